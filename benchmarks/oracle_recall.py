@@ -29,7 +29,7 @@ from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import RobotTarget, target_for
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.registry import CHECKS
-from mirotwin.verify.wanted import silent_scenario
+from mirotwin.verify.rig_options import silent_scenario
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.for_fuzzing import FOR_FUZZING

@@ -35,7 +35,7 @@ from mirotwin.shell.program import Terminated, complain
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import as_settings
-from mirotwin.verify.wanted import silent_scenario
+from mirotwin.verify.rig_options import silent_scenario
 
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0

@@ -43,9 +43,9 @@ test_line.__test__ = False  # type: ignore[attr-defined]
 
 def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str]) -> str:
     """The section of a report: what ran, which checks failed, the last events, and `lines` to reproduce it."""
-    image, world = rig.wanted.image, rig.world
+    image, world = rig.options.image, rig.world
     text = [
-        f"scenario {rig.wanted.scenario.name}, seed {rig.wanted.seed}, {at(rig.tick)}",
+        f"scenario {rig.options.scenario.name}, seed {rig.options.seed}, {at(rig.tick)}",
         f"firmware {image.path.name}, {image.sha256[:12]}",
         f"digest {world.digest}",
         *(f"check failed: {one}" for one in failures),
@@ -79,7 +79,7 @@ def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, c
     sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
-    leave(folder, text + "\n", case, sent, rig.wanted.image, others)
+    leave(folder, text + "\n", case, sent, rig.options.image, others)
 
 
 def page_of(
@@ -100,24 +100,24 @@ def page_of(
 
 
 def _material(rig: Rig, name: str, caught: BaseException | None, text: str, again: Sequence[str]) -> Material:
-    wanted = rig.wanted
-    scenario = wanted.scenario
-    expected = dict(wanted.expected)
+    options = rig.options
+    scenario = options.scenario
+    expected = dict(options.expected)
     if isinstance(caught, WaitFailed) and caught.expect is not None:
         waited = msgspec.structs.replace(scenario, expect=dict(caught.expect))
         for place, checks in expectations_of(waited, scenario.name).items():
             known = [check.name for check in expected.get(place, ())]
             expected[place] = [*expected.get(place, ()), *(one for one in checks if one.name not in known)]
-    world = World(scenario, wanted.seed, wanted.image, rig.trace.script())
+    world = World(scenario, options.seed, options.image, rig.trace.script())
     done = reproduce(world, rig.tick, expected)
     return Material(
         about=PageHeader(
             kind="failed test",
             file=name,
             name=name,
-            seed=wanted.seed,
-            firmware=wanted.image.path.name,
-            firmware_sha256=wanted.image.sha256 or "",
+            seed=options.seed,
+            firmware=options.image.path.name,
+            firmware_sha256=options.image.sha256 or "",
             report=text,
             again=again,
             verdict="failed",
@@ -126,5 +126,5 @@ def _material(rig: Rig, name: str, caught: BaseException | None, text: str, agai
         scenario_text=tomli_w.dumps(tables_of(scenario)),
         periods=done.periods,
         again=done,
-        sources=source_folders(wanted.image),
+        sources=source_folders(options.image),
     )

@@ -16,7 +16,7 @@ from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import PAGE, case_line, clear, report_line
 from mirotwin.verify.cases.replay_line import foreign_path
-from mirotwin.verify.wanted import marked, wanted
+from mirotwin.verify.rig_options import marker_options, rig_options
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
@@ -28,8 +28,8 @@ def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
     rig: Rig | None = None
     said = ""
     try:
-        mark = marked([(mark.args, mark.kwargs) for mark in item.iter_markers("mirotwin")])
-        rig = Rig(wanted(mark, item.path.parent, firmware, seed))
+        mark = marker_options([(mark.args, mark.kwargs) for mark in item.iter_markers("mirotwin")])
+        rig = Rig(rig_options(mark, item.path.parent, firmware, seed))
     except ValueError as error:
         said = f"{item.nodeid}: {error}"
     if rig is None:
@@ -77,10 +77,12 @@ def tell(
     """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
     rig = item.stash[RIG]
     failed = report.failed
-    nodeid = str(item.nodeid).replace(f"-seed{rig.wanted.seed}]", "]").replace(f"[seed{rig.wanted.seed}]", "")
+    nodeid = (
+        str(item.nodeid).replace(f"-seed{rig.options.seed}]", "]").replace(f"[seed{rig.options.seed}]", "")
+    )
     file, _, name = nodeid.partition("::")
     file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
-    again = test_line(f"{file}::{name}", rig.wanted.seed, _relative(item.config, firmware))
+    again = test_line(f"{file}::{name}", rig.options.seed, _relative(item.config, firmware))
     failures = _judged(rig) if failed else ()
     facts: dict[str, Any] = {**rig.facts(), "mirotwin_reproduce": again}
     report.user_properties += list(facts.items())
@@ -96,7 +98,7 @@ def tell(
     where = ""
     if folder is not None:
         where = str(_relative(item.config, folder))
-        lines += [] if case is None else [case_line(where, foreign_path(rig.wanted.image) is None)]
+        lines += [] if case is None else [case_line(where, foreign_path(rig.options.image) is None)]
     text = story(rig, failures, lines)
     if folder is not None and not rig.written:
         text += f"\n{report_line(where)}"

@@ -15,7 +15,7 @@ from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.wanted import Wanted
+from mirotwin.verify.rig_options import RigOptions
 
 LAST_EVENTS = 240
 LAST_LINES = 12
@@ -27,9 +27,9 @@ _STATES: dict[tuple[bytes, int, str], bytes] = {}
 class Rig:
     """The world of one test. `links`: by network; `robots`: by network and slot."""
 
-    def __init__(self, wanted: Wanted) -> None:
-        self.wanted = wanted
-        self.world, self.trace, self.checks = world_for(wanted)
+    def __init__(self, options: RigOptions) -> None:
+        self.options = options
+        self.world, self.trace, self.checks = world_for(options)
         self.links = [Link(self.world, network.index) for network in self.world.networks]
         self.robots = [
             RobotUnderTest(self.world, network.index, robot.slot)
@@ -56,9 +56,9 @@ class Rig:
     def facts(self) -> dict[str, str | int]:
         """What names a run: for the report and for JUnit."""
         return {
-            "mirotwin_seed": self.wanted.seed,
-            "mirotwin_scenario": self.wanted.scenario.name,
-            "mirotwin_firmware": self.wanted.image.sha256,
+            "mirotwin_seed": self.options.seed,
+            "mirotwin_scenario": self.options.scenario.name,
+            "mirotwin_firmware": self.options.image.sha256,
             "mirotwin_digest": self.world.digest,
         }
 
@@ -74,10 +74,10 @@ class Rig:
         return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
 
     def __repr__(self) -> str:
-        return f"Rig({self.wanted.scenario.name!r}, seed={self.wanted.seed}, tick={self.world.tick})"
+        return f"Rig({self.options.scenario.name!r}, seed={self.options.seed}, tick={self.world.tick})"
 
 
-def world_for(wanted: Wanted) -> tuple[World, Trace, Checks]:
+def world_for(options: RigOptions) -> tuple[World, Trace, Checks]:
     """A new world, what goes into it, and the checks of all that happens in it.
 
     Its robots are up, and only the first world of its kind waits for the firmware. A robot is up when its serial
@@ -86,16 +86,16 @@ def world_for(wanted: Wanted) -> tuple[World, Trace, Checks]:
 
     Raises BadInput where the firmware does not come up.
     """
-    world = World(wanted.scenario, wanted.seed, wanted.image)
+    world = World(options.scenario, options.seed, options.image)
     trace = Trace(world)
-    if not wanted.boot:
-        return world, trace, Checks(world, wanted.expected)
-    scenario = msgspec.json.encode(msgspec.structs.replace(wanted.scenario, expect={}))
-    key = (scenario, wanted.seed, wanted.image.sha256)
+    if not options.boot:
+        return world, trace, Checks(world, options.expected)
+    scenario = msgspec.json.encode(msgspec.structs.replace(options.scenario, expect={}))
+    key = (scenario, options.seed, options.image.sha256)
     if key in _STATES and not _watched(world):
         world.load(_STATES[key])
-        return world, trace, Checks(world, wanted.expected)
-    checks = Checks(world, wanted.expected)
+        return world, trace, Checks(world, options.expected)
+    checks = Checks(world, options.expected)
     _boot(world)
     seen = checks.failures or world.faults  # every test is to see them
     if not seen and not _watched(world):

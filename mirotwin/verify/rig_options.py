@@ -31,7 +31,7 @@ MARKER = "@pytest.mark.mirotwin"
 KEYS = ("scenario", "settings", "firmware", "seed", "expect", "boot")
 
 
-class Wanted(msgspec.Struct, frozen=True):
+class RigOptions(msgspec.Struct, frozen=True):
     """What a test's world is made of. `boot`: it begins when the firmware is up, not at power-on."""
 
     scenario: Scenario
@@ -41,7 +41,7 @@ class Wanted(msgspec.Struct, frozen=True):
     boot: bool
 
 
-class Marked(msgspec.Struct, frozen=True, kw_only=True):
+class MarkerOptions(msgspec.Struct, frozen=True, kw_only=True):
     """The keys of a test's markers, put together; None where none says anything."""
 
     scenario: str | Path | dict[str, Any] | None = None
@@ -52,7 +52,7 @@ class Marked(msgspec.Struct, frozen=True, kw_only=True):
     boot: bool | None = None
 
 
-def marked(marks: Sequence[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> Marked:
+def marker_options(marks: Sequence[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> MarkerOptions:
     """From the arguments of markers, the innermost one first. Raises BadInput for keys and values that cannot be."""
     found: dict[str, Any] = {}
     settings: list[str] = []
@@ -71,7 +71,7 @@ def marked(marks: Sequence[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> Marked
                 expect = {**value, **expect}
             else:
                 found.setdefault(key, value)
-    return Marked(**found, settings=tuple(settings), expect=expect)
+    return MarkerOptions(**found, settings=tuple(settings), expect=expect)
 
 
 _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
@@ -95,7 +95,7 @@ def _check_key(key: str, value: Any) -> None:
         raise BadInput("", MARKER, f"settings={value!r}", f"give {what}")
 
 
-def wanted(mark: Marked, folder: Path, firmware: str | Path | None, seed: int) -> Wanted:
+def rig_options(mark: MarkerOptions, folder: Path, firmware: str | Path | None, seed: int) -> RigOptions:
     """What a marker and the session ask for. `folder`: that of the test, from which the marker's paths go; `firmware`:
     the session's, None for the robot's own. Raises BadInput.
     """
@@ -111,10 +111,10 @@ def wanted(mark: Marked, folder: Path, firmware: str | Path | None, seed: int) -
     if mark.expect:
         scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark.expect})
     boot = mark.boot if mark.boot is not None else all(one.host == "silent" for one in scenario.networks)
-    return Wanted(scenario, image, seed, expectations_of(scenario, scenario.name), boot)
+    return RigOptions(scenario, image, seed, expectations_of(scenario, scenario.name), boot)
 
 
-def _scenario(mark: Marked, folder: Path) -> Scenario:
+def _scenario(mark: MarkerOptions, folder: Path) -> Scenario:
     source = mark.scenario
     if source is None or isinstance(source, dict):
         settings = [f"{key}={_toml(value)}" for key, value in (source or {}).items()]

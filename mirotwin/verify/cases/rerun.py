@@ -17,7 +17,7 @@ from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks, Expected
-from mirotwin.verify.wanted import silent_scenario
+from mirotwin.verify.rig_options import silent_scenario
 
 
 class Rerun(msgspec.Struct, frozen=True):

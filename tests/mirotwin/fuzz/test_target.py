@@ -17,7 +17,7 @@ from miro_sim.world.world import World
 from mirotwin.fuzz.oracle import expected_of
 from mirotwin.fuzz.target import target_for
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.wanted import silent_scenario
+from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.fuzz import target_digest
 from tests.mutants import planted

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from mirotwin.testing.rig import Rig
-from mirotwin.verify.wanted import marked, wanted
+from mirotwin.verify.rig_options import marker_options, rig_options
 
 HERE = Path(__file__).parent
 
 
 def rig(seed: int = 0, **keys: Any) -> Rig:
-    return Rig(wanted(marked([((), keys)]), HERE, None, seed))
+    return Rig(rig_options(marker_options([((), keys)]), HERE, None, seed))

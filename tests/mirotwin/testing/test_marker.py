@@ -7,7 +7,7 @@ import pytest
 from miro_exact.bad_input import BadInput
 from mirotwin.testing.rig import Rig
 from mirotwin.verify.checks.registry import ALWAYS_ON
-from mirotwin.verify.wanted import marked, wanted
+from mirotwin.verify.rig_options import marker_options, rig_options
 from tests.mirotwin.testing.rigs import HERE
 
 
@@ -31,12 +31,12 @@ from tests.mirotwin.testing.rigs import HERE
 def test_a_marker_that_cannot_be_met_is_refused_with_the_remedy(keys, said):
     mark = dict(keys)
     with pytest.raises(BadInput, match=said):
-        Rig(wanted(marked([((), mark)]), HERE, None, mark.get("seed", 0)))
+        Rig(rig_options(marker_options([((), mark)]), HERE, None, mark.get("seed", 0)))
 
 
 def test_a_marker_without_names_is_refused():
     with pytest.raises(BadInput, match="'fig6' has no name; write scenario='fig6'"):
-        marked([(("fig6",), {})])
+        marker_options([(("fig6",), {})])
 
 
 def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
@@ -47,11 +47,11 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
         "settings": ["duration_s=3", "network.robots=5"],
         "expect": {"inside_pitch": False, "frames_accepted_min": 1},
     }
-    found = marked([((), inner), ((), outer)])
+    found = marker_options([((), inner), ((), outer)])
     assert found.seed == 1
     assert found.settings == ("duration_s=3", "network.robots=5", "duration_s=2")
     assert found.expect == {"inside_pitch": True, "frames_accepted_min": 1}
-    made = wanted(found, HERE, None, 0)
+    made = rig_options(found, HERE, None, 0)
     assert (made.scenario.duration_s, made.scenario.networks[0].robots) == (2, 5)
     assert [check.name for check in made.expected[0, 0]][len(ALWAYS_ON) :] == [
         "inside_pitch",
@@ -61,6 +61,6 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
 
 def test_a_table_as_scenario_changes_keys_of_the_silent_one():
     table = {"network.radio": {"profile": "fade15", "keyup_s": 0.002}, "duration_s": 5}
-    made = wanted(marked([((), {"scenario": table})]), HERE, None, 0)
+    made = rig_options(marker_options([((), {"scenario": table})]), HERE, None, 0)
     assert made.scenario.networks[0].radio.keyup_s == 0.002
     assert made.scenario.networks[0].host == "silent"

@@ -97,7 +97,7 @@ def test_the_end_of_a_test_is_its_own_not_that_of_the_period():
 def test_checks_of_a_world_that_was_loaded_judge_as_those_from_its_begin():
     one = rig()
     whole = World(one.world.scenario, 0, one.world.image)
-    checks = Checks(whole, one.wanted.expected)
+    checks = Checks(whole, one.options.expected)
     frame = encode(ServiceFrame.ping(0, 0), 3)
     for world in (one.world, whole):
         world.run_to(ms(50))
