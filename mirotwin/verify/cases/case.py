@@ -17,7 +17,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -40,7 +39,9 @@ SUFFIX = ".stream"
 
 def case_text(world: World, trace: Trace, expect: Mapping[str, Any], verdict: str) -> str:
     """The case of `world` as it is now. `expect`: the check that failed, as in `[expect]`; `verdict`: what it said."""
-    header: dict[str, Any] = {"version": importlib.metadata.version("mirotwin"), "seed": world.seed}
+    from importlib.metadata import version  # slow to import
+
+    header: dict[str, Any] = {"version": version("mirotwin"), "seed": world.seed}
     if world.image.sha256:  # else it comes from no file
         header["firmware_sha256"] = world.image.sha256
     if verdict:

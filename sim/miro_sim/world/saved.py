@@ -15,7 +15,6 @@ its worlds are refused, and so are those of before this form. It is data: nothin
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import struct
 from functools import cache
 from typing import NamedTuple
@@ -39,9 +38,11 @@ class Identity(NamedTuple):
 @cache
 def version() -> str:
     """Of this program, as it is installed."""
+    from importlib import metadata  # slow to import
+
     try:
-        return importlib.metadata.version("mirotwin")
-    except importlib.metadata.PackageNotFoundError:
+        return metadata.version("mirotwin")
+    except metadata.PackageNotFoundError:
         return "unknown"
 
 
