@@ -110,7 +110,7 @@ class ResultRows:
         name, equals, values = text.partition("=")
         if name not in self.about.factors:
             remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
-            raise BadInput(self.path, "--compare", f"has no factor {name!r}", remedy)
+            raise BadInput(self.path, "--between", f"has no factor {name!r}", remedy)
         levels = self.levels(name)
         if not equals and len(levels) == 2:
             return name, levels[0], levels[1]
@@ -121,7 +121,7 @@ class ResultRows:
                 return name, first, second
         shown = ", ".join(f"{level}" for level in levels)
         raise BadInput(
-            self.path, "--compare", f"{text!r} names no two levels", f"give {name}=A,B of: {shown}"
+            self.path, "--between", f"{text!r} names no two levels", f"give {name}=A,B of: {shown}"
         )
 
 

@@ -66,7 +66,7 @@ def test_medians_and_their_intervals_are_those_of_campaign_show(results, markup)
 
 
 def test_paired_differences_are_those_of_campaign_show(results, markup):
-    compared = shown(results, "--compare", "start")
+    compared = shown(results, "--between", "start")
     assert f"start: {compared['second']} against {compared['first']}, 40 pairs" in markup.text
     for one in compared["differences"]:
         low, high = one["interval"]["low"], one["interval"]["high"]
