@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import click
 
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.seeds import MOST_SEEDS, seeds_of
 from mirotwin.shell.command import Option
 
 
@@ -16,7 +15,7 @@ class SeedRange(click.ParamType[range]):
 
     name = "seeds"
 
-    def __init__(self, most: int = sys.maxsize) -> None:
+    def __init__(self, most: int = MOST_SEEDS) -> None:
         self.most = most
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
