@@ -31,32 +31,36 @@ LINES_AROUND = 5
 
 
 class Console:
-    """Reads commands, and prints what comes of them."""
+    """Does commands, and gives `tell` the lines that come of them."""
 
-    def __init__(self, debugger: Debugger) -> None:
+    def __init__(self, debugger: Debugger, tell: Callable[[str], object] = show_line) -> None:
         self.debugger = debugger
+        self.tell = tell
         self.frame = 0
         self.stopped = False
         self.ended = False
         self.last = ""
-        debugger.timeline.interrupted = lambda: self.stopped
 
     def run(self, line: str) -> bool:
-        """Does one command; False where it could not, which it says."""
+        """Does one command; the last step again where the line is empty. False where it could not, which it says."""
         words = line.strip() or self.last
-        if not words:
-            return True
-        verb, _, rest = words.partition(" ")
-        if verb == "r" and rest:
-            verb, _, rest = f"r{rest}".partition(" ")
-        self.last = words if verb.lstrip("r") in ("continue", "step", "next", "finish", *"csnf") else ""
+        verb = words.partition(" ")[0]
+        self.last = words if verb.lstrip("r") in ("continue", "step", "stepi", "next", *"csn") else ""
         try:
             with self._interruptible():
-                self._verb(verb)(rest.strip())
+                self.do(words)
         except BadInput as error:
             complain(f"error: {error}")
             return False
         return True
+
+    def do(self, line: str) -> None:
+        """The same without a word about errors. Raises BadInput."""
+        verb, _, rest = line.strip().partition(" ")
+        if verb == "r" and rest:
+            verb, _, rest = f"r{rest.strip()}".partition(" ")
+        if verb:
+            self._verb(verb)(rest.strip())
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
@@ -66,6 +70,7 @@ class Console:
         def stop(number: int, frame: FrameType | None) -> None:
             self.stopped = True
 
+        self.debugger.timeline.interrupted = lambda: self.stopped
         before = signal.signal(signal.SIGINT, stop)
         try:
             yield
@@ -168,21 +173,21 @@ class Console:
         self.frame = 0
         for cycle, core, text, address in self.debugger.told:
             place = (
-                f"{self._time(cycle * CYCLE_TICKS)}  {self._core(core)}{self.debugger.symbols.place(address)}"
+                f"{self.time(cycle * CYCLE_TICKS)}  {self.core(core)}{self.debugger.symbols.place(address)}"
             )
-            show_line(f"{place}: {text}")
+            self.tell(f"{place}: {text}")
         self.debugger.told.clear()
         focus = self.debugger.timeline.focus
         place = self.debugger.symbols.place(self.debugger.cpu.pc)
-        show_line(
-            f"{self._time(self.debugger.timeline.tick)}  {self._core(focus)}{why}: {place}{self._source()}"
+        self.tell(
+            f"{self.time(self.debugger.timeline.tick)}  {self.core(focus)}{why}: {place}{self._source()}"
         )
 
-    def _core(self, at: int) -> str:
+    def core(self, at: int) -> str:
         cores = self.debugger.timeline.cores
         return f"{cores[at].name}  " if len(cores) > 1 else ""
 
-    def _time(self, tick: int) -> str:
+    def time(self, tick: int) -> str:
         return f"{tick / self._hz:.7f}s" if self._hz == TICKS_PER_SECOND else f"{tick}t"
 
     def _source(self) -> str:
@@ -197,26 +202,24 @@ class Console:
     def _break(self, rest: str) -> None:
         if not rest:
             for one in self.debugger.breakpoints:
-                show_line(f"{one.number}  {one.text}")
+                self.tell(f"{one.number}  {one.text}")
             return
         place, _, condition = rest.partition(" if ")
-        found = self.debugger.symbols.at(place.strip())
+        symbols, place = self.debugger.symbols, place.strip()
+        found = symbols.at(place)
         one = self.debugger.add(rest, found.addresses, condition)
-        moved = (
-            "" if found.line is None or not place.strip().endswith(tuple("0123456789")) else str(found.line)
-        )
-        note = (
-            f" (no code in {place.strip()}: moved on)"
-            if ":" in place and moved and not moved.endswith(_line(place))
-            else ""
-        )
-        show_line(f"breakpoint {one.number}: {self.debugger.symbols.place(found.addresses[0])}{note}")
+        note = ""
+        if found.line is not None and ":" in place and not place.endswith(f":{found.line.line}"):
+            note = f" ({place} has no code: the next line that has some)"
+        if not symbols.instructions.issuperset(found.addresses):
+            note = " (no instruction is known to begin there)"
+        self.tell(f"breakpoint {one.number}: {symbols.place(found.addresses[0])}{note}")
 
     def _watch(self, rest: str) -> None:
         name, _, condition = rest.partition(" if ")
         one = self.debugger.watch(name.strip(), condition)
         one.text = f"watch {rest}"
-        show_line(f"breakpoint {one.number}: before {name.strip()} is written")
+        self.tell(f"breakpoint {one.number}: before {name.strip()} is written")
 
     def _delete(self, rest: str) -> None:
         there = self.debugger.breakpoints
@@ -232,21 +235,32 @@ class Console:
             if not rest.isdecimal() or int(rest) >= len(frames):
                 raise BadInput("", "where", f"there is no frame {rest}", f"there are 0 to {len(frames) - 1}")
             self.frame = int(rest)
-        show_frames(self.debugger, frames, self.frame)
+        self._frames(frames, self.frame)
 
     def _print(self, rest: str) -> None:
         moment = self.debugger.moment(self.frame)
         value = expression(rest)(moment)
         for line in lines_of(rest, value, moment):
-            show_line(line)
+            self.tell(line)
 
     def _who(self, rest: str) -> None:
         found = self.debugger.last_writer(self.debugger.bytes_of(rest))
         if found is None:
-            show_line(f"nothing wrote {rest} before")
+            self.tell(f"nothing wrote {rest} before")
             return
-        show_line(f"{self._time(found.tick)}  {rest} was last written by")
-        show_frames(self.debugger, found.frames)
+        self.tell(f"{self.time(found.tick)}  {rest} was last written by")
+        self._frames(found.frames)
+
+    def _frames(self, frames: list[Frame], chosen: int = -1) -> None:
+        """One line a frame, the innermost first."""
+        symbols = self.debugger.symbols
+        for at, frame in enumerate(frames):
+            called = at > 0 and not frames[at - 1].by_interrupt
+            place = symbols.unwinder.call_before(frame.pc) if called else frame.pc
+            how = "  <- interrupt" if frame.by_interrupt else ""
+            self.tell(f"{'*' if at == chosen else ' '}#{at}  {symbols.place(place)}{how}")
+        if not frames[-1].known:
+            self.tell("    the stack cannot be told from here on")
 
     def _list(self, rest: str) -> None:
         symbols = self.debugger.symbols
@@ -255,7 +269,7 @@ class Console:
         path = None if line is None else symbols.sources.path(line.file)
         if line is None or path is None:
             for _ in range(2 * LINES_AROUND):
-                show_line(
+                self.tell(
                     f"{'=>' if address == self.debugger.cpu.pc else '  '} {address:#06x}  "
                     + disassemble(symbols.image.code, address, symbols.names)
                 )
@@ -263,27 +277,14 @@ class Console:
             return
         text = path.read_text(errors="replace").splitlines()
         for number in range(max(1, line.line - LINES_AROUND), min(len(text), line.line + LINES_AROUND) + 1):
-            show_line(f"{'=>' if number == line.line else '  '} {number:4}  {text[number - 1]}")
+            self.tell(f"{'=>' if number == line.line else '  '} {number:4}  {text[number - 1]}")
 
     def _help(self, rest: str) -> None:
         for verb, (_, text) in self.verbs().items():
-            show_line(f"{verb:10} {text}")
+            self.tell(f"{verb:10} {text}")
 
     def _quit(self, rest: str) -> None:
         self.ended = True
-
-
-def show_frames(debugger: Debugger, frames: list[Frame], chosen: int = -1) -> None:
-    """One line a frame, the innermost first."""
-    symbols = debugger.symbols
-    for at, frame in enumerate(frames):
-        inside = (
-            symbols.unwinder.call_before(frame.pc) if at and not frames[at - 1].by_interrupt else frame.pc
-        )
-        how = "  <- interrupt" if frame.by_interrupt else ""
-        show_line(f"{'*' if at == chosen else ' '}#{at}  {symbols.place(inside)}{how}")
-    if not frames[-1].known:
-        show_line("    the stack cannot be told from here on")
 
 
 def lines_of(name: str, value: Value, moment: Any) -> Iterator[str]:
@@ -310,7 +311,3 @@ def _value(text: str) -> Any:
     with suppress(ValueError):
         return int(text, 0)
     return text
-
-
-def _line(place: str) -> str:
-    return place.strip().rpartition(":")[2]

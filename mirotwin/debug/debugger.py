@@ -88,6 +88,11 @@ class Debugger:
         return Moment(self.symbols, self.core, self.frames()[frame] if frame else None, not frame)
 
     @property
+    def _went(self) -> bool:
+        """Whether it stands behind the begin of the run."""
+        return self.timeline.tick > self.timeline.begin_tick
+
+    @property
     def _base(self) -> int:
         return self.symbols.unwinder.base(self.cpu)
 
@@ -237,7 +242,7 @@ class Debugger:
         hit = self.timeline.find_back(traps or self._traps(silent=True))
         if hit is not None:
             return self._named(hit.found)
-        return "the run begins here" if not self.timeline.tick else "interrupted"
+        return "interrupted" if self._went else "the run begins here"
 
     def _named(self, found: object) -> str:
         return f"breakpoint {found.number}" if isinstance(found, Breakpoint) else "step"
@@ -273,9 +278,10 @@ class Debugger:
         while True:
             if not self.timeline.step_back():
                 return "the run begins here"
-            if how != "over" or self._base <= base or not self.symbols.unwinder.frames(self.cpu)[0].known:
+            frames = self.frames()
+            if how != "over" or self._base <= base or len(frames) < 2:
                 return "step"
-            by_interrupt = self.frames()[0].by_interrupt
+            by_interrupt = frames[0].by_interrupt
             self._out_back()
             if not by_interrupt:
                 return "step"
@@ -385,7 +391,7 @@ class Debugger:
         if found != "line":
             return "the run begins here" if found == "begin" else "step"
         self._begin_of_line()
-        return "step" if timeline.tick else "the run begins here"
+        return "step" if self._went else "the run begins here"
 
     def _any_line_back(self, base: int, line: SourceLine | None) -> str:
         """The last line begun, of any function at the same level of interrupt; of a routine, where it was called."""

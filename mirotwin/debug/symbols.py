@@ -29,7 +29,7 @@ from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
 _BYTE, _WORD, _BIT = CType("int", 1), CType("int", 2), CType("bit", 1)
-_SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
+SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
 _CHIP = (
     *(
         "desired_position",
@@ -78,6 +78,7 @@ class Symbols:
         self.unwinder = Unwinder(image, self.names)
         self.variables = variables_of(image)
         self.blocks: Blocks = parse_blocks(read_text(image.path.with_suffix(".cdb")))
+        self.begins = dict(self.debug.lines)
         self.starts = [address for address, _ in self.debug.lines]
         self.instructions = instructions_of(
             image.code,
@@ -154,7 +155,7 @@ class Symbols:
 
     def known_names(self) -> list[str]:
         """For completion and remedies."""
-        return [*self.variables.by_name, *_REGISTERS, *SFRS, *BITS, "lm629", "pins", "tick", "cycle", *_SIZES]
+        return [*self.variables.by_name, *_REGISTERS, *SFRS, *BITS, "lm629", "pins", "tick", "cycle", *SIZES]
 
 
 class Moment:
@@ -176,8 +177,8 @@ class Moment:
                     return value() if callable(value) else value
         variable = self._variable(name, module)
         if variable is not None:
-            return self._placed(variable)
-        special = self._special(name) if not module else None
+            return self.placed(variable)
+        special = self._find_special(name) if not module else None
         if special is not None:
             return special
         symbol = self.symbols.image.symbols.find(name)
@@ -201,7 +202,8 @@ class Moment:
             raise NoValue(f"there are several {name}", f"give one of {places}")
         return ranked[0] if ranked else None
 
-    def _placed(self, variable: Variable) -> Value:
+    def placed(self, variable: Variable) -> Value:
+        """What a variable with a place means."""
         fields = self.symbols.variables.fields(variable)
         return Value(variable.type, variable.space, variable.address, fields=fields)
 
@@ -214,7 +216,7 @@ class Moment:
         for one in self.symbols.blocks.visible(name, function.first, self.pc):
             yield one.name, partial(self._in_registers, one)
         for variable in self.symbols.variables_in(name):
-            yield variable.name, self._placed(variable)
+            yield variable.name, self.placed(variable)
 
     def _in_registers(self, one: RegisterVariable) -> Value:
         if one.on_stack:
@@ -232,7 +234,7 @@ class Moment:
         where = " ".join(register.upper() for register in reversed(one.registers))
         return Value(one.type, number=number, note=f"in {where}: theirs only while the compiler needs it")
 
-    def _special(self, name: str) -> Value | None:
+    def _find_special(self, name: str) -> Value | None:
         cpu, board = self.core.cpu, self.core.board
         if name in _REGISTERS:
             return Value(number=_REGISTERS[name](cpu))
@@ -242,8 +244,8 @@ class Moment:
             return Value(_BYTE, "sfr", SFRS[name])
         if name in BITS:
             return Value(_BIT, "bit", BITS[name])
-        if name in _SIZES and (name != "xram" or board is None):
-            return memory(name, _SIZES[name])
+        if name in SIZES and (name != "xram" or board is None):
+            return memory(name, SIZES[name])
         if name == "pins":
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
         if name == "lm629" and board is not None:
@@ -251,6 +253,13 @@ class Moment:
         if name in ("cycle", "tick"):
             return Value(number=cpu.cycles * (CYCLE_TICKS if name == "tick" else 1))
         return None
+
+    def special(self, name: str) -> Value:
+        """A register, a bit, a memory, the chips. Raises NoValue."""
+        found = self._find_special(name)
+        if found is None:
+            raise NoValue(f"there is no {name} here")
+        return found
 
     def _pins(self, port: int) -> Value:
         tap = CpuTap(self.core.board, lambda: None)

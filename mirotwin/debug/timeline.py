@@ -205,7 +205,6 @@ class Timeline:
         self.cores = self.machine.cores
         self.focus = self.machine.focus
         self.interrupted = interrupted
-        self.frontier = 0
         self._kept: list[_Checkpoint] = []
         self._bytes = 0
         self._loaded: tuple[int, bytes] = (-1, b"")
@@ -214,6 +213,16 @@ class Timeline:
     @property
     def core(self) -> Core:
         return self.cores[self.focus]
+
+    @property
+    def begin_tick(self) -> int:
+        """Where the run begins: 0, or where a saved world goes on."""
+        return self._kept[0].tick
+
+    @property
+    def frontier(self) -> int:
+        """How far the run has been."""
+        return max(self._kept[-1].tick, self.machine.tick)
 
     @property
     def tick(self) -> int:
@@ -374,7 +383,7 @@ class Timeline:
                 self._run_to(end_tick)
             if found:
                 return self._land(max(found.values(), key=_order))
-            if begin_tick == 0 or self.interrupted():
+            if begin_tick == self.begin_tick or self.interrupted():
                 self.go_to(begin_tick)
                 return None
             end_tick = begin_tick
@@ -391,6 +400,20 @@ class Timeline:
                 return event
             self.save()
         return None
+
+    def radio_events(self) -> list[Event]:
+        """Frames on the air of the network of the robot in focus, up to now."""
+        if not isinstance(self.machine, _RobotMachine):
+            return []
+        network = self.machine.world.networks[self.machine.robots[self.focus].network]
+        events = (event for _, event in network.log.since(0, heard=False))
+        return [event for event in events if event.what in ("sent", "answer") and event.tick <= self.tick]
+
+    def find_core(self, network: int, slot: int) -> int:
+        """The processor of the robot in a slot; the one in focus where there is none."""
+        robots = self.machine.robots if isinstance(self.machine, _RobotMachine) else []
+        places = [(robot.network, robot.slot) for robot in robots]
+        return places.index((network, slot)) if (network, slot) in places else self.focus
 
     @contextmanager
     def _asking(self, traps: Mapping[int, Trap], tell: Callable[[Hit], bool]) -> Iterator[None]:

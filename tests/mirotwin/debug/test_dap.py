@@ -1,0 +1,208 @@
+"""What the adapter answers to clients that ask wrongly, at the wrong time, or not at all."""
+
+import json
+import socket
+import sys
+
+import pytest
+
+from tests import children
+
+MIROTWIN = [sys.executable, "-c", "from mirotwin.commands import main; main()", "debug"]
+
+
+class Client:
+    """A client that can also send what is no message."""
+
+    def __init__(self, source, sink):
+        self.source = source
+        self.sink = sink
+        self.seq = 0
+
+    def raw(self, data):
+        self.sink.write(data)
+        self.sink.flush()
+
+    def send(self, command, **arguments):
+        self.seq += 1
+        data = json.dumps(
+            {"seq": self.seq, "type": "request", "command": command, "arguments": arguments}
+        ).encode()
+        self.raw(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+
+    def message(self):
+        size = int(self.source.readline().split(b":")[1])
+        self.source.readline()
+        return json.loads(self.source.read(size))
+
+    def until(self, **wanted):
+        """The next message with these values."""
+        while True:
+            found = self.message()
+            if all(found.get(key) == value for key, value in wanted.items()):
+                return found
+
+    def ask(self, command, **arguments):
+        self.send(command, **arguments)
+        return self.until(type="response", command=command)
+
+    def begin(self, **configuration):
+        self.ask("initialize")
+        launched = self.ask("launch", **configuration)
+        assert launched["success"], launched
+        self.ask("configurationDone")
+        return self.until(event="stopped")["body"]
+
+
+@pytest.fixture
+def adapter():
+    process = children.start([*MIROTWIN, "--dap"], stdin=-1, stdout=-1, stderr=-1)
+    yield process, Client(process.stdout, process.stdin)
+    process.kill()
+    process.communicate()
+
+
+def ended(process):
+    """How it ended by itself: exit code and what it said."""
+    _, err = process.communicate(timeout=60)
+    return process.returncode, err.decode()
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"Content-Length: 3\r\n\r\nabc",
+        b"Content-Length: 2\r\n\r\n{}",
+        b"Content-Length: 999999999\r\n\r\n",
+        b"x" * 10_000,
+        b'Content-Length: 60\r\n\r\n{"seq": 1, "type": "request", "command": "x", "arguments": 7}',
+    ],
+)
+def test_garbage_ends_it_with_one_line(adapter, garbage):
+    process, client = adapter
+    client.raw(garbage)
+    code, err = ended(process)
+    assert code == 2
+    assert err.startswith("mirotwin: error: --dap: the client sends no message of the protocol")
+    assert err.count("\n") == 1
+
+
+def test_a_client_that_dies_leaves_no_process(adapter):
+    process, client = adapter
+    client.begin(subject="fig6")
+    client.send("continue", threadId=1)
+    assert ended(process) == (0, "mirotwin: the client has gone\n")
+
+
+def test_what_comes_during_a_run_gets_an_answer_each(adapter):
+    process, client = adapter
+    client.begin(subject="silent", set=["duration_s=60"])
+    client.send("continue", threadId=1)
+    client.send("threads")
+    client.send("stackTrace", threadId=1)
+    client.send("setFunctionBreakpoints", breakpoints=[])
+    client.send("pause", threadId=1)
+    answers = [client.until(type="response") for _ in range(5)]
+    assert [(one["command"], one["success"]) for one in answers] == [
+        ("continue", True),
+        ("threads", True),
+        ("stackTrace", False),
+        ("setFunctionBreakpoints", True),
+        ("pause", True),
+    ]
+    assert answers[2]["message"] == "the run is under way: pause it first"
+    assert client.until(event="stopped")["body"]["reason"] == "pause"
+    client.ask("disconnect")
+    assert ended(process) == (0, "")
+
+
+def test_a_breakpoint_that_is_set_during_a_run_stops_it(adapter):
+    _, client = adapter
+    client.begin(subject="silent", set=["duration_s=60"])
+    client.send("continue", threadId=1)
+    client.send("setFunctionBreakpoints", breakpoints=[{"name": "failsafe_tick"}])
+    assert client.until(event="stopped")["body"]["reason"] == "function breakpoint"
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "said"),
+    [
+        ("restartFrame", {"frameId": 1}, "restartFrame: is not answered by this debugger"),
+        ("continue", {"threadId": 9}, "there is no such robot"),
+        ("continue", {}, "arguments that cannot be used"),
+        ("variables", {"variablesReference": 77}, "is of a moment that is left"),
+        ("evaluate", {"expression": "1 +"}, "lacks a name or a number"),
+        ("readMemory", {"memoryReference": "moon:0x0", "count": 1}, "arguments that cannot be used"),
+        ("scopes", {"frameId": 999}, "arguments that cannot be used"),
+    ],
+)
+def test_a_request_that_cannot_be_done_gets_an_error_and_the_session_goes_on(
+    adapter, command, arguments, said
+):
+    _, client = adapter
+    client.begin(subject="fig6")
+    answer = client.ask(command, **arguments)
+    assert not answer["success"]
+    assert said in answer["message"]
+    assert client.ask("threads")["success"]
+
+
+def test_breakpoints_that_cannot_be_set_say_why(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    source = {"path": "/elsewhere/failsafe.c"}
+    lines = [
+        {"line": 146, "condition": "age >"},
+        {"line": 9999},
+        {"line": 146, "hitCondition": "often"},
+        {"line": 146},
+    ]
+    found = client.ask("setBreakpoints", source=source, breakpoints=lines)["body"]["breakpoints"]
+    assert [one["verified"] for one in found] == [False, False, False, True]
+    assert all(one["message"] for one in found[:3])
+
+
+@pytest.mark.parametrize(
+    ("configuration", "said"),
+    [
+        ({}, "subject: is missing"),
+        ({"subject": "no_such_scenario"}, "no_such_scenario"),
+        ({"subject": "fig6", "at": "12"}, "it has no unit"),
+        ({"subject": "fig6", "slot": "x"}, "its keys are"),
+    ],
+)
+def test_a_launch_that_cannot_be_done_says_why(adapter, configuration, said):
+    _, client = adapter
+    client.ask("initialize")
+    assert client.ask("threads")["message"] == "threads: there is no run yet; send launch first"
+    answer = client.ask("launch", **configuration)
+    assert not answer["success"]
+    assert said in answer["message"]
+
+
+def test_it_listens_on_a_port_of_this_machine_alone():
+    process = children.start([*MIROTWIN, "--listen", "0"], stdout=-1, stderr=-1)
+    port = int(process.stderr.readline().rpartition(b":")[2])
+    with socket.create_connection(("127.0.0.1", port)) as connection, connection.makefile("rwb") as stream:
+        client = Client(stream, stream)
+        assert client.begin(subject="fig6", at="20ms")["reason"] == "goto"
+        client.ask("disconnect")
+    assert ended(process)[0] == 0
+
+
+def test_robots_are_threads_that_stop_together(adapter, short):
+    _, client = adapter
+    client.begin(subject=str(short))
+    threads = client.ask("threads")["body"]["threads"]
+    assert [one["name"] for one in threads] == ["net0/robot0", "net0/robot2"]
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "failsafe_fresh"}])
+    stopped = set()
+    for _ in range(2):
+        client.send("continue", threadId=1)
+        body = client.until(event="stopped")["body"]
+        assert body["allThreadsStopped"]
+        trace = client.ask("stackTrace", threadId=body["threadId"])["body"]["stackFrames"]
+        assert trace[0]["name"] == "failsafe_fresh"
+        stopped.add(body["threadId"])
+    assert stopped == {1, 2}

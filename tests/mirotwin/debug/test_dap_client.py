@@ -1,0 +1,80 @@
+"""Editors' own client drives the adapter: `@vscode/debugadapter-testsupport`, with which adapters are tested.
+
+    npm install --prefix build/npm @vscode/debugadapter-testsupport@1.68.0
+
+What the adapter sends is compared with the published schema of the protocol, which the package debugpy carries.
+"""
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from miro_robot.firmware import source_folder
+from tests import children
+
+ROOT = Path(__file__).parents[3]
+MODULES = ROOT / "build" / "npm" / "node_modules"
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory):
+    """Messages that the adapter sent while the client asked for all that it can do."""
+    if shutil.which("node") is None or not (MODULES / "@vscode" / "debugadapter-testsupport").is_dir():
+        pytest.skip("node, or the package @vscode/debugadapter-testsupport in build/npm, is not there")
+    log = tmp_path_factory.mktemp("dap") / "sent"
+    words = ["node", HERE / "dap_client.js", sys.executable, HERE / "dap_server.py", source_folder()]
+    environment = {**os.environ, "NODE_PATH": str(MODULES), "DAP_SENT": str(log)}
+    done = children.run(words, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found, data = [], log.read_bytes()
+    while data:
+        head, _, rest = data.partition(b"\r\n\r\n")
+        size = int(re.fullmatch(rb"Content-Length: (\d+)", head)[1])
+        found.append(msgspec.json.decode(rest[:size]))
+        data = rest[size:]
+    return found
+
+
+def test_the_client_gets_what_it_asks_for(sent):
+    assert [message["seq"] for message in sent] == list(range(1, len(sent) + 1))
+    assert {message["type"] for message in sent} == {"response", "event"}
+
+
+def schema():
+    jsonschema = pytest.importorskip("jsonschema")
+    debugpy = pytest.importorskip("debugpy")
+    path = Path(debugpy.__file__).parent / "_vendored/pydevd/_pydevd_bundle/_debug_adapter/debugProtocol.json"
+    return jsonschema.Draft4Validator, msgspec.json.decode(path.read_bytes())
+
+
+def definition_of(message, definitions):
+    """The name of the schema's definition for a message: `StackTraceResponse`, `StoppedEvent`."""
+    if message["type"] == "response" and not message["success"]:
+        return "ErrorResponse"
+    name = message["command"] if message["type"] == "response" else message["event"]
+    return next(one for one in definitions if one.lower() == f"{name}{message['type']}".lower())
+
+
+def test_each_message_is_valid_against_the_published_schema(sent):
+    validator, document = schema()
+    seen = set()
+    for message in sent:
+        name = definition_of(message, document["definitions"])
+        seen.add(name)
+        checker = validator({**document, "$ref": f"#/definitions/{name}"})
+        assert not [f"{name}: {error.message}: {message}" for error in checker.iter_errors(message)]
+    assert len(seen) > 25
+
+
+def test_a_message_that_is_wrong_would_be_found():
+    validator, document = schema()
+    checker = validator({**document, "$ref": "#/definitions/StoppedEvent"})
+    assert list(
+        checker.iter_errors({"seq": 1, "type": "event", "event": "stopped", "body": {"threadId": "one"}})
+    )
