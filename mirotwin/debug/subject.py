@@ -35,7 +35,7 @@ from mirotwin.verify.checks.monitors import Checks
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     """What is debugged, from where on, and where its C files are."""
 
-    subject: Annotated[str, Argument("SUBJECT", NAME)] = ""
+    subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     resume: Annotated[
         str | None, Option(metavar="FILE.world", type=NAME, help="Scenario: begin with a saved world of it.")

@@ -129,7 +129,7 @@ def test_a_case_stands_at_its_failed_check(mirotwin, finished, tmp_path):
         ("print nothing", "there is no nothing here"),
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
-        ("until edge pin=nowhere", "is no pin"),
+        ("until edge pin=nowhere", "is not a pin"),
         ("watch lm629.left.status", "lies in no memory that can be watched"),
         ("finish", "nothing called this function"),
         ("where 7", "there is no frame 7"),
