@@ -11,6 +11,7 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.bare.case import replay_bare
+from mirotwin.verify.cases.replay_line import debug_line, foreign_path
 from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
 
@@ -27,7 +28,11 @@ def replay_case(job: Job, image: Image, file: str, quiet: bool) -> int:
     with ProgressBar("replaying", periods, quiet) as bar:
         again = rerun_job(job, image, file, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
     judged = all(one.name != name or one.verdict != "not judged" for one in again.checks.verdicts())
-    return _say(verdict_of(job.case.verdict, again.failures, job.case.changed, judged))
+    verdict = verdict_of(job.case.verdict, again.failures, job.case.changed, judged)
+    _say(verdict)
+    if again.failures and not quiet:
+        show(debug_line(file, foreign_path(image)))
+    return verdict.code
 
 
 def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:

@@ -44,7 +44,7 @@ from mirotwin.shell.program import DIVERGENCE, DONE, complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
-from mirotwin.verify.cases.replay_line import CaseOptions
+from mirotwin.verify.cases.replay_line import CaseOptions, debug_line
 from mirotwin.verify.cases.rerun import Rerun
 from mirotwin.verify.checks.expect import says_anything
 from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
@@ -163,6 +163,8 @@ def replay(options: ReplayOptions) -> int:
         show(expectations_text(checks.verdicts()))
     faults = report_faults(world)
     differs = _verdict(job, compare, periods, replayed, found, apart)
+    if found and not options.quiet and not compare.as_json:
+        show(debug_line(file, options.firmware, found[0].tick))
     decides = any(".expect." in f".{one}" for one in settings)
     code = (faults or failed) if decides else (differs or faults or failed)
     if compare.as_json:

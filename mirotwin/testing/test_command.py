@@ -25,7 +25,7 @@ from mirotwin.shell.options import (
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.testing.case_test import CaseTests
-from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_line, report_line
+from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_debug_line, case_line, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.interface import in_ms
@@ -165,7 +165,9 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
         show_line(f"    left in {outcome.left}")
         case = Path(outcome.left) / CASE
         if case.exists():
-            show_line(f"    {case_line(outcome.left, not case.with_name(FIRMWARE).exists())}")
+            own = not case.with_name(FIRMWARE).exists()
+            show_line(f"    {case_line(outcome.left, own)}")
+            show_line(f"    {case_debug_line(outcome.left, own)}")
         show_line(f"    {report_line(outcome.left)}")
     if not passed and outcome.verdict != "error":
         show_line(f"    {again}")

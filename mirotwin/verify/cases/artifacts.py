@@ -16,7 +16,7 @@ from pathlib import Path
 from miro_robot.image import Image
 from mirotwin.shell.command_line import command_line, operand
 from mirotwin.verify.cases.case import write_case
-from mirotwin.verify.cases.replay_line import foreign_path, replay_line
+from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
 CASES = (CASE, SENT)
@@ -80,6 +80,11 @@ MOST_BYTES = 1 << 20
 def case_line(folder: str, own: bool, name: str = CASE) -> str:
     """The command that gives the verdict of the case in `folder` again; `own`: with the robot's own firmware."""
     return replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+
+
+def case_debug_line(folder: str, own: bool, name: str = CASE) -> str:
+    """The command that stands at the failed check of that case."""
+    return debug_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
 
 
 def report_line(folder: str) -> str:

@@ -1,4 +1,4 @@
-"""The command that plays a stream or a case again."""
+"""The commands that play a stream or a case again, and that stand at what failed in it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
-from mirotwin.shell.command import Argument, Options
+from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import FIRMWARE, NAME
 from mirotwin.verify.expectations import CHECK, Expected
 
@@ -27,6 +27,21 @@ class CaseOptions(Options, frozen=True, kw_only=True):
         str | None,
         CHECK.saying("FILE.py:FUNCTION, for a case of a bare processor whose check is in a file."),
     ] = None
+
+
+class DebugOptions(CaseOptions, frozen=True, kw_only=True):
+    """What `mirotwin debug` is told of a case or a recording; the command has more options."""
+
+    COMMAND = "debug"
+    at: Annotated[str, Option(help="Where to stand first.")] = ""
+
+
+def debug_line(
+    file: str | PathLike[str], firmware: str | PathLike[str] | None = None, at_tick: int | None = None
+) -> str:
+    """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
+    image, at = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
+    return DebugOptions(file=f"{file}", firmware=image, at=at).command_line()
 
 
 def replay_line(

@@ -31,7 +31,14 @@ from mirotwin.shell.options import (
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.cases.artifacts import FIRMWARE, IMAGE_FILES, case_line, leave_image, report_line
+from mirotwin.verify.cases.artifacts import (
+    FIRMWARE,
+    IMAGE_FILES,
+    case_debug_line,
+    case_line,
+    leave_image,
+    report_line,
+)
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.causes import begin_with, causes_first, folded
 from mirotwin.verify.conform.explain import explain
@@ -232,6 +239,7 @@ def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:
     own = not (artifacts / FIRMWARE).exists()
     for name in names:
         show_line(case_line(f"{artifacts}", own, name))
+        show_line(case_debug_line(f"{artifacts}", own, name))
     if names:
         show_line(report_line(f"{artifacts / names[0]}"))
 

@@ -58,8 +58,9 @@ def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_pa
     said = line.split(maxsplit=3)[3]
     assert "found left at 124.94 ms, right at" in said
     assert "wanted both wheels told to stop 108.46 ms to 110.50 ms after the end of" in said
-    assert out.splitlines()[-2:] == [
+    assert out.splitlines()[-3:] == [
         f"mirotwin replay {folder / 'P29.stream'} --firmware {folder / 'firmware.ihx'}",
+        f"mirotwin debug {folder / 'P29.stream'} --firmware {folder / 'firmware.ihx'}",
         f"page: mirotwin report {folder / 'P29.stream'}",
     ]
     assert sorted(path.name for path in folder.iterdir()) == ["P29.stream", "firmware.ihx"]
