@@ -1,0 +1,233 @@
+"""Ports that vanish, block, speak nonsense or are somebody else's: one line each, and the robot is told to stop."""
+
+import errno
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import tty
+from contextlib import suppress
+
+import pytest
+import serial
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.decoder import Decoder
+from miro_protocol.events import Received
+from miro_protocol.frames import TeamFrame, encode
+from mirotwin.desk.guard import MotionLimits
+from mirotwin.desk.robot_port import PortError, RobotPort
+from mirotwin.desk.session import greet
+from tests import children
+from tests.mirotwin.desk.rig import stream_text
+from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
+
+MS = 24_000
+MOVING = MotionLimits(motion=True)
+DRIVE = encode(TeamFrame(0, 20, ((300, 300),) * 3), 3)
+
+
+class Pty:
+    """A pseudo-terminal: the test has its master side, where a robot would be."""
+
+    def __init__(self):
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self.slave = slave
+
+    def read(self):
+        os.set_blocking(self.master, False)
+        found = b""
+        with suppress(OSError):
+            while data := os.read(self.master, 4096):
+                found += data
+        return found
+
+    def close(self):
+        for one in (self.master, self.slave):
+            with suppress(OSError):
+                os.close(one)
+
+
+@pytest.fixture
+def pty():
+    found = Pty()
+    yield found
+    found.close()
+
+
+def stops(data):
+    """Whether what was sent ends with three frames that tell all robots to stand."""
+    found = [event.message(3) for event in Decoder(3).feed(data) if isinstance(event, Received)]
+    return [frame.velocities for frame in found[-3:]] == [((0, 0),) * 3] * 3
+
+
+def test_a_port_that_is_closed_has_told_its_robots_to_stop(pty):
+    with RobotPort(pty.path, MOVING) as port:
+        port.send(DRIVE)
+        assert pty.read() == DRIVE
+    assert port.stopped
+    assert stops(DRIVE + pty.read())
+
+
+def broken_off(path, do, error, limits=MOVING):
+    """A talk that ends by an error; the port, and the error's line."""
+    port = RobotPort(str(path), limits)
+    with pytest.raises(error) as caught, port:
+        do(port)
+    assert "\n" not in str(caught.value)
+    return port, str(caught.value)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, SystemExit])
+def test_whatever_ends_a_talk_the_robots_are_told_to_stop_first(pty, error):
+    def do(port):
+        port.send(DRIVE)
+        raise error
+
+    broken_off(pty.path, do, error)
+    assert stops(pty.read())
+
+
+def test_what_is_not_allowed_is_not_sent(pty):
+    _, said = broken_off(pty.path, lambda port: port.send(DRIVE), BadInput, MotionLimits())
+    assert "--allow-motion" in said
+    sent = pty.read()
+    assert stops(sent)
+    assert DRIVE not in sent
+
+
+def test_characters_come_with_the_time_at_which_they_were_there(pty):
+    with RobotPort(pty.path, MOVING) as port:
+        os.write(pty.master, b"abc")
+        port.run_to(port.tick + 20 * MS)
+        before = port.tick
+        port.end()
+    assert [one.data for one in port.received] == [b"abc"]
+    assert port.received[0].end_tick <= before
+
+
+def test_a_port_that_vanishes_is_told_in_one_line(pty):
+    def do(port):
+        port.send(DRIVE)
+        pty.close()
+        port.run_to(port.tick + 500 * MS)
+
+    port, said = broken_off(pty.path, do, PortError)
+    assert re.match(f"{pty.path}: [0-9.]+ s: the port is lost: ", said)
+    assert not port.stopped
+
+
+def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
+    other, link = Pty(), tmp_path / "radio"
+    link.symlink_to(pty.path)
+
+    def do(port):
+        port.send(DRIVE)
+        link.unlink()
+        link.symlink_to(other.path)
+        pty.close()
+        port.run_to(port.tick + 500 * MS)
+
+    port, _ = broken_off(link, do, PortError)
+    assert port.stopped
+    assert stops(other.read())
+    other.close()
+
+
+def test_a_port_that_takes_nothing_more_is_told_and_its_buffer_is_emptied_for_the_stop_frames(pty):
+    def do(port):
+        for _ in range(100):
+            port.send(DRIVE * 40)
+
+    port, said = broken_off(pty.path, do, PortError)
+    assert "it takes no characters for 1 s; look at its flow control" in said
+    assert (port.stopped, stops(pty.read())) == (True, True)
+
+
+def test_a_port_of_another_program_is_not_opened(pty):
+    with RobotPort(pty.path, MOVING), pytest.raises(PortError, match="another program has it open; end that"):
+        RobotPort(pty.path, MOVING)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.EACCES, "no permission to open it; join the group"),
+        (errno.EBUSY, "another program has it open"),
+    ],
+)
+def test_a_port_that_the_system_refuses_is_told_with_a_remedy(monkeypatch, number, said):
+    def refuse(*given, **named):
+        raise serial.SerialException(number, f"could not open port: {os.strerror(number)}")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(PortError, match=f"^/dev/ttyUSB9: {said}"):
+        RobotPort("/dev/ttyUSB9", MOVING)
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("/dev/nothing", "there is no such port"),
+        ("socket://127.0.0.1:1", "cannot be opened"),
+        ("nonsense://x", "cannot be opened"),
+        ("miro://nothing", "cannot be opened"),
+    ],
+)
+def test_a_port_that_is_none_is_told_in_one_line(url, said):
+    with pytest.raises(PortError, match=said) as caught:
+        RobotPort(url, MOVING)
+    assert "\n" not in str(caught.value)
+
+
+def answering(pty, answer):
+    """A thread that answers what comes until the terminal is gone."""
+
+    def run():
+        with suppress(OSError):
+            while data := os.read(pty.master, 4096):
+                os.write(pty.master, answer(data))
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda data: data, "the port echoes what is sent; turn the echo"),
+        (lambda data: bytes(7), "[0-9]+ characters come that are no answer, 00 00 .*9600 baud"),
+        (lambda data: b"", "nothing comes; is it switched on"),
+    ],
+    ids=["echo", "garbage", "silence"],
+)
+def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
+    answering(pty, answer)
+    port, told = broken_off(pty.path, lambda port: greet(port, 3), BadInput, MotionLimits())
+    assert port.stopped
+    assert re.search(said, told)
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_the_robot_and_leaves_what_was_recorded(tmp_path, number, code):
+    (tmp_path / "drive.stream").write_text(stream_text(2000))
+    with served("fig6", "--tcp", 0, "--out", tmp_path / "session", "--once") as session:
+        url = f"socket://127.0.0.1:{session.number()}"
+        command = [sys.executable, "-c", PROGRAM, "replay", "drive.stream", "--port", url, "--allow-motion"]
+        process = children.start(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+        for line in process.stderr:
+            if "all times are" in line:
+                break
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=1.0)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == code, err
+        session.wait()
+    assert stops(sent_bytes(tmp_path / "session" / "run.mcap"))
+    assert (tmp_path / "runs/drive-port/run.part.mcap").exists()
