@@ -16,7 +16,7 @@ import select
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -61,7 +61,7 @@ class RobotPort:
     """An open port. Use as a context manager. `limits`: what may be sent; `name`: of what is sent, in errors.
 
     `sent`: as it went out; `received`: whole answers and characters between them, as they came; `late_ticks`: how late
-    each transmission of a schedule was.
+    each transmission of a schedule was. `listener` is given the characters as they come, and when.
     """
 
     def __init__(self, url: str, limits: MotionLimits, name: str = "") -> None:
@@ -73,6 +73,7 @@ class RobotPort:
         self.late_ticks: list[int] = []
         self.free_tick = 0
         self.stopped = False
+        self.listener: Callable[[bytes, int], object] = lambda data, now: None
         self._decoder = TelemetryDecoder()
         self._heard_tick = 0
         self._began_ns = time.monotonic_ns()
@@ -172,6 +173,7 @@ class RobotPort:
                 self._keep(self._decoder.flush(), self._heard_tick)
             self._heard_tick = now
             self._keep(self._decoder.feed(data), now)
+            self.listener(data, now)
 
     def _keep(self, events: list[Event], now: int) -> None:
         for event in events:
@@ -193,9 +195,9 @@ class RobotPort:
             what = f"it takes no characters for {BLOCKED_S:g} s"
             raise PortError(self.url, "", what, "look at its flow control, and at who reads it") from None
         except (serial.SerialException, OSError) as error:
+            seconds = self.tick / TICKS_PER_SECOND
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
-            seconds = self.tick / TICKS_PER_SECOND
             raise PortError(self.url, f"{seconds:.3f} s", f"the port is lost: {error}") from None
 
 

@@ -47,8 +47,8 @@ def record_at_port(
     sent = _sendable(job, file, desk)
     robots = job.scenario.networks[0].robots
     folder = OutputFolder(out or _default(file), force, (RECORDING,), ours=out is None)
-    planned_s = seconds(sent[-1].end_tick)
-    source = _source(job, image, planned_s + SPARE_S)
+    recorded = job.firmware if image is job.image else b""
+    source = twin_source(job.scenario, job.seed, image, seconds(sent[-1].end_tick), recorded)
     with ExitStack() as files:
         files.enter_context(folder)
         folder.keep = (RECORDING,)
@@ -122,14 +122,16 @@ def _default(file: str) -> Path:
     return Path("runs") / f"{stem or 'stream'}-port"
 
 
-def _source(job: Job, image: Image, duration_s: float) -> RunSource:
-    """What the twin of the robots at the port is made from."""
-    twin = _twin(job.scenario, duration_s)
+def twin_source(
+    scenario: Scenario, seed: int, image: Image, duration_s: float, firmware: bytes = b""
+) -> RunSource:
+    """What the twin of robots at a port is made from; `firmware` is the image's file where that is none on the disk."""
+    twin = _twin(scenario, duration_s + SPARE_S)
     return RunSource(
         scenario_name=twin.name,
         scenario_text=tomli_w.dumps(tables_of(twin)),
-        seed=job.seed,
-        firmware=job.firmware if image is job.image else image.path.read_bytes(),
+        seed=seed,
+        firmware=firmware or image.path.read_bytes(),
         firmware_sha256=image.sha256,
         symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
         origin=PORT,

@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from miro_exact.bad_input import BadInput
+from mirotwin.desk.options import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
@@ -25,6 +26,7 @@ from mirotwin.shell.options import (
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.testing.case_test import CaseTests
+from mirotwin.testing.port_test import NOTED, run_port_test
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_debug_line, case_line, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
@@ -33,14 +35,28 @@ from mirotwin.verify.expectations import CHECK, Expected, as_settings
 from mirotwin.verify.steps.collecting import KINDS, collect
 from mirotwin.verify.steps.running import Outcome, Verdict, run_test, stem_of
 
-WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
+WORDS = {
+    "passed": "passed",
+    "failed": "FAILED",
+    "fault": "FAULT",
+    "error": "ERROR",
+    "not observable": "not observable",
+}
 CODES: dict[Verdict, int] = {
     "error": BAD_INPUT,
     "fault": FIRMWARE_FAULT,
     "failed": EXPECTATION_FAILED,
     "passed": DONE,
+    "not observable": DONE,
 }
 """In the order of precedence."""
+
+
+_JUNIT: dict[str, Literal["passed", "error", "skipped"]] = {
+    "passed": "passed",
+    "error": "error",
+    "not observable": "skipped",
+}
 
 
 class TestOptions(Options, frozen=True, kw_only=True):
@@ -69,6 +85,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
     pages: Annotated[
         bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
     ] = False
+    desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
     def line_for(self, file: str) -> str:
@@ -79,6 +96,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
             settings=self.settings,
             expected=self.expected,
             firmware=self.firmware,
+            desk=self.desk,
         )
         return again.command_line()
 
@@ -91,11 +109,15 @@ def test(options: TestOptions) -> int:
     Cases (*.stream), of a failure that was mended, run with their own seed and settings, and pass where their check
     passes. One of a bare processor needs --firmware.
 
+    With --port the steps go to a real robot: those that a PC can do and see. The others, and what is expected of a
+    robot's inside, are not observable on a port: that is told and counted, and never passes. --artifacts leaves the
+    recording.
+
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
     none. Where several apply: 2, then 3, then 1.
     """
     choose_engine(options.engine)
-    word, junit = options.word, options.junit
+    word, junit, desk = options.word, options.junit, options.desk
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
@@ -117,7 +139,11 @@ def test(options: TestOptions) -> int:
     lines = []
     for file in chosen:
         began_s = time.perf_counter()
-        if file.endswith(CASE_SUFFIX):
+        if desk.port:
+            again = options.line_for(file)
+            image = load_firmware(options.firmware)
+            outcome = run_port_test(file, image, desk, desk.port, settings, options.artifacts)
+        elif file.endswith(CASE_SUFFIX):
             outcome = cases.run(file)
             again = replay_line(file, options.firmware, cases.check_of(file))
         else:
@@ -155,9 +181,11 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     steps = f"{outcome.done} of {outcome.steps} steps, " if outcome.steps else ""
     how = (
         ""
-        if outcome.verdict == "error" or not outcome.digest  # of a bare processor
+        if outcome.verdict == "error" or not outcome.digest  # of a bare processor, of a robot at a port
         else f" ({steps}{in_ms(outcome.tick)}, digest {outcome.digest[:12]})"
     )
+    if not outcome.digest and outcome.steps:
+        how = f" ({steps}{in_ms(outcome.tick)})"
     show_line(f"{WORDS[outcome.verdict]}  {outcome.path}{how}")
     for line in (*outcome.lines, *outcome.notes):
         show_line(f"    {line}")
@@ -181,8 +209,11 @@ def _summary(outcomes: Sequence[Outcome]) -> int:
         "fault": "with a firmware fault",
         "failed": "failed",
         "passed": "passed",
+        "not observable": "not observable",
     }
-    show_line(", ".join(f"{count} {words[verdict]}" for verdict, count in counted.items() if count))
+    said = ", ".join(f"{count} {words[verdict]}" for verdict, count in counted.items() if count)
+    unseen = sum(one.unseen for one in outcomes)
+    show_line(said + (f"; {unseen} steps and expectations are {NOTED}" if unseen else ""))
     return next(code for verdict, code in CODES.items() if counted[verdict])
 
 
@@ -194,7 +225,7 @@ def _write_junit(
             name=stem_of(one.path),
             classname=str(Path(one.path).parent).strip("./").replace("/", ".") or "scenario",
             time_s=time_s,
-            verdict={"passed": "passed", "error": "error"}.get(one.verdict, "failure"),  # type: ignore[arg-type]
+            verdict=_JUNIT.get(one.verdict, "failure"),
             lines=(*one.lines, *one.notes),
             properties={
                 "seed": str(one.seed),

@@ -31,7 +31,7 @@ from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import steps_of
 
-Verdict = Literal["passed", "failed", "fault", "error"]
+Verdict = Literal["passed", "failed", "fault", "error", "not observable"]
 SCENARIO = "scenario.toml"
 """The whole scenario with all that was set, in the folder of a file that failed."""
 LINES = 5
@@ -42,7 +42,8 @@ class Outcome(msgspec.Struct, frozen=True):
     """The result of a file. `lines`: each failure as one line, none where it passed; `notes`: what else to say.
 
     `error`: it could not be run. `done` of `steps`; `tick`: where the run ended. `left`: the folder with its case.
-    `left_out`: what settings left out of the scenario, a line each.
+    `left_out`: what settings left out of the scenario, a line each. `unseen`: steps and expectations that
+    no port shows.
     """
 
     path: str
@@ -57,6 +58,7 @@ class Outcome(msgspec.Struct, frozen=True):
     firmware_sha256: str = ""
     left: str = ""
     left_out: tuple[str, ...] = ()
+    unseen: int = 0
 
 
 def everything(scenario: Scenario, origin: str) -> None:
