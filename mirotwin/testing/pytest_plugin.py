@@ -43,6 +43,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="make the page of each failed test, too: some seconds each",
     )
+    group.addoption(
+        "--mirotwin-port", metavar="URL", help="run against the robots at this port, not against their twin"
+    )
+    group.addoption(
+        "--mirotwin-allow-motion", action="store_true", help="with a port: send what moves a robot"
+    )
+    group.addoption(
+        "--mirotwin-max-speed",
+        metavar="M_S",
+        type=float,
+        help="with a port: refuse faster wheels (default: 0.5)",
+    )
     for name, what in _INI.items():
         parser.addini(name, what, type="string")
     group.addoption(
@@ -71,6 +83,10 @@ def pytest_configure(config: pytest.Config) -> None:
         "mirotwin(scenario=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
     )
     _check_options(config)
+    if config.getoption("--mirotwin-port"):
+        from mirotwin.testing import port_fixtures
+
+        config.pluginmanager.register(port_fixtures.PortFixtures(config), port_fixtures.NAME)
     share = config.getoption("--firmware-coverage-fail-under")
     if not 0.0 <= share <= 100.0:
         raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.testing.port_fixtures import desk_of
+from mirotwin.testing.port_test import run_port_test
 from mirotwin.testing.test_command import TestOptions
 from mirotwin.verify.steps.running import Outcome, run_test, stem_of
 
@@ -38,16 +40,22 @@ class ScenarioItem(pytest.Item):
     def runtest(self) -> None:
         firmware = _path(self.config, "firmware")
         seed = self.seed
-        file = relative(self.path)
+        file, desk = relative(self.path), desk_of(self.config)
         again = TestOptions(
-            paths=(file,), seed=seed, firmware=None if firmware is None else str(firmware)
+            paths=(file,), seed=seed, firmware=None if firmware is None else str(firmware), desk=desk
         ).command_line()
         try:
             image = load_firmware(firmware)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
-        outcome = run_test(file, image, seed, artifacts=_path(self.config, "artifacts"), again=again)
+        artifacts = _path(self.config, "artifacts")
+        if desk.port:
+            outcome = run_port_test(file, image, desk, desk.port, (), artifacts)
+        else:
+            outcome = run_test(file, image, seed, artifacts=artifacts, again=again)
         self._note(outcome, again)
+        if outcome.verdict == "not observable":
+            pytest.skip("; ".join(outcome.notes))
         if outcome.verdict != "passed":
             left = [f"left in {relative(Path(outcome.left))}"] if outcome.left else []
             raise ScenarioFailed("\n".join((*outcome.lines, *outcome.notes, f"again: {again}", *left)))

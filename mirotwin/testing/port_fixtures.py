@@ -1,0 +1,99 @@
+"""The pytest fixtures for a robot at a port: `world` and `link` as a PC has them; what no port shows is skipped.
+
+pytest --mirotwin-port=/dev/ttyUSB0 --mirotwin-allow-motion
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import TYPE_CHECKING, Any, NoReturn, cast
+
+import pytest
+
+from miro_exact.bad_input import BadInput
+from miro_sim.world.waits import WaitExpired
+from mirotwin.desk.guard import MAX_SPEED_M_S
+from mirotwin.desk.options import DeskOptions
+from mirotwin.desk.port_world import NotObservable, PortWaits, PortWorld
+from mirotwin.desk.robot_port import RobotPort
+from mirotwin.testing.link import Link
+from mirotwin.testing.waiting import WaitFailed
+from mirotwin.verify.wanted import marked, wanted
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+NAME = "mirotwin-port"
+"""Of the plugin that has these fixtures."""
+
+
+def desk_of(config: pytest.Config) -> DeskOptions:
+    """What the command line says of a port."""
+    speed = config.getoption("--mirotwin-max-speed", default=None)
+    return DeskOptions(
+        port=config.getoption("--mirotwin-port", default=None),
+        allow_motion=bool(config.getoption("--mirotwin-allow-motion", default=False)),
+        max_speed=MAX_SPEED_M_S if speed is None else float(speed),
+    )
+
+
+class PortFixtures:
+    """A plugin whose fixtures stand in for those of the twin. The port is opened for each test."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        desk = desk_of(config)
+        assert desk.port is not None
+        self.url, self.limits = desk.port, desk.limits
+
+    def pytest_report_header(self) -> str:
+        return f"mirotwin: robots at {self.url}; what a port does not show is skipped"
+
+    @pytest.fixture
+    def mirotwin_port(
+        self, request: pytest.FixtureRequest, _mirotwin_seed: int
+    ) -> Generator[PortWorld, None, None]:
+        """The robots at the port, standing, and told to stand again when the test is over."""
+        try:
+            marks = [(mark.args, mark.kwargs) for mark in request.node.iter_markers("mirotwin")]
+            asked = wanted(marked(marks), request.node.path.parent, None, _mirotwin_seed)
+            network = asked.scenario.networks[0]
+            if len(asked.scenario.networks) > 1 or network.host != "silent":
+                pytest.skip("not observable on a port: several networks, or a controller that needs a camera")
+            if asked.scenario.expect:
+                names = ", ".join(asked.scenario.expect)
+                request.node.add_report_section("call", "mirotwin", f"{names}: not observable on a port")
+            with RobotPort(self.url, self.limits, request.node.name) as port:
+                yield PortWorld(port, asked.scenario)
+        except BadInput as error:
+            pytest.fail(str(error), pytrace=False)
+
+    @pytest.fixture
+    def world(self, mirotwin_port: PortWorld) -> PortWorld:
+        return mirotwin_port
+
+    @pytest.fixture
+    def link(self, mirotwin_port: PortWorld) -> Link:
+        return Link(cast("World", mirotwin_port), waits=PortWaits(mirotwin_port))
+
+    @pytest.fixture
+    def links(self, link: Link) -> list[Link]:
+        return [link]
+
+    @pytest.fixture
+    def robot(self) -> NoReturn:
+        pytest.skip("not observable on a port: the inside of a robot")
+
+    @pytest.fixture
+    def robots(self, robot: object) -> NoReturn:
+        raise AssertionError(robot)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, Any, Any]:
+        """What turns out to need a robot's inside is skipped, too; a wait that ran out is told in words."""
+        try:
+            return (yield)
+        except NotObservable as error:
+            pytest.skip(str(error))
+        except WaitExpired as error:
+            world = getattr(item, "funcargs", {})["mirotwin_port"]
+            raise WaitFailed.of(error, world).with_traceback(error.__traceback__) from None

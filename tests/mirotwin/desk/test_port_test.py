@@ -1,0 +1,176 @@
+"""`mirotwin test --port` and the pytest fixtures: what a PC can do and see runs, the rest never passes."""
+
+import pytest
+
+from tests.mirotwin.desk.rig import ROBOT
+
+pytest_plugins = ["pytester"]
+HEAD = """
+name = "poll"
+duration_s = 1.0
+[[network]]
+host = "silent"
+[[network.robot]]
+slot = 0
+reference = {kind = "line", drive_s = 0.0}
+"""
+POLL = """
+[[step]]
+send = "poll"
+[[step]]
+wait_for = "answer"
+within_ms = 80
+accepted = 1
+"""
+INSIDE = """
+[[step]]
+send = "ping"
+[[step]]
+wait_for = "command"
+name = "RDRP"
+[[step]]
+hold = "wheels"
+left_m_s = 0.0
+for_ms = 20
+"""
+SWITCH = """
+[[step]]
+reset = 1
+[[step]]
+pause_ms = 5
+[[step]]
+silence_for_ms = 20
+"""
+
+
+@pytest.fixture
+def at_port(mirotwin, tmp_path):
+    def run(steps, *options):
+        path = tmp_path / "poll.scenario.toml"
+        path.write_text(HEAD + steps)
+        return mirotwin("test", path, "--port", ROBOT, *options)
+
+    return run
+
+
+def test_steps_that_a_pc_can_do_and_see_pass(at_port):
+    code, out, err = at_port(POLL)
+    assert (code, err) == (0, "")
+    assert out.startswith("passed ")
+    assert out.endswith("1 passed\n")
+
+
+def test_an_answer_that_is_not_what_was_wanted_fails(at_port):
+    code, out, _ = at_port(POLL.replace("accepted = 1", "accepted = 3"))
+    assert code == 1
+    assert "step failed: step 2: wait_for answer" in out
+
+
+def test_waits_inside_the_robot_are_passed_over_and_counted(at_port):
+    code, out, _ = at_port(INSIDE + POLL.replace("accepted = 1", "accepted = 2"))
+    assert (code, out.splitlines()[-1]) == (
+        0,
+        "1 passed; 2 steps and expectations are not observable on a port",
+    )
+    assert "step 2: wait_for command: not observable on a port: it is inside the robot" in out
+
+
+def test_a_file_of_which_nothing_can_be_seen_does_not_pass(at_port):
+    code, out, _ = at_port(INSIDE)
+    assert (code, out.startswith("not observable ")) == (0, True)
+    assert "passed" not in out
+
+
+def test_behind_a_switch_that_no_port_has_nothing_is_judged(at_port):
+    code, out, _ = at_port(POLL + SWITCH)
+    assert (code, out.splitlines()[-1]) == (
+        0,
+        "1 passed; 3 steps and expectations are not observable on a port",
+    )
+    assert at_port(SWITCH)[1].startswith("not observable ")
+
+
+def test_expectations_are_counted_as_not_observable(at_port):
+    code, out, _ = at_port(POLL + "[expect]\nframes_accepted_min = 1\n")
+    assert code == 0
+    assert "expectation frames_accepted_min: not observable on a port" in out
+    assert "1 steps and expectations are not observable" in out
+
+
+def test_a_step_that_moves_is_refused_unless_it_is_allowed(at_port):
+    steps = '[[step]]\nsend = "team"\nleft_m_s = 0.1\n' + POLL
+    code, out, _ = at_port(steps)
+    assert (code, "--allow-motion" in out) == (2, True)
+    assert at_port(steps.replace("accepted = 1", "accepted = 2"), "--allow-motion")[0] == 0
+
+
+def test_a_controller_needs_more_than_a_port(at_port):
+    code, out, _ = at_port("".replace("", ""), "--set", 'network.host="controller"')
+    assert (code, "a controller, which needs a camera: not observable on a port" in out) == (0, True)
+
+
+def test_the_recording_of_a_test_is_compared_with_its_twin(at_port, mirotwin, tmp_path):
+    at_port(POLL * 1 + POLL.replace("accepted = 1", "accepted = 2"), "--artifacts", tmp_path / "left")
+    (folder,) = (tmp_path / "left").iterdir()
+    code, out, err = mirotwin("replay", folder)
+    assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
+
+
+TESTS = """
+import pytest
+from mirotwin import Telemetry, conditions, ms
+
+def test_answer(link):
+    link.poll()
+    assert link.expect(Telemetry, within=ms(80)).accepted == 1
+
+def test_silence(link, world):
+    link.ping()
+    link.expect_silence(ms(50))
+    link.poll()
+    assert world.run_until(conditions.Answer(slot=0), within=ms(80)).value == 0
+
+def test_inside(robot):
+    raise AssertionError
+
+def test_commands(link, world):
+    link.ping()
+    world.run_until(conditions.Command(name="STT"), within=ms(50))
+
+def test_switch(link):
+    link.radio("down")
+
+def test_nobody_asks(link):
+    link.expect(Telemetry, within=ms(50))
+
+def test_motion(link):
+    link.send(velocities={0: (100, 100)})
+
+@pytest.mark.mirotwin(expect={"frames_accepted_min": 1})
+def test_expectation(link):
+    link.ping()
+"""
+
+
+def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
+    pytester.makepyfile(test_desk=TESTS)
+    for name, steps in (("poll", POLL), ("inside", INSIDE)):
+        (pytester.path / f"{name}.scenario.toml").write_text(HEAD + steps)
+    found = pytester.runpytest_subprocess("-rs", "-p", "no:xdist", f"--mirotwin-port={ROBOT}")
+    found.assert_outcomes(passed=4, skipped=4, failed=2)
+    found.stdout.fnmatch_lines(
+        [
+            "mirotwin: robots at miro://*; what a port does not show is skipped",
+            "*test_nobody_asks*",
+            "*WaitFailed: no answer within 50 ms*",
+            "*test_motion*",
+            "*--allow-motion*",
+        ]
+    )
+    found.stdout.fnmatch_lines_random(
+        [
+            "*not observable on a port: the inside of a robot*",
+            '*command with name = "STT": not observable on a port*',
+            "*`set_radio` of a robot's world: not observable on a port*",
+        ]
+    )
