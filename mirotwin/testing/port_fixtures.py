@@ -18,7 +18,7 @@ from mirotwin.desk.port_world import NotObservable, PortWaits, PortWorld
 from mirotwin.desk.robot_port import RobotPort
 from mirotwin.testing.link import Link
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.wanted import marked, wanted
+from mirotwin.verify.rig_options import marker_options, rig_options
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -55,7 +55,7 @@ class PortFixtures:
         """The robots at the port, standing, and told to stand again when the test is over."""
         try:
             marks = [(mark.args, mark.kwargs) for mark in request.node.iter_markers("mirotwin")]
-            asked = wanted(marked(marks), request.node.path.parent, None, _mirotwin_seed)
+            asked = rig_options(marker_options(marks), request.node.path.parent, None, _mirotwin_seed)
             network = asked.scenario.networks[0]
             if len(asked.scenario.networks) > 1 or network.host != "silent":
                 pytest.skip("not observable on a port: several networks, or a controller that needs a camera")
