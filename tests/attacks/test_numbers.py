@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from mirotwin.commands import main
-from mirotwin.shell.options import Number, Whole
+from mirotwin.shell.options import FiniteNumber, Whole
 
 WRONG = ("nan", "inf", "-inf", "1e999", "9" * 5000, "-" + "9" * 5000, "0x10", "")
 ONLY_NUMBERS = (click.types.FloatParamType, click.types.IntParamType)
@@ -37,7 +37,9 @@ def test_there_are_options_with_numbers():
 )
 def test_options_take_numbers_by_our_types(words, option):
     """Those of click take NaN for in range, and repeat 5000 digits."""
-    assert isinstance(option.type, (Number, Whole)) or type(option.type).__module__.startswith("mirotwin")
+    assert isinstance(option.type, (FiniteNumber, Whole)) or type(option.type).__module__.startswith(
+        "mirotwin"
+    )
     for value in WRONG:
         with pytest.raises(click.BadParameter) as caught:
             option.type.convert(value, option, click.Context(main))
