@@ -85,7 +85,7 @@ CODES = {
 """C types of fields and their codes."""
 
 
-class Field(NamedTuple):
+class StateField(NamedTuple):
     """A field of a part that exists; `path` names it from the root on."""
 
     part: Any
@@ -123,7 +123,7 @@ def kind_of(declared: Any) -> Kind:
 class One:
     """A field that is not compiled."""
 
-    def __init__(self, field: Field, before: Block | None) -> None:
+    def __init__(self, field: StateField, before: Block | None) -> None:
         self.field = field
         self.value: Any = None
         self.sibling: One | None = None
@@ -154,7 +154,7 @@ class One:
 class Some:
     """Numbers of one part that is not compiled: packed together, because that is quicker."""
 
-    def __init__(self, fields: list[Field]) -> None:
+    def __init__(self, fields: list[StateField]) -> None:
         self.fields = fields
         self.part = fields[0].part
         numbers = [field.kind for field in fields if isinstance(field.kind, Number)]
@@ -192,7 +192,7 @@ class Flat:
     """The state of `root` and of all parts below it."""
 
     def __init__(self, root: Any) -> None:
-        self.fields: list[Field] = []
+        self.fields: list[StateField] = []
         self._before: list[Callable[[], object]] = []
         self._after: list[Callable[[], object]] = []
         self._blocks: list[Block] = []
@@ -301,7 +301,7 @@ class Flat:
                     for key, child in _numbered(getattr(part, name)):
                         self._walk(child, f"{inner}[{key}]", counts)
                 else:
-                    self._add(Field(part, name, kind_of(declared), inner), places, counts)
+                    self._add(StateField(part, name, kind_of(declared), inner), places, counts)
         if hasattr(part, "after_load"):
             self._after.append(part.after_load)
 
@@ -312,18 +312,18 @@ class Flat:
         places = getattr(sys.modules.get(cls.__module__), f"_places_{cls.__name__}", None)
         return {} if places is None else places(part)
 
-    def _add(self, field: Field, places: dict[str, tuple[int, str, int]], counts: bool) -> None:
+    def _add(self, field: StateField, places: dict[str, tuple[int, str, int]], counts: bool) -> None:
         if counts != self._counts:
             self._close()
             self._counts = counts
         self.fields.append(field)
         if field.name in places and isinstance(field.kind, Number | Queue):
-            if not self._group or isinstance(self._group[0], Field):
+            if not self._group or isinstance(self._group[0], StateField):
                 self._close()
             self._group.append(_memory_field(field, field.kind, places))
         elif isinstance(field.kind, Number) and not field.kind.count:
             last = self._group[len(self._group) - 1] if self._group else None
-            if not isinstance(last, Field) or last.part is not field.part:
+            if not isinstance(last, StateField) or last.part is not field.part:
                 self._close()
             self._group.append(field)
         else:
@@ -334,7 +334,7 @@ class Flat:
         group, self._group = self._group, []
         if not group:
             return
-        if not isinstance(group[0], Field):
+        if not isinstance(group[0], StateField):
             from miro_exact.memory import Memory
 
             self._append(Memory(group))
@@ -354,7 +354,7 @@ def _numbered(parts: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _memory_field(
-    field: Field, kind: Number | Queue, places: dict[str, tuple[int, str, int]]
+    field: StateField, kind: Number | Queue, places: dict[str, tuple[int, str, int]]
 ) -> tuple[Any, ...]:
     """What `memory.pyx` has to know. Raises TypeError if table and C layout do not agree."""
     address, c_type, size = places[field.name]

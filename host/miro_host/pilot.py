@@ -28,7 +28,7 @@ from miro_host.wheels import Wheels
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
 
-class Command(msgspec.Struct, frozen=True):
+class WheelCommand(msgspec.Struct, frozen=True):
     """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the values that law and estimator name.
 
     `left`, `right` in 1/256 count per LM629 sample, for wheels whose radii are the nominal one times `left_factor` and
@@ -49,7 +49,7 @@ _LARGEST = sys.float_info.max
 _FASTEST = 0x8000  # what a frame holds
 LARGEST_FACTOR = 2.0
 """A wheel's radius over the nominal one stays between this and its inverse."""
-STANDSTILL = Command(0, 0, 0.0, 0.0)
+STANDSTILL = WheelCommand(0, 0, 0.0, 0.0)
 
 
 class Pilot:
@@ -89,7 +89,7 @@ class Pilot:
         self.reference_lead_s = reference_lead_s
         self.dead_s = dead_s
         self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
-        self.command = Command(
+        self.command = WheelCommand(
             *(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0)),
             estimate=dict.fromkeys(self.estimator.INNER, 0.0),
         )
@@ -97,7 +97,9 @@ class Pilot:
     def __repr__(self) -> str:
         return f"Pilot({self.reference!r}, {self.law!r}, command={self.command!r})"
 
-    def update(self, measured: Posture | None, t_s: float, telemetry: LastTelemetry | None = None) -> Command:
+    def update(
+        self, measured: Posture | None, t_s: float, telemetry: LastTelemetry | None = None
+    ) -> WheelCommand:
         """One control period at `t_s` after the reference's start; `measured` and `telemetry` may be missing (None).
 
         Raises PluginError, and leaves integrator and command alone, when the law fails or answers what is no number.
@@ -131,7 +133,7 @@ class Pilot:
         factors = estimate.left_factor, estimate.right_factor
         left, right = self.wheels.command(z.v_m_s, z.w_rad_s, *factors)
         named = {name: estimate.inner[name] for name in self.estimator.INNER}
-        self.command = Command(left, right, z.v_m_s, z.w_rad_s, inner, *factors, named)
+        self.command = WheelCommand(left, right, z.v_m_s, z.w_rad_s, inner, *factors, named)
         return self.command
 
     def _estimate(self, given: EstimatorInput) -> Estimate | None:
@@ -177,7 +179,7 @@ class Pilot:
         count = len(self.law.INNER)
         values = dict(zip(self.law.INNER, inner[:count], strict=True))
         named = dict(zip(self.estimator.INNER, inner[count:], strict=True))
-        self.command = Command(
+        self.command = WheelCommand(
             int(left), int(right), v_m_s, w_rad_s, values, left_factor, right_factor, named
         )
 

@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import PICTURE_BYTES, read_input
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH
-from miro_host.eye.frame import Frame
+from miro_host.eye.frame import Pixels
 
 SUFFIXES = (".png", ".ppm")
 _DAMAGED = (
@@ -36,7 +36,7 @@ _ROWS = 12
 
 
 class Picture:
-    """A picture that stays as it is. It is a `Frame`, so a tracker can look at it. `data`: three bytes a pixel."""
+    """A picture that stays as it is. It is `Pixels`, so a tracker can look at it. `data`: three bytes a pixel."""
 
     def __init__(self, data: bytes) -> None:
         if len(data) != 3 * WIDTH * HEIGHT:
@@ -49,7 +49,7 @@ class Picture:
         return f"Picture({self.width} x {self.height})"
 
     def window(self, left: int, top: int, width: int, height: int) -> bytearray:
-        """See `Frame`. Raises ValueError for a window that is not inside the picture."""
+        """See `Pixels`. Raises ValueError for a window that is not inside the picture."""
         if min(left, top, width - 1, height - 1) < 0 or left + width > WIDTH or top + height > HEIGHT:
             raise ValueError(f"window {width} x {height} at ({left}, {top}) is not inside {WIDTH} x {HEIGHT}")
         found = bytearray()
@@ -63,7 +63,7 @@ class Picture:
         return Image.frombytes("YCbCr", (WIDTH, HEIGHT), self.data).convert("RGB")
 
 
-def taken(frame: Frame) -> Picture:
+def taken(frame: Pixels) -> Picture:
     """The whole picture of what may only be read by windows."""
     return Picture(b"".join(frame.window(0, top, WIDTH, _ROWS) for top in range(0, HEIGHT, _ROWS)))
 

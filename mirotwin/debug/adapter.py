@@ -17,7 +17,7 @@ from typing import Any
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
-from miro_robot.inspect.frames import Frame
+from miro_robot.inspect.frames import StackFrame
 from miro_robot.mcs51.names import BITS, SFRS
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from mirotwin.debug.console import Console, shown_value
@@ -353,7 +353,7 @@ class Adapter:
             "threads": [{"id": at + 1, "name": core.name} for at, core in enumerate(self.its.timeline.cores)]
         }
 
-    def _frames(self, thread: int) -> list[Frame]:
+    def _frames(self, thread: int) -> list[StackFrame]:
         return self.its.symbols.unwinder.frames(self.its.timeline.cores[thread].cpu)
 
     def on_stackTrace(self, given: Message) -> Message:
@@ -371,7 +371,7 @@ class Adapter:
             "totalFrames": len(found),
         }
 
-    def _frame(self, thread: int, at: int, frames: list[Frame]) -> Message:
+    def _frame(self, thread: int, at: int, frames: list[StackFrame]) -> Message:
         symbols, frame = self.its.symbols, frames[at]
         called = at > 0 and not frames[at - 1].by_interrupt
         place = symbols.unwinder.call_before(frame.pc) if called else frame.pc

@@ -17,7 +17,6 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
-from miro_robot.inspect.frames import Frame
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from miro_sim.world.conditions import CONDITIONS
 from mirotwin.debug.debugger import Debugger

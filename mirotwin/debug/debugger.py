@@ -14,7 +14,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image.symbol_files import SourceLine
-from miro_robot.inspect.frames import Frame
+from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, is_call
@@ -54,7 +54,7 @@ class Written(msgspec.Struct, frozen=True):
     """An instruction that writes a variable: where it stands at `tick`, and the frames there."""
 
     tick: int
-    frames: list[Frame]
+    frames: list[StackFrame]
 
 
 class Debugger:
@@ -81,7 +81,7 @@ class Debugger:
     def cpu(self) -> Cpu:
         return self.timeline.core.cpu
 
-    def frames(self) -> list[Frame]:
+    def frames(self) -> list[StackFrame]:
         return self.symbols.unwinder.frames(self.cpu)
 
     def moment(self, frame: int = 0) -> Moment:
@@ -288,7 +288,7 @@ class Debugger:
 
     # Out of a function
 
-    def _caller(self) -> tuple[Frame, Frame]:
+    def _caller(self) -> tuple[StackFrame, StackFrame]:
         frames = self.frames()
         if len(frames) < 2:
             what = "nothing called this function" if frames[0].known else "the stack cannot be told here"

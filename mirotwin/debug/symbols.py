@@ -17,7 +17,7 @@ from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.image.registers import Blocks, RegisterVariable, parse_blocks
 from miro_robot.image.symbol_files import SourceLine, read_text
 from miro_robot.image.variables import Variable, variables_of
-from miro_robot.inspect.frames import Frame, Unwinder
+from miro_robot.inspect.frames import StackFrame, Unwinder
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.tap import CpuTap, port_pins
 from miro_robot.inspect.values import bytes_at
@@ -162,7 +162,7 @@ class Moment:
     """What names mean for a processor that stands at `frame`. `innermost`: the registers are this function's."""
 
     def __init__(
-        self, symbols: Symbols, core: Core, frame: Frame | None = None, innermost: bool = True
+        self, symbols: Symbols, core: Core, frame: StackFrame | None = None, innermost: bool = True
     ) -> None:
         self.symbols = symbols
         self.core = core

@@ -12,7 +12,7 @@ import click
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import TEXT_BYTES, read_input
-from miro_robot.bare.input import Piece
+from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.image import Image
@@ -262,7 +262,7 @@ def _ticks(time: Time | None, options: BareOptions) -> int | None:
     return None if time is None else time.ticks(options.crystal_hz)
 
 
-def _pieces(options: BareOptions) -> tuple[Piece, ...]:
+def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
     """What --stdin and its conditions say, in order."""
 
     texts = [text.encode(errors="surrogateescape") for text in options.stdin_when]
@@ -286,11 +286,11 @@ def _pieces(options: BareOptions) -> tuple[Piece, ...]:
     if options.stdin_by_line and not texts:
         raise BadInput("", "--stdin-by-line", "has no effect without --stdin-when", "give that too")
     delay = _ticks(options.stdin_after, options)
-    pieces: list[Piece] = []
+    pieces: list[InputPiece] = []
     for path, when in zip(options.stdin, [b""] * (files - len(texts)) + texts, strict=True):
         data = _stdin_bytes(path)
         parts = data.splitlines(keepends=True) if options.stdin_by_line and when else [data]
-        pieces += [Piece(part, when, delay if when or not pieces else None) for part in parts]
+        pieces += [InputPiece(part, when, delay if when or not pieces else None) for part in parts]
     return tuple(pieces)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_robot.inspect.trace import HEADING, Trace
+from miro_robot.inspect.trace import HEADING, InstructionTrace
 from mirotwin.firmware.code_place import SYMBOL, functions_at
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.firmware.subject import WindowOptions, look, open_window
@@ -39,6 +39,8 @@ def trace(options: TraceOptions) -> int:
     names = SymbolNames(image)
     only = {first for first, _ in functions_at(options.symbols, image, names, options.subject)} or None
     if out is None:
-        return look(run, options, Trace(names, show_line, only, HEADING))
+        return look(run, options, InstructionTrace(names, show_line, only, HEADING))
     with whole_file(out, "--out") as staging, staging.open("w", encoding="utf-8") as stream:
-        return look(run, options, Trace(names, lambda line: stream.write(line + "\n"), only, HEADING))
+        return look(
+            run, options, InstructionTrace(names, lambda line: stream.write(line + "\n"), only, HEADING)
+        )

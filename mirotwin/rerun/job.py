@@ -210,7 +210,7 @@ def _job_of_recording(
     return msgspec.structs.replace(job, origin=source.origin, firmware=source.firmware)
 
 
-def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:
+def _job_of_stream(given: stream.StreamFile, path: str, settings: Sequence[str], seed: int | None) -> Job:
     sent = given.script()
     header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(

@@ -18,7 +18,7 @@ from miro_sim.periods import Period
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load, of_table
-from miro_sim.scenario.keys import MAX_NETWORKS, Network, Scenario
+from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND
@@ -140,7 +140,7 @@ def _default_scenario(script: Sequence[ScriptItem], path: str) -> Scenario:
     networks = []
     for index in range(count):
         robots = robots_of_stream(one for one in script if one.network == index)
-        network = Network(
+        network = NetworkSpec(
             robots=5 if robots == 5 else 3,
             radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
             robot=tuple(msgspec.structs.replace(model, slot=slot) for slot in range(robots)),

@@ -69,7 +69,7 @@ def iterate(
     event type, see `events_line`.
     """
     stream = BytesIO(data) if isinstance(data, bytes) else data
-    return _Reader(stream, source, Counter() if passed_over is None else passed_over).packets()
+    return _BlockReader(stream, source, Counter() if passed_over is None else passed_over).packets()
 
 
 def events_line(passed_over: Counter[int]) -> str:
@@ -92,7 +92,7 @@ class _Interface:
     offset: int  # seconds
 
 
-class _Reader:
+class _BlockReader:
     def __init__(self, stream: Readable, source: str, passed_over: Counter[int]) -> None:
         self.stream = stream
         self.source = source

@@ -30,8 +30,8 @@ from miro_protocol.stream_line import (
     FIRST_LINE,
     MAX_TICK,
     Entry,
-    Line,
     StreamItem,
+    StreamLine,
     format_line,
     needs_version_2,
 )
@@ -42,8 +42,8 @@ __all__ = [
     "Entry",
     "Header",
     "Reader",
-    "Stream",
     "StreamError",
+    "StreamFile",
     "decode",
     "format_line",
     "format_stream",
@@ -53,7 +53,7 @@ __all__ = [
 ]
 
 
-class Stream(msgspec.Struct, frozen=True):
+class StreamFile(msgspec.Struct, frozen=True):
     """A stream file: what it says about itself, and its lines in the order of time. `source` names it in errors."""
 
     entries: tuple[Entry, ...]
@@ -97,7 +97,7 @@ class Reader:
     def __iter__(self) -> Iterator[Entry]:
         last = 0
         for number, text in enumerate(self._lines, 1):
-            line = Line(self.source, number, text.rstrip("\r\n"))
+            line = StreamLine(self.source, number, text.rstrip("\r\n"))
             if number == 1:
                 self.version = line.version()
             if self.version > 1 and line.text.startswith(PREFIX):
@@ -114,7 +114,7 @@ class Reader:
             yield entry
         self._close_header()
 
-    def _take_header(self, line: Line) -> None:
+    def _take_header(self, line: StreamLine) -> None:
         if not self._in_header:
             raise line.error(1, "a line of the header after the first tick", "put it above all ticks")
         self._header_lines.append((line.number, line.text))
@@ -125,19 +125,19 @@ class Reader:
             self._in_header = False
 
 
-def parse(text: str, source: str = "<stream>") -> Stream:
+def parse(text: str, source: str = "<stream>") -> StreamFile:
     """A stream file from its text."""
     reader = Reader(text.split("\n"), source)
     entries = tuple(reader)
-    return Stream(entries, reader.header, source)
+    return StreamFile(entries, reader.header, source)
 
 
-def read(path: str | os.PathLike[str]) -> Stream:
+def read(path: str | os.PathLike[str]) -> StreamFile:
     """Reads a stream file; StreamError, or OSError when it cannot be opened."""
     return decode(read_input(path), os.fspath(path))
 
 
-def decode(data: bytes, source: str = "<stream>") -> Stream:
+def decode(data: bytes, source: str = "<stream>") -> StreamFile:
     """A stream file from its bytes; `source` names it in a StreamError."""
     try:
         text = data.decode("utf-8-sig")

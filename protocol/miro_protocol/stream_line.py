@@ -102,7 +102,7 @@ def _check(name: str, value: int, high: int) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class StreamLine:
     """Line `number` of the file `source`, to be read."""
 
     source: str

@@ -142,10 +142,10 @@ def test_it_tracks_its_path(site, tmp_path, name):
 DRIVEN = """
 from miro_host.pilot import Pilot
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from pursuit_law import Parameters
 
-pilot = Pilot(Line(), Parameters(lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3).law())
+pilot = Pilot(StraightLine(), Parameters(lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3).law())
 for x_m, y_m, theta_rad in ((0.5, -0.1, 0.0), (1.1, 0.0, 0.0), (0.65, 0.0, 0.0)):
     command = pilot.update(Posture(x_m, y_m, theta_rad), 3.0)
     print(command.v_m_s, command.w_rad_s)

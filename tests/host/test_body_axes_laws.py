@@ -21,14 +21,14 @@ from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.interface import Reference
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.references.ramp import Ramp
 from tests.host.driving import apart, drive, starts
 from tests.naive import host_laws as naive
 
 ALL = [BodyFrameParameters, KanayamaParameters, DynamicFeedbackParameters]
 HERE = Posture(0.0, 0.0, 0.0)
-PATHS = [Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
+PATHS = [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
 SETTLED_M, SETTLED_RAD = 0.01, math.radians(3.0)
 
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
@@ -39,7 +39,7 @@ TURNS = st.floats(-4.0, 4.0)
 
 
 def asked(law, reference, posture, v=0.0, w=0.0):
-    return law.step(LawInput(1.0, PERIOD_S, reference, Line(), posture, v, w))
+    return law.step(LawInput(1.0, PERIOD_S, reference, StraightLine(), posture, v, w))
 
 
 def moving(posture=HERE, v=0.2, w=0.0):
@@ -161,7 +161,7 @@ def test_the_surfaces_fall_as_they_are_told_while_no_guard_and_no_limit_is_met(p
 @settings(deadline=None)
 @given(st.sampled_from(ALL), TIMES, POSTURES, st.floats(0.1, 0.9), TURNS)
 def test_the_mirrored_robot_gets_the_mirrored_answer(parameters, t, posture, v, w):
-    r = Line().at(t)
+    r = StraightLine().at(t)
     one = asked(parameters().law(), r, posture, v, w)
     other = asked(parameters().law(), r, Posture(posture.x_m, -posture.y_m, -posture.theta_rad), v, -w)
     if isinstance(one, Velocities):
@@ -208,7 +208,7 @@ def test_dynamic_feedback_stays_at_rest_with_a_reference_that_stands_where_the_r
 def test_a_robot_turned_right_round_comes_about_and_does_not_follow_backwards():
     for parameters in ALL:
         *_, (command, truth, reference) = drive(
-            parameters().law(), Line(), Posture(0.0, 0.0, math.pi - 1e-3), 180
+            parameters().law(), StraightLine(), Posture(0.0, 0.0, math.pi - 1e-3), 180
         )
         assert command.v_m_s > 0.19
         assert apart(truth, reference)[1] < SETTLED_RAD
@@ -238,7 +238,7 @@ def test_from_all_headings_within_60_cm_the_robot_comes_to_the_path_within_its_l
 @pytest.mark.parametrize("parameters", ALL)
 @pytest.mark.parametrize("heading_rad", [k * math.pi / 6 for k in range(-5, 7)])
 def test_no_heading_of_the_line_is_forbidden(parameters, heading_rad):
-    path = Line(heading_rad=heading_rad)
+    path = StraightLine(heading_rad=heading_rad)
     *_, (_, truth, reference) = drive(parameters().law(), path, Posture(0.07, 0.02, heading_rad - 0.4), 178)
     assert apart(truth, reference)[0] < 0.002
 
@@ -246,14 +246,14 @@ def test_no_heading_of_the_line_is_forbidden(parameters, heading_rad):
 @pytest.mark.parametrize("parameters", ALL)
 def test_a_lateral_error_alone_goes_away(parameters):
     """Under the paper's law it stays for ever."""
-    path = Line(Ramp(ramp_s=0.0))
+    path = StraightLine(Ramp(ramp_s=0.0))
     *_, (_, truth, reference) = drive(parameters().law(), path, Posture(0.0, 0.04, 0.0), 178)
     assert apart(truth, reference)[0] < 0.002
 
 
 @pytest.mark.parametrize("parameters", ALL)
 def test_far_away_the_answer_is_finite_and_within_the_limits(parameters):
-    for command, _, _ in drive(parameters().law(), Line(), Posture(-1e3, 1e3, 2.0), 30):
+    for command, _, _ in drive(parameters().law(), StraightLine(), Posture(-1e3, 1e3, 2.0), 30):
         assert math.isfinite(command.v_m_s)
         assert abs(command.v_m_s) <= 0.95
         assert abs(command.w_rad_s) <= 3.7
@@ -267,7 +267,7 @@ NO_STATE_OF_ITS_OWN = ["integrator.v_m_s", "integrator.w_rad_s", "numbers"]
 @pytest.mark.parametrize("parameters", ALL)
 def test_the_law_is_found_by_its_name_and_adds_no_state_of_its_own(parameters):
     assert LAWS.find(parameters.name()) is parameters
-    assert list(values(Pilot(Line(), parameters().law()))) == NO_STATE_OF_ITS_OWN
+    assert list(values(Pilot(StraightLine(), parameters().law()))) == NO_STATE_OF_ITS_OWN
 
 
 @pytest.mark.parametrize("parameters", ALL)

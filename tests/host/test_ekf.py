@@ -16,7 +16,7 @@ from miro_host.eye.track import Sighting
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from tests.host.followed_robot import DELAY_S, Loop, P, Robot, rims, truths, velocities
 
 
@@ -191,7 +191,7 @@ def test_a_plain_posture_is_believed_as_little_as_the_papers_camera():
 
 def test_a_filter_saved_at_any_period_goes_on_with_the_same_bits():
     def pilot():
-        return Pilot(Line(), Gains().law(), estimator=P.estimator())
+        return Pilot(StraightLine(), Gains().law(), estimator=P.estimator())
 
     whole, cut = pilot(), pilot()
     for k in range(40):

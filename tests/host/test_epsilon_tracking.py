@@ -22,14 +22,16 @@ from miro_host.laws.registry import LAWS
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from tests.host.driving import apart, drive
 from tests.naive import host_laws as naive
 from tests.naive.host_ideal_loop import drive_at_velocities
 
 SETS = [THEORY, ILLUSTRATIVE, RETUNED]
 NAMES = ["theory", "illustrative", "retuned"]
-PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
+PATHS = st.sampled_from(
+    [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
+)
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
 TIMES = st.floats(0.02, 5.9)
 
@@ -121,7 +123,7 @@ def test_the_robot_on_the_reference_is_driven_out_to_the_circle_and_not_along():
 # What the theory promises, in continuous time.
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()], ids=["line", "arc"])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()], ids=["line", "arc"])
 @pytest.mark.parametrize("start", [(0.0243, 0.0308, -0.96), (0.0292, 0.0185, 0.56), (0.0709, 0.0172, -0.38)])
 def test_with_the_theory_s_gains_sigma_vanishes_and_n_holds_epsilon_in_continuous_time(path, start):
     """beta epsilon > 2 |u*|: after 4 s both have long settled, n on the circle of radius epsilon, sigma at 0."""
@@ -141,7 +143,9 @@ def test_with_the_theory_s_gains_sigma_vanishes_and_n_holds_epsilon_in_continuou
 def test_with_the_condition_broken_sigma_does_not_vanish():
     """The condition is what holds sigma: with a tenth of beta it wanders off from the circle's promise."""
     weak = msgspec.structs.replace(THEORY, beta_per_s=0.5)
-    rows = drive_at_velocities(EpsilonTracking(weak), Line(), beside(Line(), 0.0243, 0.0308, -0.96), 0.0, 6.0)
+    rows = drive_at_velocities(
+        EpsilonTracking(weak), StraightLine(), beside(StraightLine(), 0.0243, 0.0308, -0.96), 0.0, 6.0
+    )
     assert max(abs(row.control.inner["sigma_rad2"]) for row in rows[-1000:]) > 0.1 * weak.epsilon_rad**2
 
 
@@ -150,12 +154,12 @@ def test_once_a_period_the_theory_s_gains_do_not_hold():
     fast = msgspec.structs.replace(
         THEORY, max_v_m_s=10.0, max_w_rad_s=100.0, max_v_dot_m_s2=1e4, max_w_dot_rad_s2=1e5
     )
-    start = Posture(*beside(Line(), 0.0243, 0.0308, -0.96))
-    errors = [apart(truth, r)[0] for _, truth, r in drive(EpsilonTracking(fast), Line(), start, 178)]
+    start = Posture(*beside(StraightLine(), 0.0243, 0.0308, -0.96))
+    errors = [apart(truth, r)[0] for _, truth, r in drive(EpsilonTracking(fast), StraightLine(), start, 178)]
     assert max(errors[-30:]) > 0.10
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()], ids=["line", "arc"])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()], ids=["line", "arc"])
 def test_the_retuned_gains_track_without_delay_or_noise(path):
     """On the arc 3 cm remain: with so small a beta sigma does not come to 0 while x* turns."""
     for start in ((0.0243, 0.0308, -0.96), (0.0292, 0.0185, 0.56), (0.0709, 0.0172, -0.38)):
@@ -171,13 +175,13 @@ def test_the_retuned_gains_track_without_delay_or_noise(path):
 @given(st.floats(-3.0, 3.0), st.integers(-3, 3))
 def test_the_first_heading_is_taken_within_half_a_turn_of_the_reference(theta_rad, turns):
     law = EpsilonTracking(RETUNED)
-    asked(law, Line(), 1.0, Posture(0.2, 0.0, theta_rad + turns * 2.0 * math.pi))
+    asked(law, StraightLine(), 1.0, Posture(0.2, 0.0, theta_rad + turns * 2.0 * math.pi))
     assert law.theta_rad == pytest.approx(theta_rad, abs=1e-12)
 
 
 def test_headings_go_on_through_pi():
     """A robot and a reference that turn on count their turns: no jump of 2 pi in x1."""
-    law, path = EpsilonTracking(RETUNED), Line(heading_rad=3.0)
+    law, path = EpsilonTracking(RETUNED), StraightLine(heading_rad=3.0)
     for k in range(40):
         asked(law, path, 1.0 + k * PERIOD_S, Posture(0.2, 0.0, math.remainder(3.0 + 0.2 * k, 2.0 * math.pi)))
         assert law.theta_rad == pytest.approx(3.0 + 0.2 * k, abs=1e-12)
@@ -185,11 +189,11 @@ def test_headings_go_on_through_pi():
 
 
 def test_its_memory_is_saved_and_makes_the_same_commands():
-    whole, cut = (Pilot(Line(heading_rad=3.0), RETUNED.law()) for _ in range(2))
+    whole, cut = (Pilot(StraightLine(heading_rad=3.0), RETUNED.law()) for _ in range(2))
     chance = random.Random(5)
     for k in range(60):
         posture = Posture(chance.random(), chance.random(), math.remainder(0.3 * k, 2.0 * math.pi))
-        other = Pilot(Line(heading_rad=3.0), RETUNED.law())
+        other = Pilot(StraightLine(heading_rad=3.0), RETUNED.law())
         restore(other, snapshot(cut))
         cut = other
         assert cut.update(posture, k * PERIOD_S) == whole.update(posture, k * PERIOD_S)

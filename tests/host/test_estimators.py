@@ -17,7 +17,7 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.wheels import Wheels
 
 HERE = Posture(0.07, 0.02, -0.38)
@@ -77,14 +77,14 @@ def test_a_robot_that_follows_at_once_is_where_it_was_predicted(commands, age_s,
 
 
 def test_the_law_is_given_the_reference_of_the_time_that_was_predicted():
-    plain, led = Gains().law(), Pilot(Line(), Gains().law(), reference_lead_s=0.03)
-    one = Pilot(Line(), plain, estimator=PredictParameters(age_s=0.0, ahead_s=0.03).estimator())
+    plain, led = Gains().law(), Pilot(StraightLine(), Gains().law(), reference_lead_s=0.03)
+    one = Pilot(StraightLine(), plain, estimator=PredictParameters(age_s=0.0, ahead_s=0.03).estimator())
     assert one.update(HERE, 1.0) == led.update(HERE, 1.0)  # at rest nothing moves, only the time differs
 
 
 def test_what_was_sent_is_remembered_over_a_save():
     def pilot():
-        return Pilot(Line(), Gains().law(), estimator=PredictParameters().estimator())
+        return Pilot(StraightLine(), Gains().law(), estimator=PredictParameters().estimator())
 
     whole, cut = pilot(), pilot()
     for k in range(6):
@@ -119,7 +119,7 @@ class Answering(Estimator[Odd]):
     ],
 )
 def test_an_estimator_that_fails_is_named(answer, reason):
-    one = Pilot(Line(), Gains().law(), estimator=Odd(answer).estimator())
+    one = Pilot(StraightLine(), Gains().law(), estimator=Odd(answer).estimator())
     with pytest.raises(
         PluginError,
         match=rf"estimator 'odd' failed: .*{reason} \(.*:\d+ in Answering.step\); mend the estimator",
@@ -152,7 +152,9 @@ class Knowing(Estimator[KnowingParameters]):
 
 def steered(**parameters):
     """A pilot whose estimator knows the wheels, after one period, and its command."""
-    one = Pilot(Line(), KanayamaParameters().law(), estimator=KnowingParameters(**parameters).estimator())
+    one = Pilot(
+        StraightLine(), KanayamaParameters().law(), estimator=KnowingParameters(**parameters).estimator()
+    )
     return one, one.update(HERE, 1.0)
 
 

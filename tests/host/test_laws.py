@@ -14,7 +14,7 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.telemetry_receiver import LastTelemetry
 from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
 
@@ -39,7 +39,7 @@ class Any(LawParameters, frozen=True, tag="any"):
 
 
 def pilot(law, **options):
-    return Pilot(Line(), law, **options)
+    return Pilot(StraightLine(), law, **options)
 
 
 def test_a_law_is_given_the_measurement_the_reference_and_the_last_answer_of_its_robot():

@@ -8,7 +8,7 @@ import pytest
 
 from miro_host.laws.yang_kim import Gains, YangKim, saturation
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 
 
 def surface_rate(law, path, t, posture, v, w):
@@ -33,7 +33,7 @@ def inside_the_layer(count):
     """States within 0.1 rad of the reference's heading, and away from the origin and from assumption 3."""
     chance = random.Random(3)
     while count:
-        r = Line().at(chance.uniform(1.0, 5.0))
+        r = StraightLine().at(chance.uniform(1.0, 5.0))
         x, y = r.posture.x_m + chance.uniform(-0.1, 0.1), r.posture.y_m + chance.uniform(-0.2, 0.2)
         if x > 0.05:
             count -= 1
@@ -43,7 +43,7 @@ def inside_the_layer(count):
 
 def test_inside_the_layer_the_published_u2_lets_v_rise_and_the_layer_s_derivative_does_not():
     """sat has a slope where sgn has none: s2' then has theta_e' / w |phi_e| beside what Theorem 1 counts."""
-    width, path = 0.1, Line()
+    width, path = 0.1, StraightLine()
     published = Gains(1.7, 3.0, 0.53, 0.72, 0.35, 1.2, layer_s2_rad_s=0.19, layer_theta_rad=width)
     sloped = msgspec.structs.replace(published, layer_derivative=True)
     rises, most, seen = {False: 0, True: 0}, 0.0, 0

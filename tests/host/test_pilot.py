@@ -11,7 +11,7 @@ from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.station import Station
 from miro_host.vision import Vision, VisionErrors
 
@@ -21,7 +21,7 @@ ACCELERATIONS = st.floats(-1e4, 1e4)
 
 
 def pilot(**options):
-    return Pilot(Line(), LAW, **options)
+    return Pilot(StraightLine(), LAW, **options)
 
 
 def test_before_the_first_measurement_the_command_is_zero():
@@ -50,7 +50,7 @@ def test_the_command_is_the_integral_of_reference_acceleration_and_input():
 def test_the_law_is_given_the_commanded_velocity_of_the_period_before():
     one = pilot()
     first = one.update(START, 1.0)
-    expected = LAW.control(Line().at(1.1), START, first.v_m_s, first.w_rad_s)
+    expected = LAW.control(StraightLine().at(1.1), START, first.v_m_s, first.w_rad_s)
     assert one.update(START, 1.1).inner["u1"] == expected.u1
 
 

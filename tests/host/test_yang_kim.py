@@ -10,13 +10,15 @@ from hypothesis import strategies as st
 from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from tests.naive import host_control as naive
 
 SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)
 SLOPED = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, layer_theta_rad=0.4, layer_derivative=True)
 SWITCHING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)
-PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
+PATHS = st.sampled_from(
+    [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
+)
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
 TIMES = st.floats(0.02, 5.9)
 SPEEDS = st.floats(-0.9, 0.9)
@@ -89,7 +91,7 @@ def test_inserting_16_into_18_gives_21_and_22(path, t, posture, v, w, f1, f2):
 
 def test_the_derivative_of_the_absolute_angle_error_has_the_sign_of_the_change():
     """Not |phi_e'|: seen from an approaching and from a departing robot it differs in sign."""
-    r = Line().at(3.0)
+    r = StraightLine().at(3.0)
     gains = Gains(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, switching="sign")
     here, ahead = Posture(0.5, 0.1, 0.3), Posture(0.5, 0.1, 0.1)
     inwards = YangKim(gains).control(r, here, -0.2, 0.0)
@@ -103,7 +105,7 @@ def test_the_derivative_of_the_absolute_angle_error_has_the_sign_of_the_change()
 def test_the_mirrored_robot_on_the_line_gets_the_mirrored_answer(t, posture, v, w, gains):
     assume(abs(posture.y_m) > 1e-6)  # not on the seam of phi_e, where one side is as good as the other
     assume(abs(math.cos(math.atan2(posture.y_m, posture.x_m) - posture.theta_rad)) > 1e-6)
-    law, r = YangKim(gains), Line().at(t)
+    law, r = YangKim(gains), StraightLine().at(t)
     one = law.control(r, posture, v, w)
     other = law.control(r, Posture(posture.x_m, -posture.y_m, -posture.theta_rad), v, -w)
     assert (other.s1, other.u1, other.s2, other.u2) == (one.s1, one.u1, -one.s2, -one.u2)
@@ -119,7 +121,7 @@ def test_with_the_guards_every_posture_has_a_bounded_answer(path, t, posture, v,
 
 def test_the_guarded_factor_keeps_the_sign_and_vanishes_at_the_singularity():
     law = YangKim(SATURATING)
-    r = Line().at(2.0)
+    r = StraightLine().at(2.0)
     across = law.control(r, Posture(0.3, 0.0, math.pi / 2), 0.0, 0.0)
     assert abs(across.u1) < 1e-12
     towards, away = (law.control(r, Posture(0.3, 0.0, angle), 0.0, 0.0) for angle in (0.0, math.pi))

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_host.pilot import STANDSTILL, Command
+from miro_host.pilot import STANDSTILL, WheelCommand
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
 from miro_robot.firmware import image_path
@@ -34,7 +34,7 @@ wheel_radius_mismatch = 0.0
 
 
 def command(v_m_s, w_rad_s):
-    return Command(*WHEELS.command(v_m_s, w_rad_s), v_m_s, w_rad_s)
+    return WheelCommand(*WHEELS.command(v_m_s, w_rad_s), v_m_s, w_rad_s)
 
 
 @given(st.integers(0, 2**63 - 1), st.integers(0, 10**6), st.floats(0, 1), st.floats(0, 40))
@@ -52,7 +52,7 @@ def test_what_is_sent_is_a_command_within_the_bounds(seed, period, v_bound, w_bo
 
 def test_no_bounds_are_no_noise_and_no_rounding():
     noise = NoisyCommands(ControlNoise(), WHEELS, 1, "a")
-    odd = Command(123, -456, 0.0, 0.0)  # not what v and w would give
+    odd = WheelCommand(123, -456, 0.0, 0.0)  # not what v and w would give
     assert noise.wheels_of(odd, 3) == (123, -456)
 
 

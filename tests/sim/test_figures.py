@@ -11,7 +11,7 @@ from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY, Epsil
 from miro_host.references.arc import ArcRef
 from miro_host.references.line import LineRef
 from miro_sim.scenario.file import builtin_names, load, parse
-from miro_sim.scenario.keys import Robot
+from miro_sim.scenario.keys import RobotSpec
 
 CAPTIONS: dict[str, tuple[tuple[float, float, float], type, str]] = {
     "fig6": ((7.09, 1.72, -0.38), LineRef, "yang_kim"),
@@ -23,7 +23,7 @@ CAPTIONS: dict[str, tuple[tuple[float, float, float], type, str]] = {
 TABLE = "[network.robot.controller]\n"
 
 
-def only_robot(name: str) -> Robot:
+def only_robot(name: str) -> RobotSpec:
     return load(name).scenario.networks[0].robot[0]
 
 

@@ -136,7 +136,7 @@ def test_drive_s_says_when_the_reference_stands():
 FOREIGN = """
 import msgspec
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.references.interface import ReferenceParameters
 
 class Odd(ReferenceParameters, frozen=True, kw_only=True, tag="odd"):
@@ -152,7 +152,7 @@ class Path:
         self.how = how
 
     def at(self, t_s):
-        found = Line().at(min(t_s, 1.0))
+        found = StraightLine().at(min(t_s, 1.0))
         if t_s > 2.0 and self.how == "fails":
             raise KeyError("t_s")
         if t_s > 2.0 and self.how == "leaves":

@@ -10,7 +10,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.camera_keys import GaussianCamera, PixelCamera
 from miro_sim.scenario.file import ScenarioError, load, parse
-from miro_sim.scenario.keys import Host
+from miro_sim.scenario.keys import HostSpec
 from miro_sim.world.world import World
 from mirotwin.commands import main
 
@@ -56,7 +56,7 @@ def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(
     network = scenario.networks[0]
     robot = network.robot[0]
     assert scenario.camera == EXACT
-    assert scenario.host == Host(compute_s=0.00001)
+    assert scenario.host == HostSpec(compute_s=0.00001)
     assert (network.radio.bit_error_rate, network.radio.eb_n0_db, network.radio.bursts) == (0.0, None, None)
     assert (network.radio.lost_frames, network.radio.squelch) == (0.0, True)
     assert (network.control_noise.v_m_s, robot.wheel_radius_mismatch) == (0.0, 0.0)

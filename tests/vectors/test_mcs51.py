@@ -5,7 +5,7 @@ from click.testing import CliRunner
 from msgspec import ValidationError
 
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH
-from miro_robot.mcs51.vectors import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, Bench, State, decode
+from miro_robot.mcs51.vectors import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, State, VectorRunner, decode
 from mirotwin.commands import main
 from tests.vectors.paths import MCS51
 
@@ -28,7 +28,7 @@ def test_there_is_one_file_for_each_opcode():
 
 @pytest.mark.parametrize("high", range(16))
 def test_the_cpu_does_what_the_vectors_say(high):
-    bench = Bench()
+    bench = VectorRunner()
     for opcode in range(16 * high, 16 * high + 16):
         for vector in vectors_of(opcode):
             assert bench.run(vector.initial) == (vector.final, vector.cycles), vector.name
@@ -90,12 +90,12 @@ def test_what_cannot_be_written_is_one_line_and_exit_code_2(arguments, tmp_path)
 
 def test_a_state_that_does_not_list_what_changes_is_refused():
     with pytest.raises(ValueError, match="does not list all"):
-        Bench().run(State(pc=0, sfr=[], iram=[], xram=[], code=[(0, 0x74), (1, 0x55), (2, 0)]))
+        VectorRunner().run(State(pc=0, sfr=[], iram=[], xram=[], code=[(0, 0x74), (1, 0x55), (2, 0)]))
 
 
 def test_a_bench_carries_out_any_number_of_vectors():
     """Each of these moves TXD down, and the reset before it up again."""
-    bench = Bench()
+    bench = VectorRunner()
     initial = State(pc=0, sfr=[(0xB0, 0xFD)], iram=[], xram=[], code=[(0, 0), (1, 0)])
     results = [bench.run(initial) for _ in range(2100)]
     assert results.count(results[0]) == len(results)

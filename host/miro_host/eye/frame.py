@@ -3,7 +3,7 @@
 from typing import Protocol
 
 
-class Frame(Protocol):
+class Pixels(Protocol):
     """One picture. `width`, `height` in pixels."""
 
     width: int

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from miro_host.eye.frame import Frame
+from miro_host.eye.frame import Pixels
 from miro_host.eye.lens import Lens
 from miro_host.eye.pitch_marks import Mark
 
@@ -32,7 +32,7 @@ SPREAD_PX = 1.0
 _STEP_M = 0.01
 
 
-class Band(NamedTuple):
+class FloorMark(NamedTuple):
     """A mark in the picture: its middle (u, v) and the unit vector (across_u, across_v) to one side of it."""
 
     u: float
@@ -41,13 +41,13 @@ class Band(NamedTuple):
     across_v: float
 
 
-def expected(lens: Lens, mark: Mark) -> Band:
+def expected(lens: Lens, mark: Mark) -> FloorMark:
     """Where a camera draws a mark: half-way between foot and edge of a wall. Raises ValueError as `Lens.pixel` does."""
     u, v = _middle(lens, mark, 0.0)
     ahead_u, ahead_v = _middle(lens, mark, _STEP_M)
     along_u, along_v = ahead_u - u, ahead_v - v
     length = math.sqrt(along_u * along_u + along_v * along_v)
-    return Band(u, v, 0.0 - along_v / length, along_u / length)
+    return FloorMark(u, v, 0.0 - along_v / length, along_u / length)
 
 
 def _middle(lens: Lens, mark: Mark, ahead_m: float) -> tuple[float, float]:
@@ -59,7 +59,7 @@ def _middle(lens: Lens, mark: Mark, ahead_m: float) -> tuple[float, float]:
     return 0.5 * (u + top_u), 0.5 * (v + top_v)
 
 
-def find(frame: Frame, band: Band) -> float | None:
+def find(frame: Pixels, band: FloorMark) -> float | None:
     """How far across the band is from where it was expected, in pixels. None: it is not there, or not for sure."""
     by_rows = abs(band.across_u) >= abs(band.across_v)
     length = 2 * REACH_PX + 1

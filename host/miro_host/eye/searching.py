@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from miro_host.eye.frame import Frame
+from miro_host.eye.frame import Pixels
 from miro_host.eye.regions import Regions
 
 ROW_STEP = 4
 """Rows from one that is looked at to the next: a patch of 8 pixels cannot lie between two."""
 
 
-def candidates(frame: Frame, regions: Regions, team: int, side_px: float) -> list[tuple[int, int]]:
+def candidates(frame: Pixels, regions: Regions, team: int, side_px: float) -> list[tuple[int, int]]:
     """(u, v) of what may be patches of class `team`, whose sides are `side_px` long; rows from the top."""
     found: list[tuple[float, int, int]] = []  # middle of the first run, first row, last row
     for row in range(ROW_STEP // 2, frame.height, ROW_STEP):

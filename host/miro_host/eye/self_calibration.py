@@ -26,7 +26,7 @@ import msgspec
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
-from miro_host.eye.frame import Frame
+from miro_host.eye.frame import Pixels
 from miro_host.eye.lens import Lens
 from miro_host.eye.mark_finder import expected, find
 from miro_host.eye.pitch_marks import MARKS, Mark
@@ -79,7 +79,7 @@ class SelfCalibration:
     def __repr__(self) -> str:
         return f"SelfCalibration({dict(zip(LEARNT, self.changes, strict=True))!r}, used={self.used})"
 
-    def look(self, frame: Frame, robots: Sequence[Track]) -> bool:
+    def look(self, frame: Pixels, robots: Sequence[Track]) -> bool:
         """Takes one mark of a picture. True: `calibration` has news for the tracker."""
         frames = self.looked
         if frames < SETTLED_FRAMES or frames % SELDOM == 0:
@@ -102,7 +102,7 @@ class SelfCalibration:
         """Standard deviations of the parameters, by name."""
         return {name: math.sqrt(self.covariance[index * (_SIZE + 1)]) for index, name in enumerate(LEARNT)}
 
-    def _take(self, frame: Frame, mark: Mark) -> None:
+    def _take(self, frame: Pixels, mark: Mark) -> None:
         try:
             band = expected(Lens(changed(self.begun.camera, self.changes)), mark)
             slopes = slopes_of(self.begun.camera, mark)

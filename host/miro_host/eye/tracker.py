@@ -19,7 +19,7 @@ from typing import Literal
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.colours import CLASS_OF, ColourClasses
-from miro_host.eye.frame import Frame
+from miro_host.eye.frame import Pixels
 from miro_host.eye.notes import Notes, Pair, Window
 from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
@@ -111,7 +111,7 @@ class Tracker:
         if self.learning is not None:
             self._believe(self.learning.calibration)
 
-    def track(self, frame: Frame, tick: int) -> list[Sighting | None]:
+    def track(self, frame: Pixels, tick: int) -> list[Sighting | None]:
         """Where the robots are in a picture exposed at `tick`, in their order; None: not found, or not for sure."""
         if self.notes is not None:
             self.notes.begin(tick)
@@ -136,7 +136,7 @@ class Tracker:
 
     # ---- where to look
 
-    def _followed(self, frame: Frame, tick: int, slot: int) -> Pair | None:
+    def _followed(self, frame: Pixels, tick: int, slot: int) -> Pair | None:
         """The robot in a window around where it is predicted, or in a larger one."""
         track = self.tracks[slot]
         if track.seen == 0:
@@ -152,13 +152,13 @@ class Tracker:
         return pair
 
     def _in_window(
-        self, frame: Frame, tick: int, slot: int, u: float, v: float, size: int, predicted: Posture
+        self, frame: Pixels, tick: int, slot: int, u: float, v: float, size: int, predicted: Posture
     ) -> Pair | None:
         pixels = self._look(frame, u, v, size, slot)
         self._expect(slot, predicted)
         return self._chosen(pixels, tick, slot)
 
-    def _look(self, frame: Frame, u: float, v: float, size: int, slot: int) -> bytearray:
+    def _look(self, frame: Pixels, u: float, v: float, size: int, slot: int) -> bytearray:
         """Finds the patches in a window around a pixel, moved so that it lies in the picture."""
         width, height = min(size, frame.width), min(size, frame.height)
         left = min(max(math.floor(u) - width // 2, 0), frame.width - width)
@@ -169,7 +169,7 @@ class Tracker:
         self.patches.look(pixels, left, top, width, height)
         return pixels
 
-    def _search(self, frame: Frame, tick: int, pairs: list[Pair | None]) -> None:
+    def _search(self, frame: Pixels, tick: int, pairs: list[Pair | None]) -> None:
         """Looks for the robots that are None in `pairs` in the whole picture, and puts in what it finds once."""
         missing = [slot for slot, pair in enumerate(pairs) if pair is None]
         found: dict[int, list[Pair]] = {slot: [] for slot in missing}

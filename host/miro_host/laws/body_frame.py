@@ -61,7 +61,7 @@ class BodyFrameParameters(LawParameters, frozen=True, kw_only=True, tag="body_fr
         return BodyFrame(self)
 
 
-class Control(msgspec.Struct, frozen=True):
+class BodyFrameControl(msgspec.Struct, frozen=True):
     """Errors, surfaces s1 [m/s] and s2 [rad/s], and what makes them fall: v' [m/s2] and w' [rad/s2]."""
 
     x_m: float
@@ -84,7 +84,7 @@ class BodyFrame(Law[BodyFrameParameters]):
         inner = {"s1": c.s1, "s2": c.s2, "x_m": c.x_m, "y_m": c.y_m, "theta_rad": c.theta_rad}
         return Accelerations(c.v_dot, c.w_dot, inner)
 
-    def control(self, reference: Reference, posture: Posture, v: float, w: float) -> Control:
+    def control(self, reference: Reference, posture: Posture, v: float, w: float) -> BodyFrameControl:
         """The answer for a robot at `posture` that moves with `v` m/s and `w` rad/s."""
         g, r = self.parameters, reference
         e = errors(r.posture, posture)
@@ -107,7 +107,7 @@ class BodyFrame(Law[BodyFrameParameters]):
         reach1 = g.q1_per_s * s1 + g.p1_m_s2 * clamp(s1 / g.layer_s1_m_s, 1.0)
         x_accel = w_dot * y + w * y_rate + r.v_dot_m_s2 * cos - r.v_m_s * sin * theta_rate  # x'' without -v'
         v_dot = x_accel + g.gamma1_per_s * x_rate + reach1
-        return Control(x, y, e.theta_rad, s1, s2, v_dot, w_dot)
+        return BodyFrameControl(x, y, e.theta_rad, s1, s2, v_dot, w_dot)
 
     def demand(self, y_m: float) -> tuple[float, float, float]:
         """The heading demand h(y) in rad, h'(y) in rad/m and h''(y) in rad/m2."""

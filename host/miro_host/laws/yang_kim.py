@@ -86,7 +86,7 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
         return YangKim(self)
 
 
-class Control(msgspec.Struct, frozen=True):
+class YangKimControl(msgspec.Struct, frozen=True):
     """What the law saw and what it answers.
 
     Errors c - r in polar coordinates (m, rad, wrapped), surfaces s1 [m/s], s2 [rad/s] of equation (13),
@@ -137,7 +137,9 @@ class YangKim(Law[Gains]):
         inner = {"u1": c.u1, "u2": c.u2, "s1": c.s1, "s2": c.s2}
         return Accelerations(r.v_dot_m_s2 + c.u1, r.w_dot_rad_s2 + c.u2, inner)
 
-    def control(self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> Control:
+    def control(
+        self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float
+    ) -> YangKimControl:
         """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
 
         ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
@@ -174,7 +176,7 @@ class YangKim(Law[Gains]):
         )
         if g.layer_derivative and abs(theta_e) < g.layer_theta_rad:
             u2 -= theta_e_rate / g.layer_theta_rad * abs(phi_e)
-        return Control(rho_e, phi_e, theta_e, s1, s2, u1, u2)
+        return YangKimControl(rho_e, phi_e, theta_e, s1, s2, u1, u2)
 
     def _switch(self, x: float, width: float) -> float:
         if self.parameters.switching == "sign":

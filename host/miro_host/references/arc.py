@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
 from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
@@ -60,7 +60,7 @@ class Arc(msgspec.Struct, frozen=True):
             rho_accel_m_s2=v_dot * cos_h - v * v * (0.5 * kappa) * sin_h,
         )
 
-    def pace(self, step_m: float, step_rad: float) -> Pace:
+    def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """After one whole turn the circle is closed."""
         kappa = abs(self.curvature_per_m)
         if kappa == 0.0:

@@ -46,7 +46,7 @@ class Trajectory(Protocol):
         ...
 
 
-class Pace(msgspec.Struct, frozen=True):
+class SamplingPace(msgspec.Struct, frozen=True):
     """How closely, and how long, one has to look at a trajectory to have seen all of it.
 
     Within `step_s` it goes no further and turns no more than was asked. After `until_s` it stands, or goes only where
@@ -62,7 +62,7 @@ class Pace(msgspec.Struct, frozen=True):
 class Paced(Trajectory, Protocol):
     """A trajectory that says how closely it has to be looked at. All of our own do."""
 
-    def pace(self, step_m: float, step_rad: float) -> Pace:
+    def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """Its pace for steps of `step_m` and `step_rad` at most."""
         ...
 

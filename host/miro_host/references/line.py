@@ -6,12 +6,12 @@ import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
 from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
 
-class Line(msgspec.Struct, frozen=True):
+class StraightLine(msgspec.Struct, frozen=True):
     """Straight line at `heading_rad` against +X. Out of the origin theta_r = phi_r = the angle and rho_r = s."""
 
     ramp: Ramp = Ramp()
@@ -40,7 +40,7 @@ class Line(msgspec.Struct, frozen=True):
             rho_accel_m_s2=v_dot,
         )
 
-    def pace(self, step_m: float, step_rad: float) -> Pace:
+    def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """A line that does not end in time leads on for ever."""
         return self.ramp.pace(step_m, math.inf)
 
@@ -59,8 +59,8 @@ class LineRef(ReferenceParameters, frozen=True, kw_only=True, tag="line"):
     ramp_s: Seconds = 0.5
     drive_s: DriveS | None = None
 
-    def trajectory(self, duration_s: float) -> Line:
-        return Line(
+    def trajectory(self, duration_s: float) -> StraightLine:
+        return StraightLine(
             ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
             self.heading_deg * DEGREE,
             self.start_x_cm / 100.0,

@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from miro_host.references.interface import Pace
+from miro_host.references.interface import SamplingPace
 
 Speed = Annotated[float, Meta(ge=0.0, le=1.46)]
 Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
@@ -44,15 +44,15 @@ class Ramp(msgspec.Struct, frozen=True):
             return self._length(t_s), self.speed_m_s * t_s / self.ramp_s, self.speed_m_s / self.ramp_s
         return self._length(t_s), self.speed_m_s, 0.0
 
-    def pace(self, step_m: float, length_m: float, period_m: float = 0.0) -> Pace:
+    def pace(self, step_m: float, length_m: float, period_m: float = 0.0) -> SamplingPace:
         """The pace of a path that has been everywhere after `length_m`, and whose shape repeats after `period_m`."""
         if self.speed_m_s == 0.0 or self.duration_s == 0.0:
-            return Pace(self.duration_s, self.duration_s, 0.0)
+            return SamplingPace(self.duration_s, self.duration_s, 0.0)
         until_s = min(self.duration_s, self.ramp_s + length_m / self.speed_m_s)
         steady_s = min(self.duration_s, self.ramp_s + period_m / self.speed_m_s)
         if self.ramp_down and period_m > 0.0:  # it may slow down where it has not sped up
             steady_s = self.duration_s
-        return Pace(step_m / self.speed_m_s, until_s, steady_s)
+        return SamplingPace(step_m / self.speed_m_s, until_s, steady_s)
 
     def _whole_length(self) -> float:
         if not self.ramp_down:

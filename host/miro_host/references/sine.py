@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
 from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
@@ -59,7 +59,7 @@ class Sine(msgspec.Struct, frozen=True):
             (bend * u_ddot + bend_rate * square) / g2 - 2.0 * slope * bend * bend * square / (g2 * g2),
         )
 
-    def pace(self, step_m: float, step_rad: float) -> Pace:
+    def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """Steepest on the axis, where a metre of it has sqrt(1 + (2 pi A / wavelength)^2); bent most at a crest."""
         k = FULL_TURN / self.wavelength_m
         steep, bend = self.amplitude_m * k, abs(self.amplitude_m) * k * k

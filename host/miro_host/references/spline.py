@@ -43,7 +43,7 @@ class Shape(msgspec.Struct, frozen=True):
         return curvature, by_tau / rate
 
 
-class Piece(msgspec.Struct, frozen=True):
+class SplinePiece(msgspec.Struct, frozen=True):
     """One polynomial in each coordinate: coefficients of tau^0 to tau^5, in m."""
 
     x: tuple[float, float, float, float, float, float]
@@ -88,7 +88,9 @@ def _third(c: Six, t: float) -> float:
     return 6.0 * c[3] + t * (24.0 * c[4] + t * (60.0 * c[5]))
 
 
-def spline(points: Sequence[tuple[float, float]], headings: Sequence[float], closed: bool) -> list[Piece]:
+def spline(
+    points: Sequence[tuple[float, float]], headings: Sequence[float], closed: bool
+) -> list[SplinePiece]:
     """The pieces between points in m with these headings in rad; `closed`: with one from the last to the first."""
     count = len(points)
     ends = [(i, (i + 1) % count) for i in range(count if closed else count - 1)]
@@ -136,7 +138,9 @@ def _arc_like(a: Pair, b: Pair, leaving: float, arriving: float) -> tuple[float,
     return length, (-(4.0 * first + 2.0 * last) / length, (2.0 * first + 4.0 * last) / length)
 
 
-def _quintic(a: Pair, b: Pair, at_a: Pair, at_b: Pair, bend_a: float, bend_b: float, length: float) -> Piece:
+def _quintic(
+    a: Pair, b: Pair, at_a: Pair, at_b: Pair, bend_a: float, bend_b: float, length: float
+) -> SplinePiece:
     """The quintic with these ends, unit tangents and curvatures in 1/m."""
     normal_a, normal_b = (-at_a[1], at_a[0]), (-at_b[1], at_b[0])
     square = length * length
@@ -155,4 +159,4 @@ def _quintic(a: Pair, b: Pair, at_a: Pair, at_b: Pair, bend_a: float, bend_b: fl
                 6.0 * h - 3.0 * d0 - 3.0 * d1 - 0.5 * e0 + 0.5 * e1,
             )
         )
-    return Piece(*both)
+    return SplinePiece(*both)

@@ -20,10 +20,10 @@ from msgspec import Meta
 from miro_exact.dmath import atan2
 from miro_host.posture import Posture
 from miro_host.references.headings import headings
-from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
 from miro_host.references.polar import with_polar_form
 from miro_host.references.speeds import Bounds, at_nodes, run_up, smooth, timed
-from miro_host.references.spline import Piece, spline
+from miro_host.references.spline import SplinePiece, spline
 
 CELLS = 64
 """Cells of the table in each piece of the path."""
@@ -66,7 +66,7 @@ class Waypoints:
         kind = "closed" if self.closed else "open"
         return f"Waypoints({len(self.pieces)} pieces, {kind}, lap of {self.lap.duration_s:.3f} s)"
 
-    def _tabulate(self, piece: Piece, number: int, curvatures: list[float]) -> None:
+    def _tabulate(self, piece: SplinePiece, number: int, curvatures: list[float]) -> None:
         """The cells of one piece: their lengths, and a bound of their curvature.
 
         A peak between two of the places that are looked at is higher than the higher one by an eighth of the difference
@@ -113,7 +113,7 @@ class Waypoints:
         posture = Posture(shape.x_m, shape.y_m, atan2(shape.dy, shape.dx))
         return with_polar_form(posture, v, bend * v, v_dot, bend * v_dot + bend_rate * v * v)
 
-    def _tau(self, piece: Piece, cell: int, way_m: float) -> float:
+    def _tau(self, piece: SplinePiece, cell: int, way_m: float) -> float:
         """The parameter `way_m` behind a cell's beginning: linearly, then two steps of Newton."""
         first = (cell % CELLS) / CELLS
         tau = first + min(way_m / self.ways_m[cell], 1.0) / CELLS
@@ -121,17 +121,17 @@ class Waypoints:
             tau -= (_way(piece, first, tau) - way_m) / piece.rate(tau)
         return tau
 
-    def pace(self, step_m: float, step_rad: float) -> Pace:
+    def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """It has been everywhere after its end, or after the first lap at its own speed."""
         until_s = self.start.duration_s
         if self.closed:
             until_s += self.lap.duration_s
         bend = self.most_curvature_per_m
         step_s = min(step_m, step_rad / bend if bend > 0.0 else step_m) / self.bounds.speed_m_s
-        return Pace(step_s, until_s, until_s)
+        return SamplingPace(step_s, until_s, until_s)
 
 
-def _way(piece: Piece, first: float, last: float) -> float:
+def _way(piece: SplinePiece, first: float, last: float) -> float:
     """Length in m of a piece from one parameter to another, by Gauss and Legendre."""
     span = last - first
     rate = 0.0

@@ -17,7 +17,7 @@ from miro_host.posture import Posture
 from miro_host.theory import computed_torque
 from miro_host.theory.assumptions import radius
 from miro_host.theory.matrices import Vector, solution, times
-from miro_host.theory.unicycle import Body, cartesian_rates, inertia, polar_rates
+from miro_host.theory.unicycle import UnicycleBody, cartesian_rates, inertia, polar_rates
 
 Chart = Literal["cartesian", "polar"]
 Torques = Callable[[float], Vector]
@@ -29,7 +29,7 @@ class Demand(Protocol):
     def __call__(self, t_s: float, posture: Posture, v: float, w: float, /) -> tuple[float, float]: ...
 
 
-class Row(msgspec.Struct, frozen=True):
+class SimulatedStep(msgspec.Struct, frozen=True):
     """The robot at the beginning of a step, its heading unwrapped, and what was demanded and applied there."""
 
     t_s: float
@@ -44,7 +44,7 @@ def no_disturbance(t_s: float) -> Vector:
     return [0.0, 0.0]
 
 
-class Simulation:
+class BodySimulation:
     """A body with a law. `disturbance` is tau_d in Nm at the wheels; `model` the body that the law believes in.
 
     With `limits` demands are clamped as the host's integrator does it, and no speed is raised above its limit.
@@ -52,11 +52,11 @@ class Simulation:
 
     def __init__(
         self,
-        body: Body,
+        body: UnicycleBody,
         demand: Demand,
         *,
         disturbance: Torques = no_disturbance,
-        model: Body | None = None,
+        model: UnicycleBody | None = None,
         limits: Limits | None = None,
         chart: Chart = "cartesian",
     ) -> None:
@@ -70,7 +70,7 @@ class Simulation:
 
     def run(
         self, start: Posture, z: tuple[float, float], start_s: float, end_s: float, step_s: float
-    ) -> Iterator[Row]:
+    ) -> Iterator[SimulatedStep]:
         """Rows from `start_s` to `end_s`, both included. Raises ValueError unless that is a whole number of steps."""
         count = round((end_s - start_s) / step_s)
         if count < 0 or abs(count * step_s - (end_s - start_s)) > 1e-6 * step_s:
@@ -80,7 +80,7 @@ class Simulation:
             t = start_s + index * step_s
             posture = self._posture(state)
             demanded, torque = self._drive(t, posture, state[3], state[4])
-            yield Row(t, posture, state[3], state[4], demanded, torque)
+            yield SimulatedStep(t, posture, state[3], state[4], demanded, torque)
             state = self._stepped(t, state, step_s)
 
     def _stepped(self, t: float, state: Vector, step: float) -> Vector:

@@ -12,7 +12,7 @@ from miro_host.theory.matrices import Matrix, Vector, diagonal
 from miro_host.theory.mechanics import System
 
 
-class Body(msgspec.Struct, frozen=True, kw_only=True):
+class UnicycleBody(msgspec.Struct, frozen=True, kw_only=True):
     """What the robot weighs and how it stands on its wheels. ValueError unless all are above 0."""
 
     mass_kg: float
@@ -26,7 +26,7 @@ class Body(msgspec.Struct, frozen=True, kw_only=True):
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
 
 
-def inertia(body: Body) -> Matrix:
+def inertia(body: UnicycleBody) -> Matrix:
     """H of equation (7), written out: wheel torques for v' = 1 m/s2 (first column) and w' = 1 rad/s2 (second)."""
     forward = 0.5 * body.wheel_radius_m * body.mass_kg
     turn = body.wheel_radius_m * body.yaw_inertia_kg_m2 / body.track_m
@@ -45,7 +45,7 @@ def polar_rates(q: Vector, z: Vector) -> Vector:
     return [z[0] * cos, -(z[0] / q[0]) * sin, z[1]]
 
 
-def cartesian(body: Body, q: Vector, z: Vector) -> System:
+def cartesian(body: UnicycleBody, q: Vector, z: Vector) -> System:
     """The robot at q = (x, y, theta) in m and rad with z = (v, w)."""
     sin, cos = sincos(q[2])
     w, r, arm = z[1], body.wheel_radius_m, 0.5 * body.track_m
@@ -59,7 +59,7 @@ def cartesian(body: Body, q: Vector, z: Vector) -> System:
     )
 
 
-def polar(body: Body, q: Vector, z: Vector) -> System:
+def polar(body: UnicycleBody, q: Vector, z: Vector) -> System:
     """The same at q = (rho, phi, theta), rho > 0. The constraint is that of (8) in these coordinates."""
     rho, r, arm, mass = q[0], body.wheel_radius_m, 0.5 * body.track_m, body.mass_kg
     sin, cos = sincos(q[1] - q[2])

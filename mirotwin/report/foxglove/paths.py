@@ -9,7 +9,7 @@ from miro_host.plugins import PluginError
 from miro_host.references.interface import Paced, Trajectory
 from miro_sim.periods import RobotPeriod
 from miro_sim.scenario.build import reference_for
-from miro_sim.scenario.keys import Robot
+from miro_sim.scenario.keys import RobotSpec
 from mirotwin.report.foxglove import shapes
 from mirotwin.report.foxglove.frames import PITCH, robot_frame
 from mirotwin.report.foxglove.messages import SceneEntity, Timestamp
@@ -48,7 +48,7 @@ class Trail:
             yield SceneEntity(timestamp=at, frame_id=PITCH, id=f"{frame}/trail/{name}", lines=(line,))
 
 
-def reference_points(robot: Robot, duration_s: float) -> tuple[Point, ...]:
+def reference_points(robot: RobotSpec, duration_s: float) -> tuple[Point, ...]:
     """The whole path that a robot is to go; none for one of another distribution that fails."""
     try:
         trajectory = reference_for(robot, duration_s)

@@ -148,7 +148,7 @@ def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Cas
     return verdict_of(header.verdict or "", [] if failure is None else [failure], changed)
 
 
-def _name(case: stream.Stream) -> str:
+def _name(case: stream.StreamFile) -> str:
     names = list(case.header.expect or {})
     if len(names) > 1:
         what = f"expects {', '.join(names)} of a bare processor"
@@ -156,7 +156,7 @@ def _name(case: stream.Stream) -> str:
     return names[0] if names else NO_FAULT
 
 
-def _line(case: stream.Stream) -> BareLine:
+def _line(case: stream.StreamFile) -> BareLine:
     if case.header.bare is None:
         remedy = "`mirotwin replay` plays what is for the robot"
         raise BadInput(case.source, "header", "says nothing of a bare processor", remedy)
@@ -170,7 +170,7 @@ def _line(case: stream.Stream) -> BareLine:
     return line
 
 
-def _check(case: stream.Stream, name: str, given: str | None) -> NamedCheck:
+def _check(case: stream.StreamFile, name: str, given: str | None) -> NamedCheck:
     """The check that the case names: the one given on the command line, or one that is installed."""
     if given:
         if (found_name := given.rpartition(":")[2]) != name:
@@ -186,7 +186,7 @@ def _check(case: stream.Stream, name: str, given: str | None) -> NamedCheck:
         raise BadInput(case.source, "header: expect", what, remedy) from error
 
 
-def _heard(case: stream.Stream) -> list[ScriptItem]:
+def _heard(case: stream.StreamFile) -> list[ScriptItem]:
     return [
         one
         for one in case.script()

@@ -19,7 +19,7 @@ from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.steps.sends import Send, SendFrame, beyond
 
 if TYPE_CHECKING:
-    from miro_sim.scenario.keys import Network as ScenarioNetwork
+    from miro_sim.scenario.keys import NetworkSpec as ScenarioNetwork
     from mirotwin.verify.steps.player import Player
 
 FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")

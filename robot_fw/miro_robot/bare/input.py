@@ -24,7 +24,7 @@ _TICKS_PER_BIT = 32  # of the fastest receiver there is: mode 2 with SMOD
 _LONGEST = 1 << 30  # bytes of a saved piece
 
 
-class Piece(NamedTuple):
+class InputPiece(NamedTuple):
     """Bytes with a condition: they begin `delay_ticks` after the program has sent `when`.
 
     Without `when` the delay counts from the end of the piece before, or from the start. With neither (None), they
@@ -55,7 +55,7 @@ class SerialInput:
                 piece.when,
                 -1 if piece.delay_ticks is None else piece.delay_ticks,
             ),
-            make=lambda cells: Piece(cells[0], cells[1], None if cells[2] < 0 else cells[2]),
+            make=lambda cells: InputPiece(cells[0], cells[1], None if cells[2] < 0 else cells[2]),
         ),
         "fed": TICK,
         "tail": Octets(_LONGEST),
@@ -68,7 +68,7 @@ class SerialInput:
     def __init__(
         self,
         cpu: Cpu,
-        pieces: tuple[Piece, ...],
+        pieces: tuple[InputPiece, ...],
         baud: int | None,
         crystal_hz: int,
         gap_ticks: int = 0,
@@ -93,7 +93,7 @@ class SerialInput:
 
     def add(self, data: bytes) -> None:
         """More input, to be sent as if its condition were met now."""
-        self.pieces.append(Piece(data, delay_ticks=0))
+        self.pieces.append(InputPiece(data, delay_ticks=0))
         if len(self.pieces) == 1:
             self._arm()
 

@@ -14,7 +14,7 @@ from enum import StrEnum
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK, Items, Rows
-from miro_robot.bare.input import Piece, SerialInput
+from miro_robot.bare.input import InputPiece, SerialInput
 from miro_robot.bare.pins import PinEvent, PinInput
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image
@@ -74,7 +74,7 @@ class BareMachine:
         self,
         image: Image,
         code_in_xram: bool = False,
-        stdin: bytes | tuple[Piece, ...] = b"",
+        stdin: bytes | tuple[InputPiece, ...] = b"",
         baud: int | None = None,
         output: Callable[[bytes], object] | None = None,
         stop_on_fault: bool = True,
@@ -108,7 +108,7 @@ class BareMachine:
         if code_in_xram:
             self.bus.fill(image.code)
             self.bus.code_of = self.cpu
-        pieces = (Piece(stdin),) if isinstance(stdin, bytes) else stdin
+        pieces = (InputPiece(stdin),) if isinstance(stdin, bytes) else stdin
         self.input = SerialInput(self.cpu, pieces, baud, crystal_hz, gap_ticks, live)
         self.pins = PinInput(self.cpu, pins)
         if self.pins.uses_rxd and (live or self.input.pieces):

@@ -44,7 +44,7 @@ class CType(msgspec.Struct, frozen=True):
         return f"struct {self.tag}" if self.kind == "struct" else self.kind
 
 
-class Field(msgspec.Struct, frozen=True):
+class Member(msgspec.Struct, frozen=True):
     """A member of a struct or union, so many bytes from its start."""
 
     name: str
@@ -52,7 +52,7 @@ class Field(msgspec.Struct, frozen=True):
     type: CType
 
 
-Fields = Mapping[str, tuple[Field, ...]]
+Fields = Mapping[str, tuple[Member, ...]]
 """The members of structs, by tag."""
 
 MOST_BYTES = 0x10000

@@ -16,7 +16,7 @@ from functools import lru_cache
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_robot.image.c_types import MOST_BYTES, CType, Field, type_named, type_of, values_in
+from miro_robot.image.c_types import MOST_BYTES, CType, Member, type_named, type_of, values_in
 from miro_robot.image.debug_info import listings
 from miro_robot.image.hex import Image
 from miro_robot.image.symbol_files import CDB_SPACES, parse_bits, read_text
@@ -49,10 +49,10 @@ class Variables(msgspec.Struct, frozen=True, eq=False):
     """Of one debug file. `structs`: members by module and tag. `unplaced`: bits, of which that file has no address."""
 
     by_name: dict[str, tuple[Variable, ...]]
-    structs: dict[str, dict[str, tuple[Field, ...]]]
+    structs: dict[str, dict[str, tuple[Member, ...]]]
     unplaced: tuple[Variable, ...] = ()
 
-    def fields(self, variable: Variable) -> dict[str, tuple[Field, ...]]:
+    def fields(self, variable: Variable) -> dict[str, tuple[Member, ...]]:
         """The structs that the variable's type may mean."""
         return self.structs.get(variable.module, {})
 
@@ -61,7 +61,7 @@ class Variables(msgspec.Struct, frozen=True, eq=False):
 def parse_variables(text: str) -> Variables:
     """Those of a debug file's text; records that are damaged or of an unknown type are left out."""
     declared: dict[tuple[str, str, str], tuple[CType, str, str]] = {}
-    structs: dict[str, dict[str, tuple[Field, ...]]] = {}
+    structs: dict[str, dict[str, tuple[Member, ...]]] = {}
     found: dict[str, dict[str, Variable]] = {}
     module = ""
     for line in text.splitlines():
@@ -99,11 +99,11 @@ def _scope(record: str) -> str:
     return "" if record == "G" else record[1:].rpartition(".")[2]
 
 
-def _members(text: str) -> Iterable[Field]:
+def _members(text: str) -> Iterable[Member]:
     for member in _MEMBER.finditer(text):
         kind = type_of(member[4], int(member[3]), member[5] == "S")
         if kind is not None:
-            yield Field(member[2], int(member[1]), kind)
+            yield Member(member[2], int(member[1]), kind)
 
 
 def variables_of(image: Image) -> Variables:

@@ -15,7 +15,7 @@ from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.lcov import FileRecord, Tracefile
-from miro_robot.inspect.listing import Row, rows, text_lines
+from miro_robot.inspect.listing import ListingRow, rows, text_lines
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import is_conditional
 
@@ -51,7 +51,7 @@ def merged(many: Iterable[Counts]) -> Counts:
     return total
 
 
-def instructions(image: Image, debug: DebugInfo, counts: Counts) -> list[Row]:
+def instructions(image: Image, debug: DebugInfo, counts: Counts) -> list[ListingRow]:
     """The rows of the image's listing that are instructions."""
     return [row for row in rows(image, debug, SymbolNames(image), counts) if row.cycles]
 
@@ -91,7 +91,7 @@ def by_listing(image: Image, counts: Counts) -> tuple[str, FileRecord]:
     return "\n".join(listing) + "\n", record
 
 
-def _count(record: FileRecord, line: int, row: Row, counts: Counts) -> None:
+def _count(record: FileRecord, line: int, row: ListingRow, counts: Counts) -> None:
     """One instruction's part in a line."""
     executed, jumped = counts.get(row.address, (0, 0))
     record.lines[line] = max(record.lines.get(line, 0), executed)

@@ -19,7 +19,7 @@ _MOST_FRAMES = 128  # two bytes each fill internal RAM
 _LCALL_BYTES, _ACALL_BYTES = 3, 2
 
 
-class Frame(msgspec.Struct, frozen=True):
+class StackFrame(msgspec.Struct, frozen=True):
     """A function under way: `pc` is what it executes next, `entry` where it was entered, `base` SP at that moment.
 
     `by_interrupt`: the hardware called it. `known`: whether the frames outside of it can be told.
@@ -72,9 +72,9 @@ class Unwinder:
         """Of the function that `cpu` is in; SP itself where the code does not tell."""
         return cpu.sp - self.heights.get(cpu.pc, (0, 0))[0]
 
-    def frames(self, cpu: Cpu) -> list[Frame]:
+    def frames(self, cpu: Cpu) -> list[StackFrame]:
         """From the innermost outwards. The last one is `known` if it is that of reset."""
-        found: list[Frame] = []
+        found: list[StackFrame] = []
         pc, sp = cpu.pc, cpu.sp
         while len(found) < _MOST_FRAMES:
             height, entry = self.heights.get(pc, (0, -1))
@@ -82,7 +82,7 @@ class Unwinder:
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
             known = entry >= 0 and (entry == 0 or (base > 0 and (by_interrupt or self._follows_call(back))))
-            found.append(Frame(pc, entry if entry >= 0 else pc, base, by_interrupt, known))
+            found.append(StackFrame(pc, entry if entry >= 0 else pc, base, by_interrupt, known))
             if entry == 0 or not known:
                 break
             pc, sp = back, base - 2

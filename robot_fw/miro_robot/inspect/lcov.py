@@ -118,11 +118,11 @@ def _in_one_line(name: str) -> str:
 
 def decode(text: str, path: str) -> Tracefile:
     """A tracefile, also another program's. Raises BadInput with `path` and the line."""
-    reader = _Reader()
+    reader = _LineReader()
     for number, line in enumerate(text.splitlines(), start=1):
         try:
             reader.take(line.strip())
-        except _Refused as refused:
+        except _WrongLine as refused:
             raise BadInput(path, number, refused.what, refused.remedy) from None
     found: Tracefile = {}
     for name, part in reader.parts:
@@ -130,7 +130,7 @@ def decode(text: str, path: str) -> Tracefile:
     return found
 
 
-class _Refused(Exception):
+class _WrongLine(Exception):
     """A line that cannot be taken."""
 
     def __init__(self, what: str, remedy: str = _NAME_ANOTHER) -> None:
@@ -138,7 +138,7 @@ class _Refused(Exception):
         self.remedy = remedy
 
 
-class _Reader:
+class _LineReader:
     """Takes line by line. `parts`: (source file, counts), several of one file when tracefiles are put together."""
 
     def __init__(self) -> None:
@@ -158,18 +158,18 @@ class _Reader:
         elif (kind in _DROPPED and colon) or not line or line.startswith("#"):
             pass
         elif colon and kind.isupper() and kind.isalpha() and len(kind) <= 8 and kind != "SF":
-            raise _Refused(f"{kind} records are not kept", _USE_LCOV)
+            raise _WrongLine(f"{kind} records are not kept", _USE_LCOV)
         else:
-            raise _Refused("is no record of a tracefile")
+            raise _WrongLine("is no record of a tracefile")
 
     def _count(self, kind: str, value: str) -> None:
         match = _RECORDS[kind].fullmatch(value)
         if match is None and kind == "BRDA" and _OTHER_BRANCH.fullmatch(value):
-            raise _Refused("branches that are marked or named are not kept", _USE_LCOV)
+            raise _WrongLine("branches that are marked or named are not kept", _USE_LCOV)
         if match is None:
-            raise _Refused(f"cannot be read as {kind} record")
+            raise _WrongLine(f"cannot be read as {kind} record")
         if self._record is None:
-            raise _Refused("belongs to no source file")
+            raise _WrongLine("belongs to no source file")
         self._take(self._record, kind, match.groups())
 
     def _take(self, record: FileRecord, kind: str, values: tuple[str, ...]) -> None:
@@ -181,7 +181,7 @@ class _Reader:
             self._leaders[int(values[0])] = int(values[1])
         elif kind == "FNA":
             if int(values[0]) not in self._leaders:
-                raise _Refused(f"names function {values[0]}, which no FNL record before it has")
+                raise _WrongLine(f"names function {values[0]}, which no FNL record before it has")
             record.functions[values[2]] = (self._leaders[int(values[0])], int(values[1]))
         elif kind == "DA":
             record.lines[int(values[0])] = int(values[1])

@@ -16,7 +16,7 @@ _DATA_ROW = 8
 _UNDEFINED = 0xA5
 
 
-class Row(msgspec.Struct, frozen=True):
+class ListingRow(msgspec.Struct, frozen=True):
     """`cycles` is 0 for data; `line` stands on the first row of what the compiler made of a C line."""
 
     address: int
@@ -26,7 +26,9 @@ class Row(msgspec.Struct, frozen=True):
     line: SourceLine | None = None
 
 
-def rows(image: Image, debug: DebugInfo, names: SymbolNames, executed: Collection[int] = ()) -> Iterator[Row]:
+def rows(
+    image: Image, debug: DebugInfo, names: SymbolNames, executed: Collection[int] = ()
+) -> Iterator[ListingRow]:
     """All of the image in the order of addresses. Instructions are taken one after the other from each name on; one
     whose operand would reach into what has a name of its own is data. `executed`: places where instructions begin
     for sure, which sets right what a table between instructions of a bare image has put out of step.
@@ -41,10 +43,10 @@ def rows(image: Image, debug: DebugInfo, names: SymbolNames, executed: Collectio
             wanted = _DATA_ROW if constant else LENGTH[opcode]
             data = image.code[address : _cut(address, min(address + wanted, end), marks)]
             if constant or opcode == _UNDEFINED or len(data) < wanted:
-                yield Row(address, data, "DB " + ",".join(f"{byte:02X}h" for byte in data), 0)
+                yield ListingRow(address, data, "DB " + ",".join(f"{byte:02X}h" for byte in data), 0)
             else:
                 line = begins.get(address) if debug.line_at(address) else None
-                yield Row(address, data, disassemble(image.code, address, names), CYCLES[opcode], line)
+                yield ListingRow(address, data, disassemble(image.code, address, names), CYCLES[opcode], line)
             address += len(data)
 
 

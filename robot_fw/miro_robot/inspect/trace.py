@@ -16,7 +16,7 @@ PORTS = {"P0": 0x80, "P1": 0x90, "P2": 0xA0, "P3": 0xB0}
 REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8)), *PORTS)
 
 
-class Trace(Watcher):
+class InstructionTrace(Watcher):
     """Hands one line a step to `write`. `only`: first addresses of functions; others' steps are left out.
 
     `heading` is the first line, when it begins to look. The last stretch of sleep is written when it looks no longer.

@@ -6,7 +6,7 @@ from miro_robot.lm629.encoder cimport Encoder
 from miro_robot.lm629.host_port cimport HostPort
 from miro_robot.lm629.pid cimport Pid
 from miro_robot.lm629.signals cimport Signals
-from miro_robot.lm629.trajectory cimport Trajectory
+from miro_robot.lm629.trajectory cimport ProfileGenerator
 
 
 cdef long long _NEVER, _SAMPLE_TICKS, _PWM_TICKS
@@ -26,7 +26,7 @@ cdef class MotorAxis:
     cdef readonly int clamps, rates_of_buffer
     cdef readonly HostPort port
     cdef readonly Encoder encoder
-    cdef readonly Trajectory trajectory
+    cdef readonly ProfileGenerator trajectory
     cdef readonly Pid pid
     cdef readonly Signals signals
     cdef readonly TrajectoryBuffer trajectory_buffer
@@ -59,7 +59,7 @@ cdef class MotorAxis:
     @cython.locals(flags=cython.int, moved=cython.longlong)
     cdef int _latch_position(self, long long now) noexcept
     @cython.final
-    @cython.locals(profile=Trajectory, control=cython.int, buffer=TrajectoryBuffer)
+    @cython.locals(profile=ProfileGenerator, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
     @cython.final
     @cython.locals(flags=cython.int)

@@ -18,7 +18,7 @@ from miro_robot.lm629.host_port import HostPort
 from miro_robot.lm629.options import DEFAULT_OPTIONS, TICKS_PER_CLOCK, Lm629Options
 from miro_robot.lm629.pid import Pid
 from miro_robot.lm629.signals import Signals
-from miro_robot.lm629.trajectory import Trajectory
+from miro_robot.lm629.trajectory import ProfileGenerator
 
 SAMPLE_TICKS = 8192
 PWM_TICKS = 2048
@@ -55,7 +55,7 @@ class MotorAxis:
     STATE = {
         "port": HostPort,
         "encoder": Encoder,
-        "trajectory": Trajectory,
+        "trajectory": ProfileGenerator,
         "pid": Pid,
         "signals": Signals,
         "trajectory_buffer": TrajectoryBuffer,
@@ -111,7 +111,7 @@ class MotorAxis:
         self.rates_of_buffer = 1 if options.relative_rates == "buffer" else 0
         self.port = HostPort(options.busy_clocks * TICKS_PER_CLOCK, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
-        self.trajectory = Trajectory(options.stop_keeps_fraction)
+        self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
         self.pid = Pid(options.pid_saturates, options.sum_rounding == "down")
         self.signals = Signals(options)
         self.trajectory_buffer = TrajectoryBuffer()

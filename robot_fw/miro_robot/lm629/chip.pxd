@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.lm629.axis cimport MotorAxis
 from miro_robot.lm629.buffers cimport TrajectoryBuffer, fit_15
-from miro_robot.lm629.trajectory cimport Trajectory
+from miro_robot.lm629.trajectory cimport ProfileGenerator
 
 
 cdef int _HELD, _RESETTING, _RUNNING
@@ -35,7 +35,7 @@ cdef class Lm629(MotorAxis):
     cdef _answer(self, long long tick, int opcode)
     @cython.locals(opcode=cython.int)
     cdef int _word(self, long long tick) except -1
-    @cython.locals(buffer=TrajectoryBuffer, profile=Trajectory, outcome=cython.int)
+    @cython.locals(buffer=TrajectoryBuffer, profile=ProfileGenerator, outcome=cython.int)
     cdef _trajectory_word(self, int word)
     cdef int _filter_word(self, int word) except -1
     @cython.locals(word=cython.int, base=cython.longlong)

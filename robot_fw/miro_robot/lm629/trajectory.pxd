@@ -12,7 +12,7 @@ cdef long long _stopping_distance(long long speed, long long acceleration) noexc
 
 
 @cython.final
-cdef class Trajectory:
+cdef class ProfileGenerator:
     cdef readonly int keeps_fraction
     cdef public long long position, velocity, acceleration, max_velocity, target
     cdef public int velocity_mode, forward, stopping, moving, crossed

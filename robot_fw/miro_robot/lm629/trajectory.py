@@ -31,7 +31,7 @@ def _stopping_distance(speed: int, acceleration: int) -> int:
     return (n + 1) * speed - acceleration * n * (n + 1) // 2
 
 
-class Trajectory:
+class ProfileGenerator:
     """Desired position and velocity, and the working copies of what the host asked for.
 
     `moving` is 1 while the profile has not finished. `crossed` is 1 when the last step left the 31-bit space.

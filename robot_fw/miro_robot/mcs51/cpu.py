@@ -64,7 +64,7 @@ on_load: ContextVar[Callable[[Cpu], object] | None] = ContextVar("on_load", defa
 """Called with every CPU that gets an image: how coverage of a test session comes to CPUs that tests make."""
 
 
-class Inspector(Protocol):
+class CpuInspector(Protocol):
     """What looks into a running CPU (`miro_robot.inspect`)."""
 
     def run(self, until_cycle: int) -> int: ...
@@ -102,7 +102,7 @@ class Cpu(Executor):
         self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
-        self.inspector: Inspector | None = None
+        self.inspector: CpuInspector | None = None
         self._erase()
 
     # Image

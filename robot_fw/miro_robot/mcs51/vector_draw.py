@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE, disassemble
-from miro_robot.mcs51.vectors import REGISTERS, Bench, State, Vector, table_address
+from miro_robot.mcs51.vectors import REGISTERS, State, Vector, VectorRunner, table_address
 
 Draw = Callable[[int], int]
 
@@ -165,7 +165,7 @@ class _Drawing:
 
 def draw_vectors(opcode: int, count: int, draw: Draw) -> list[Vector]:
     """`count` vectors of one opcode; their results are those of our CPU."""
-    bench = Bench()
+    bench = VectorRunner()
     found: list[Vector] = []
     while len(found) < count:
         initial = _Drawing(opcode, draw).state()

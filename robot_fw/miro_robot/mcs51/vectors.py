@@ -85,7 +85,7 @@ class _VectorBus(Bus):
         self.latches.append((_PORTS[port], latch, LATCH))
 
 
-class Bench:
+class VectorRunner:
     """A CPU to carry out vectors on, one after the other."""
 
     NOT_STATE = ("bus", "cpu")

@@ -107,7 +107,7 @@ class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     )
 
 
-class Encoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class OpticalEncoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line.
 
     With `index_pulse` it has a third channel, low for the one count in a turn that begins it (A = B = 0 there).
@@ -160,7 +160,7 @@ class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     bridge: Bridge = Bridge()
     battery: Battery = Battery()
     chassis: Chassis = Chassis()
-    encoder: Encoder = Encoder()
+    encoder: OpticalEncoder = OpticalEncoder()
     tyre: Tyre = Tyre()
     ball: RollingBall = RollingBall()
     disturbance: Disturbance = Disturbance()

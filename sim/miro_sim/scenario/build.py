@@ -23,7 +23,7 @@ from miro_sim.plant.params import DriveParams
 from miro_sim.scenario import keys as sc
 
 
-def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
+def reference_for(robot: sc.RobotSpec, duration_s: float) -> Trajectory:
     """The reference trajectory in the paper's axes, which start at its own start. Raises PluginError."""
     parameters = robot.reference
     assert isinstance(parameters, ReferenceParameters)
@@ -34,14 +34,14 @@ def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
-def dead_s(scenario: sc.Scenario, network: sc.Network) -> float:
+def dead_s(scenario: sc.Scenario, network: sc.NetworkSpec) -> float:
     """What a PC knows of its own delay: from a period's begin to the end of its frame."""
     radio = network.radio
     keyup_s = radio.keyup_s if radio.carrier == "keyed" else 0.0
     return scenario.host.compute_s + keyup_s + radio.latency_s + seconds(DOWNLINK[network.robots].air_ticks)
 
 
-def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: float) -> Pilot:
+def pilot_for(robot: sc.RobotSpec, reference: Trajectory, host: sc.HostSpec, dead_s: float) -> Pilot:
     """Estimator and law, integrator and wheel split. Raises PluginError when one of the first two cannot be made."""
     chosen, controller = robot.estimator, robot.controller
     assert isinstance(chosen, EstimatorParameters)
@@ -85,7 +85,7 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
         raise PluginError(what, f"mend the {word} or its parameters") from error
 
 
-def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:
+def drive_for(robot: sc.RobotSpec, left: float, right: float) -> DriveParams:
     """The drive with this seed's wheels; `left`, `right` are the draws, uniform in [0, 1)."""
     spread = robot.wheel_radius_mismatch
     body = robot.drive.chassis

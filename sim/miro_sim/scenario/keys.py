@@ -31,7 +31,7 @@ TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 
 
-class Host(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class HostSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The PC: how long it computes between camera frame and key-up, how it integrates, how long its words are.
 
     `integration`: of equation (15), see `miro_host.integrator`. `word_bits`: of each wheel speed of full scale 2.88 m/s
@@ -43,7 +43,7 @@ class Host(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     word_bits: Annotated[int, Meta(ge=MIN_WORD_BITS, le=MAX_WORD_BITS)] = MAX_WORD_BITS
 
 
-class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RobotSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
     `strap`: what its slot pins say, if not its slot.
@@ -94,7 +94,7 @@ class ControlNoise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     w_rad_s: Annotated[float, Meta(ge=0.0, le=40.0)] = 0.0
 
 
-class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class NetworkSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are
     present. A `silent` host sends nothing by itself: its frames come from who runs the scenario (`World.inject`).
     """
@@ -103,7 +103,7 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     host: Literal["controller", "silent"] = "controller"
     radio: Radio = Radio()
     control_noise: ControlNoise = ControlNoise()
-    robot: Annotated[tuple[Robot, ...], Meta(min_length=1)]
+    robot: Annotated[tuple[RobotSpec, ...], Meta(min_length=1)]
 
     def __post_init__(self) -> None:
         slots = [robot.slot for robot in self.robot]
@@ -158,10 +158,10 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     stop_on_fault: bool = True
     lm629: Lm629Options = DEFAULT_OPTIONS
     camera: Camera = PixelCamera()
-    host: Host = Host()
+    host: HostSpec = HostSpec()
     expect: dict[str, Any] = {}
     step: tuple[dict[str, Any], ...] = ()
-    networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
+    networks: Annotated[tuple[NetworkSpec, ...], Meta(min_length=1)] = msgspec.field(name="network")
 
     def __post_init__(self) -> None:
         if len(self.networks) > MAX_NETWORKS:

@@ -18,7 +18,7 @@ from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.keys import Robot, Scenario
+from miro_sim.scenario.keys import RobotSpec, Scenario
 from miro_sim.scenario.views import check_camera, check_start
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def check_places(scenario: Scenario, origin: str) -> None:
                 raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
 
 
-def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
+def _check(robot: RobotSpec, scenario: Scenario, origin: str, place: str) -> None:
     from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
     from miro_sim.scenario.build import reference_for
     from miro_sim.scenario.drives import limits_problem, origin_problem

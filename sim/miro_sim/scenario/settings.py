@@ -14,7 +14,7 @@ import msgspec
 
 from miro_host.laws.registry import LAWS
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.keys import Network, Robot
+from miro_sim.scenario.keys import NetworkSpec, RobotSpec
 from miro_sim.scenario.plugins import REGISTRIES
 from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.text import check_size
@@ -224,9 +224,9 @@ def _deeper(place: str, setting: Setting, raw: Table) -> str:
         path = robot if not re.match(r"\.\d|\[", rest) else f"{network}.robot"
     elif key == LAWS.key:
         path = f"{robot}.controller.{key}"
-    elif key in Robot.__struct_encode_fields__:
+    elif key in RobotSpec.__struct_encode_fields__:
         path = f"{robot}.{key}"
-    elif key in Network.__struct_encode_fields__:
+    elif key in NetworkSpec.__struct_encode_fields__:
         path = f"{network}.{key}"
     else:
         return ""

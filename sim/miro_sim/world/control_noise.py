@@ -13,7 +13,7 @@ always a command that might have been meant.
 from __future__ import annotations
 
 from miro_exact.rng import Stream
-from miro_host.pilot import Command
+from miro_host.pilot import WheelCommand
 from miro_host.wheels import Wheels
 from miro_sim.scenario.keys import ControlNoise
 
@@ -29,7 +29,7 @@ class NoisyCommands:
     def __repr__(self) -> str:
         return f"NoisyCommands({self.bounds!r}, {self.stream!r})"
 
-    def wheels_of(self, command: Command, period: int) -> tuple[int, int]:
+    def wheels_of(self, command: WheelCommand, period: int) -> tuple[int, int]:
         """(left, right) in 1/256 count per sample, of a command sent in control period `period`."""
         if self.bounds.v_m_s == 0.0 and self.bounds.w_rad_s == 0.0:
             return command.left, command.right

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
 from miro_exact.state import TICK, Rows
-from miro_host.pilot import Command
+from miro_host.pilot import WheelCommand
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol.decoder import Received, Symbol
@@ -60,7 +60,7 @@ class Network:
 
     def __init__(
         self,
-        spec: sc.Network,
+        spec: sc.NetworkSpec,
         scenario: sc.Scenario,
         index: int,
         seed: int,
@@ -106,7 +106,7 @@ class Network:
         """Camera, PC and station, in this order."""
         measured = self.sight.expose(tick)
         self.sent = []
-        commands: list[Command | None] = [None] * len(self.robots)
+        commands: list[WheelCommand | None] = [None] * len(self.robots)
         if self.host == "controller":
             commands = [
                 robot.steer(posture, self.telemetry.last[robot.spec.slot], tick)
@@ -178,7 +178,7 @@ class Network:
             raise ValueError(f"net{self.index}: {error}") from None
         return tick
 
-    def _transmit(self, start_tick: int, commands: Sequence[Command | None]) -> None:
+    def _transmit(self, start_tick: int, commands: Sequence[WheelCommand | None]) -> None:
         wheels = [(0, 0)] * self.spec.robots
         for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
             if command is not None:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
-from miro_host.pilot import Command, Pilot
+from miro_host.pilot import Pilot, WheelCommand
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
@@ -46,7 +46,7 @@ class Robot:
     )
 
     def __init__(
-        self, spec: sc.Robot, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image
+        self, spec: sc.RobotSpec, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image
     ) -> None:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
@@ -102,7 +102,7 @@ class Robot:
                     board.log.note(TRUE, reached, 0, 0)
         return stopped
 
-    def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> Command:
+    def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> WheelCommand:
         """Wheel commands from what the PC measured and the robot's last telemetry. Raises PluginError."""
         try:
             return self.pilot.update(measured, seconds(tick), telemetry)
@@ -122,7 +122,7 @@ class Robot:
         cpu = self.board.cpu
         return cpu.peek_iram(address) | cpu.peek_iram(address + 1) << 8
 
-    def record(self, tick: int, measured: Posture | None, command: Command | None) -> RobotPeriod:
+    def record(self, tick: int, measured: Posture | None, command: WheelCommand | None) -> RobotPeriod:
         """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
         x_m, y_m, theta_rad = self.drive.pose_at(tick)
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
@@ -155,7 +155,7 @@ def _iram_address(image: Image, name: str) -> int | None:
     return symbol.address if symbol is not None and symbol.space == "iram" else None
 
 
-def _control(command: Command | None) -> Control | None:
+def _control(command: WheelCommand | None) -> Control | None:
     if command is None:
         return None
     inner, estimate = dict(command.inner), dict(command.estimate)

@@ -39,7 +39,7 @@ SLACK_M = 0.0035
 """Worst case of the tracker itself, and what a robot goes while it is exposed."""
 
 
-class Body(Protocol):
+class VisibleBody(Protocol):
     """What a camera sees of a robot."""
 
     network: int
@@ -67,7 +67,7 @@ class GaussianSight:
     STATE = {"visions": [Vision], "frame": _FRAMES}
     NOT_STATE = ("bodies", "streams")
 
-    def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[Body], seed: int) -> None:
+    def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
         errors = VisionErrors(
             camera.position_error_cm / 100.0, camera.heading_error_deg * _DEGREE, camera.pixel_cm / 100.0
         )
@@ -112,7 +112,9 @@ class SeeingSight:
     }
     NOT_STATE: tuple[str, ...] = ("camera", "bodies", "chances", "worst_m")
 
-    def __init__(self, camera: keys.SeeingCamera, bodies: Sequence[Body], seed: int, worst_m: float) -> None:
+    def __init__(
+        self, camera: keys.SeeingCamera, bodies: Sequence[VisibleBody], seed: int, worst_m: float
+    ) -> None:
         self.camera = camera
         self.bodies = bodies
         self.grabber = Grabber(len(bodies), camera.delay_frames)
@@ -167,7 +169,7 @@ class GeometricSight(SeeingSight):
 
     NOT_STATE = ("field",)
 
-    def __init__(self, camera: keys.GeometricCamera, bodies: Sequence[Body], seed: int) -> None:
+    def __init__(self, camera: keys.GeometricCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
         calibration, worst_m = calibration_for(camera, bodies[0].network, seed)
         super().__init__(camera, bodies, seed, worst_m)
         self.field = StaticField(camera.lens, calibration, camera.pattern)
@@ -176,7 +178,7 @@ class GeometricSight(SeeingSight):
         """See `Sight`."""
         return self.deliver(tick, lambda: tuple(self._see(body, tick) for body in self.bodies))
 
-    def _see(self, body: Body, tick: int) -> Sighting | None:
+    def _see(self, body: VisibleBody, tick: int) -> Sighting | None:
         try:
             read = self.field.read(Posture(*body.drive.pose_at(tick)))
         except ValueError:  # it has left the view
@@ -194,12 +196,12 @@ class PixelSight(SeeingSight):
     STATE = {"tracker": Tracker}
     NOT_STATE = ("eye", "everyone", "picture", "watch")
 
-    def __init__(self, camera: keys.PixelCamera, bodies: Sequence[Body], seed: int) -> None:
+    def __init__(self, camera: keys.PixelCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
         network = bodies[0].network
         calibration, worst_m = calibration_for(camera, network, seed)
         super().__init__(camera, bodies, seed, worst_m)
         self.picture = camera.picture
-        self.everyone: Sequence[Body] = bodies
+        self.everyone: Sequence[VisibleBody] = bodies
         self.watch: Callable[[int, int], None] | None = None
         self.eye = Camera(
             camera.lens, camera.picture, PATTERNS[camera.pattern], Stream(seed, f"net{network}/pixels")
@@ -275,7 +277,7 @@ def _distance_m(drive: DifferentialDrive, tick: int, seen: Posture) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
-def sight_of(camera: keys.Camera, bodies: Sequence[Body], seed: int) -> Sight:
+def sight_of(camera: keys.Camera, bodies: Sequence[VisibleBody], seed: int) -> Sight:
     """The camera of one host."""
     if isinstance(camera, keys.PixelCamera):
         return PixelSight(camera, bodies, seed)

@@ -29,7 +29,7 @@ def _pins() -> Run:
 def _serial() -> Run:
     """Pieces of input with conditions, and pins, for a program that sends back what it gets."""
     from miro_exact.state import snapshot
-    from miro_robot.bare.input import Piece
+    from miro_robot.bare.input import InputPiece
     from miro_robot.bare.machine import BareMachine
     from miro_robot.bare.pins import PinEvent
     from miro_robot.image import load_hex
@@ -52,7 +52,7 @@ def _serial() -> Run:
                 continue
             when = draw.take(draw.below(4)) if kind == 1 else b""
             delay_ticks = draw.below(1 << 24) if kind else None
-            pieces.append(Piece(draw.take(draw.below(16)), when, delay_ticks))
+            pieces.append(InputPiece(draw.take(draw.below(16)), when, delay_ticks))
         sent: tuple[list[int], list[int]] = ([], [])
         try:
             whole, parts = (

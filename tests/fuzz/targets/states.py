@@ -168,7 +168,7 @@ def _board() -> Run:
 
 
 def _bare() -> Run:
-    from miro_robot.bare.input import Piece
+    from miro_robot.bare.input import InputPiece
     from miro_robot.bare.machine import BareMachine
     from miro_robot.bare.pins import PinEvent
     from miro_robot.image import load_hex
@@ -179,7 +179,7 @@ def _bare() -> Run:
     image = load_hex(path)
 
     def make() -> _Flat:
-        pieces = (Piece(b"abc"), Piece(b"de", b"c", 5))
+        pieces = (InputPiece(b"abc"), InputPiece(b"de", b"c", 5))
         return _Flat(
             BareMachine(image, False, pieces, 9600, pins=(PinEvent(5000, 1, 2, 0), PinEvent(90_000, 1, 2, 1)))
         )

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from miro_host.references.arc import Arc, ArcRef
 from miro_host.references.interface import Paced
-from miro_host.references.line import Line, LineRef
+from miro_host.references.line import LineRef, StraightLine
 from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import Ramp
 from miro_host.references.sine import Sine, SineRef
@@ -18,7 +18,7 @@ from tests.naive import host_control, host_paths
 ANGLES = st.floats(-3.1, 3.1)
 PLACES = st.floats(-1.0, 1.0)
 TIMES = st.floats(0.01, 5.9)
-SHAPES = st.sampled_from([Line, Arc, Sine])
+SHAPES = st.sampled_from([StraightLine, Arc, Sine])
 AWAY_M = 0.01
 
 
@@ -54,7 +54,7 @@ def test_its_polar_form_is_that_of_its_points(t, heading, curvature, x, y):
 
 @given(st.floats(1e-3, 5.9), ANGLES, st.floats(-1.0, 1.0))
 def test_out_of_the_origin_the_closed_form_and_the_general_one_are_the_same(t, heading, curvature):
-    for path in (Line(heading_rad=heading), Arc(heading_rad=heading, curvature_per_m=curvature)):
+    for path in (StraightLine(heading_rad=heading), Arc(heading_rad=heading, curvature_per_m=curvature)):
         r = path.at(t)
         general = with_polar_form(r.posture, r.v_m_s, r.w_rad_s, r.v_dot_m_s2, r.w_dot_rad_s2)
         assert numbers(general)[:-5] == numbers(r)[:-5]

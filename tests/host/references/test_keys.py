@@ -9,20 +9,20 @@ import pytest
 from miro_host.plugins import PluginError
 from miro_host.references.arc import Arc, ArcRef
 from miro_host.references.checked import CheckedReference
-from miro_host.references.line import Line, LineRef
+from miro_host.references.line import LineRef, StraightLine
 from miro_host.references.registry import REFERENCES
 from miro_sim.scenario.file import parse
 from tests.host.distribution import install
 
 TURN = """
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.references.interface import ReferenceParameters
 
 class Waiting(ReferenceParameters, frozen=True, kw_only=True, tag="waiting"):
     wait_s: float = 1.0
 
     def trajectory(self, duration_s):
-        return Late(Line(), self.wait_s)
+        return Late(StraightLine(), self.wait_s)
 
 class Late:
     def __init__(self, path, wait_s):
@@ -37,7 +37,7 @@ def test_our_own_references_are_found_by_their_names():
     assert REFERENCES.names() == ["line", "arc", "sine", "waypoints"]
     for name in REFERENCES.names():
         assert REFERENCES.find(name).name() == name
-    assert isinstance(LineRef(heading_deg=90.0).trajectory(2.0), Line)
+    assert isinstance(LineRef(heading_deg=90.0).trajectory(2.0), StraightLine)
     arc = ArcRef(heading_deg=90.0, curvature_per_m=0.5).trajectory(2.0)
     assert isinstance(arc, Arc)
     assert (arc.heading_rad, arc.curvature_per_m, arc.ramp.duration_s) == (math.pi / 2, 0.5, 2.0)
@@ -52,7 +52,7 @@ def test_a_reference_of_another_distribution_is_named_like_our_own(tmp_path, mon
     install(tmp_path, "slow", "1", {"waiting": "plug_waiting:Waiting"}, "references", plug_waiting=TURN)
     text = 'name = "a"\nduration_s = 1\n[[network]]\n[[network.robot]]\nreference = {kind = "waiting", wait_s = 2}'
     reference = parse(text, "my.toml").networks[0].robot[0].reference
-    assert reference.trajectory(1.0).at(2.3) == Line().at(2.3 - 2.0)
+    assert reference.trajectory(1.0).at(2.3) == StraightLine().at(2.3 - 2.0)
     with pytest.raises(ValueError, match=r"robot\[0\].reference.wait: unknown key; use wait_s, in seconds"):
         parse(text.replace("wait_s", "wait"), "my.toml")
     del sys.modules["plug_waiting"]
@@ -66,7 +66,7 @@ class Broken:
         return self.answer(t_s)
 
 
-GOOD = Line().at(1.0)
+GOOD = StraightLine().at(1.0)
 
 
 @pytest.mark.parametrize(
@@ -89,4 +89,4 @@ def test_a_reference_that_fails_is_named(answer, reason):
 
 
 def test_a_good_reference_passes_unchanged():
-    assert CheckedReference(Line(), "line").at(1.5) == Line().at(1.5)
+    assert CheckedReference(StraightLine(), "line").at(1.5) == StraightLine().at(1.5)

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.references.ramp import Ramp
 from tests.host.references.numbers import numbers
 from tests.naive import host_control as naive
@@ -31,12 +31,12 @@ def test_an_arc_and_all_its_derivatives_equal_the_cartesian_path(t, heading, cur
 def test_a_line_and_all_its_derivatives_equal_the_cartesian_path(t, heading):
     assume(abs(t - 0.5) > 1e-3)
     expected = [float(x) for x in naive.reference(t, 0.2, 0.5, heading, 0)]
-    assert numbers(Line(heading_rad=heading).at(t)) == pytest.approx(expected, rel=1e-9, abs=1e-11)
+    assert numbers(StraightLine(heading_rad=heading).at(t)) == pytest.approx(expected, rel=1e-9, abs=1e-11)
 
 
 def test_an_arc_without_curvature_is_a_line():
     assert numbers(Arc(heading_rad=0.3, curvature_per_m=0.0).at(2.0)) == pytest.approx(
-        numbers(Line(heading_rad=0.3).at(2.0)), rel=1e-15, abs=1e-16
+        numbers(StraightLine(heading_rad=0.3).at(2.0)), rel=1e-15, abs=1e-16
     )
 
 
@@ -51,7 +51,7 @@ def test_the_arc_of_the_curve_scenario_ends_where_it_should():
     assert (end.x_m, end.y_m, math.degrees(end.theta_rad)) == pytest.approx((0.969, 0.495, -5.9), abs=0.02)
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()], ids=["line", "arc"])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()], ids=["line", "arc"])
 @pytest.mark.parametrize(("t", "same_place_as"), [(-1e-9, 0.0), (-5.0, 0.0), (6.0 + 1e-9, 6.0), (60.0, 6.0)])
 def test_outside_its_time_the_reference_stands_still_at_its_end(path, t, same_place_as):
     r = path.at(t)
@@ -94,7 +94,7 @@ def test_speed_and_acceleration_of_a_ramp_down_are_the_derivatives_of_its_length
 
 
 def test_a_path_with_a_ramp_down_is_the_same_path_without_until_it_slows_down():
-    for path in (Line, Arc):
+    for path in (StraightLine, Arc):
         stopping = path(Ramp(duration_s=4.0, ramp_down=True))
         assert stopping.at(3.5) == path().at(3.5)
         end = stopping.at(60.0)

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across
-from miro_host.theory.simulation import Simulation
+from miro_host.theory.simulation import BodySimulation
 from tests.host.theory import ideal
 from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
 from tests.host.theory.layer import NO_GUARD, rising
@@ -30,10 +30,10 @@ def figures():
 
 def parallel():
     """A4: theta_e = 0, 4 cm beside the line."""
-    path = Line()
+    path = StraightLine()
     _, z = beside(path, 0.75, 0.0, 0.04, 0.0)
     start = Posture(math.sqrt(path.at(0.75).rho_m ** 2 - 0.04**2), 0.04, 0.0)
-    rows = list(Simulation(ROBOT, paper_law(PRINTED, path)).run(start, z, 0.75, 6.0, 0.001))
+    rows = list(BodySimulation(ROBOT, paper_law(PRINTED, path)).run(start, z, 0.75, 6.0, 0.001))
     phi = [math.atan2(row.posture.y_m, row.posture.x_m) for row in (rows[0], rows[-1])]
     yield "4 cm beside the line with theta_e = 0: after 6 s", f"{100 * rows[-1].posture.y_m:.4f} cm beside it"
     yield ".. phi_e", f"{phi[0]:.3f} to {phi[1]:.4f} rad"
@@ -48,7 +48,7 @@ def slopes():
 def lyapunov():
     """A6."""
     for name, f, worst in (("a sine", (0.3, 1.0), False), ("the worst f", (0.3, 1.0), True)):
-        run = ideal.lyapunov_run(Line(), (0.07, 0.10, -0.38), 2.0, 5.0, f, worst)
+        run = ideal.lyapunov_run(StraightLine(), (0.07, 0.10, -0.38), 2.0, 5.0, f, worst)
         steps = [
             two.v - one.v
             for one, two in pairwise(run)
@@ -56,7 +56,7 @@ def lyapunov():
         ]
         yield f"largest rise of V in a step, {name} below P", f"{max(steps):.1e} in {len(steps)} steps"
     run = ideal.lyapunov_run(
-        Line(), (0.07, 0.30, -0.2), 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4
+        StraightLine(), (0.07, 0.30, -0.2), 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4
     )
     for one, two in pairwise(run):
         expected = stability.jump(one.turn, one.phi_e)
@@ -97,8 +97,8 @@ def starts(count):
 def remark_1():
     """u1, the greatest torque and the work of a robot that stands alpha off the limit 30 cm from the origin."""
     for alpha in (1.0, 0.3, 0.1, 0.03, 0.01):
-        path, start = Line(), Posture(0.3, 0.0, HALF_PI - alpha)
-        rows = list(Simulation(ROBOT, paper_law(PRINTED, path)).run(start, (0.0, 0.0), 1.0, 1.5, 0.0002))
+        path, start = StraightLine(), Posture(0.3, 0.0, HALF_PI - alpha)
+        rows = list(BodySimulation(ROBOT, paper_law(PRINTED, path)).run(start, (0.0, 0.0), 1.0, 1.5, 0.0002))
         work, step_s = 0.0, 0.0002
         for row in rows:
             half = 0.5 * ROBOT.track_m * row.w_rad_s

@@ -10,20 +10,20 @@ from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory.assumptions import across
 from miro_host.theory.matrices import times
-from miro_host.theory.simulation import Simulation
+from miro_host.theory.simulation import BodySimulation
 from miro_host.theory.stability import lyapunov
-from miro_host.theory.unicycle import Body, inertia
+from miro_host.theory.unicycle import UnicycleBody, inertia
 
-ROBOT = Body(mass_kg=0.5, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.020, track_m=0.068)
+ROBOT = UnicycleBody(mass_kg=0.5, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.020, track_m=0.068)
 LITERAL = Gains()  # a set that draws Figs. 6 to 8, with boundary layers and guards
 PRINTED = Gains(p1_m_s2=0.35, p2_rad_s2=1.2, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)
 BODY = BodyFrameParameters()
 STARTS = {  # path and initial errors of the paper's figures
-    "Fig. 6": (Line(), (0.0709, 0.0172, -0.38)),
-    "Fig. 7": (Line(), (0.5258, 0.1662, -3.09)),
+    "Fig. 6": (StraightLine(), (0.0709, 0.0172, -0.38)),
+    "Fig. 7": (StraightLine(), (0.5258, 0.1662, -3.09)),
     "Fig. 8": (Arc(), (0.1120, 0.2892, -1.31)),
 }
 
@@ -63,7 +63,7 @@ def beside(path, t, x_e, y_e, theta_e):
 def last(law, path, start, z, start_s, end_s, step_s, limited=True):
     """The robot at `end_s`, and (t, distance in m, heading error in rad) of every step."""
     make, parameters = LAWS[law]
-    simulation = Simulation(ROBOT, make(parameters, path), limits=parameters if limited else None)
+    simulation = BodySimulation(ROBOT, make(parameters, path), limits=parameters if limited else None)
     row, errors = None, []
     for row in simulation.run(start, z, start_s, end_s, step_s):
         there = path.at(row.t_s).posture
@@ -84,7 +84,7 @@ def figure(law, name, step_s=0.002):
 
 def lateral_slope(law, offsets=(-0.04, -0.02, 0.0, 0.02, 0.04), step_s=0.002):
     """Slope of final against initial lateral error on the line, by least squares, from 0.3 m on with a small turn."""
-    path = Line()
+    path = StraightLine()
     ends = []
     for offset in offsets:
         start, z = beside(path, 1.5, 0.0, offset, 0.05)
@@ -107,7 +107,7 @@ def random_starts(count, seed=1):
 
 def final_place(law, error, step_s=0.002):
     """Where a robot that starts at rest, off the line by `error`, is after 6 s: along, across (m), heading (rad)."""
-    path = Line()
+    path = StraightLine()
     start, _ = beside(path, 0.0, *error)
     row, errors = last(law, path, start, (0.0, 0.0), 0.0, 6.0, step_s)
     return row.posture.x_m - path.at(6.0).posture.x_m, row.posture.y_m, errors[-1][2]
@@ -152,7 +152,7 @@ def lyapunov_run(path, error, start_s, end_s, f, worst, gamma2=None, turn=0.0, s
         return times(inertia(ROBOT), parts)
 
     start, (v, w) = beside(path, start_s, *error)
-    simulation = Simulation(ROBOT, watching if worst else demand, disturbance=torques)
+    simulation = BodySimulation(ROBOT, watching if worst else demand, disturbance=torques)
     seen = []
     for row in simulation.run(start, (v, w + turn), start_s, end_s, step_s):
         c = law.control(path.at(row.t_s), row.posture, row.v_m_s, row.w_rad_s)

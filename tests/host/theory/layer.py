@@ -4,7 +4,7 @@ import random
 
 from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
 from miro_host.posture import Posture
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory import stability
 from miro_host.theory.assumptions import across, radius
 
@@ -38,7 +38,7 @@ def states(count, spread, seed=3):
     """(path, t, posture, v, w) with theta_e within `spread`, evenly drawn."""
     chance = random.Random(seed)
     for _ in range(count):
-        path, t = Line(), chance.uniform(0.6, 5.8)
+        path, t = StraightLine(), chance.uniform(0.6, 5.8)
         r = path.at(t).posture
         x, y = r.x_m + chance.uniform(-0.2, 0.2), r.y_m + chance.uniform(-0.2, 0.2)
         theta = r.theta_rad + chance.uniform(-spread, spread)

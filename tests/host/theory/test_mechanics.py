@@ -17,11 +17,11 @@ from miro_host.theory.mechanics import (
     reduced,
     residual,
 )
-from miro_host.theory.unicycle import Body, cartesian, cartesian_rates, inertia, polar, polar_rates
+from miro_host.theory.unicycle import UnicycleBody, cartesian, cartesian_rates, inertia, polar, polar_rates
 from tests.host.theory.ideal import ROBOT
 
 BODIES = st.builds(
-    Body,
+    UnicycleBody,
     mass_kg=st.floats(0.05, 20.0),
     yaw_inertia_kg_m2=st.floats(1e-5, 1.0),
     wheel_radius_m=st.floats(0.005, 0.2),
@@ -191,4 +191,4 @@ def test_rows_are_exchanged_where_the_first_one_cannot_be_divided_by():
 def test_a_body_without_mass_or_size_is_refused(name):
     keys = {"mass_kg": 1.0, "yaw_inertia_kg_m2": 1.0, "wheel_radius_m": 1.0, "track_m": 1.0, name: 0.0}
     with pytest.raises(ValueError, match=name):
-        Body(**keys)
+        UnicycleBody(**keys)

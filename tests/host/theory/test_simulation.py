@@ -9,10 +9,10 @@ from miro_host.integrator import Limits
 from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory import computed_torque
-from miro_host.theory.simulation import Simulation
-from miro_host.theory.unicycle import Body, inertia
+from miro_host.theory.simulation import BodySimulation
+from miro_host.theory.unicycle import UnicycleBody, inertia
 from tests.host.theory.ideal import LITERAL, ROBOT, beside, paper_law
 from tests.naive.host_ideal_loop import drive
 
@@ -27,17 +27,17 @@ def ended(rows):
     return row.posture.x_m, row.posture.y_m, row.posture.theta_rad, row.v_m_s, row.w_rad_s
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()])
 def test_equations_8_and_9_lead_to_the_same_place(path):
     start, z = beside(path, 1.0, 0.05, 0.03, 0.3)
     ends = [
-        ended(Simulation(ROBOT, paper_law(LITERAL, path), chart=chart).run(start, z, 1.0, 4.0, 0.002))
+        ended(BodySimulation(ROBOT, paper_law(LITERAL, path), chart=chart).run(start, z, 1.0, 4.0, 0.002))
         for chart in ("cartesian", "polar")
     ]
     assert ends[0] == pytest.approx(ends[1], abs=1e-6)
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()])
 def test_it_agrees_with_the_slow_twin_that_knows_no_torque(path):
     """The twin adds up equation (15) in steps of 0.1 ms; f is what tau_d comes to."""
     f = (0.1, 0.5)
@@ -56,7 +56,7 @@ def test_it_agrees_with_the_slow_twin_that_knows_no_torque(path):
         1e-4,
         lambda t: (f[0] * math.sin(7.0 * t), f[1] * math.sin(7.0 * t)),
     )[-1]
-    made = Simulation(ROBOT, paper_law(LITERAL, path), disturbance=friction)
+    made = BodySimulation(ROBOT, paper_law(LITERAL, path), disturbance=friction)
     x, y, theta, _, _ = ended(made.run(start, z, 1.0, 3.0, 0.002))
     assert (x, y, theta) == pytest.approx((row.posture.x_m, row.posture.y_m, row.posture.theta_rad), abs=2e-5)
 
@@ -64,7 +64,7 @@ def test_it_agrees_with_the_slow_twin_that_knows_no_torque(path):
 def test_half_the_step_leaves_a_sixteenth_of_the_error():
     def end(steps):
         return ended(
-            Simulation(ROBOT, swaying).run(Posture(0.1, 0.0, 0.2), (0.2, 1.0), 0.0, 2.0, 2.0 / steps)
+            BodySimulation(ROBOT, swaying).run(Posture(0.1, 0.0, 0.2), (0.2, 1.0), 0.0, 2.0, 2.0 / steps)
         )
 
     exact = end(800)
@@ -74,7 +74,7 @@ def test_half_the_step_leaves_a_sixteenth_of_the_error():
 
 def test_the_work_of_the_torques_is_the_energy_that_the_body_has():
     step, work, rows = 1e-3, 0.0, []
-    for row in Simulation(ROBOT, swaying).run(Posture(0.0, 0.0, 0.0), (0.0, 0.0), 0.0, 2.0, step):
+    for row in BodySimulation(ROBOT, swaying).run(Posture(0.0, 0.0, 0.0), (0.0, 0.0), 0.0, 2.0, step):
         rows.append(row)
     powers = []
     for row in rows:
@@ -90,8 +90,8 @@ def test_the_work_of_the_torques_is_the_energy_that_the_body_has():
 
 
 def test_a_wrong_model_is_the_disturbance_that_the_theory_calls_it():
-    heavy = Body(mass_kg=0.6, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.02, track_m=0.068)
-    first, second, *_ = Simulation(heavy, swaying, model=ROBOT).run(
+    heavy = UnicycleBody(mass_kg=0.6, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.02, track_m=0.068)
+    first, second, *_ = BodySimulation(heavy, swaying, model=ROBOT).run(
         Posture(0.1, 0.0, 0.2), (0.0, 0.0), 0.0, 0.01, 1e-4
     )
     v_dot = (second.v_m_s - first.v_m_s) / 1e-4
@@ -102,7 +102,7 @@ def test_a_wrong_model_is_the_disturbance_that_the_theory_calls_it():
 def test_limits_hold_for_demands_and_speeds():
     limits = Limits(max_v_m_s=0.05, max_w_rad_s=0.5, max_v_dot_m_s2=0.2, max_w_dot_rad_s2=2.0)
     rows = list(
-        Simulation(ROBOT, swaying, limits=limits).run(Posture(0.1, 0.0, 0.0), (0.0, 0.0), 0.0, 1.0, 1e-3)
+        BodySimulation(ROBOT, swaying, limits=limits).run(Posture(0.1, 0.0, 0.0), (0.0, 0.0), 0.0, 1.0, 1e-3)
     )
     assert max(abs(row.demand[0]) for row in rows) == 0.2
     assert 0.05 <= max(row.v_m_s for row in rows) < 0.0503
@@ -111,4 +111,4 @@ def test_limits_hold_for_demands_and_speeds():
 
 def test_the_steps_have_to_fill_the_time():
     with pytest.raises(ValueError, match="no whole number of steps"):
-        list(Simulation(ROBOT, swaying).run(Posture(0.1, 0.0, 0.0), (0.0, 0.0), 0.0, 1.0, 0.3))
+        list(BodySimulation(ROBOT, swaying).run(Posture(0.1, 0.0, 0.0), (0.0, 0.0), 0.0, 1.0, 0.3))

@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 from miro_host.laws.yang_kim import YangKim, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across, radius
 from tests.host.theory.ideal import PRINTED
 from tests.host.theory.layer import NO_GUARD, rates, rising, states
 
-PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
+PATHS = st.sampled_from(
+    [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
+)
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
 TIMES = st.floats(0.1, 0.4) | st.floats(0.6, 5.8)  # not on the corner of the ramp
 SPEEDS = st.floats(-0.9, 0.9)
@@ -98,7 +100,7 @@ def test_reach_is_nothing_where_condition_17_holds_and_endless_without_q():
 @given(st.floats(0.3, 0.9), st.floats(-1.2, 1.2), st.floats(-3.0, 3.0))
 def test_where_theta_e_crosses_0_v_jumps_by_the_product_that_the_proof_drops(rho, phi_e, turn):
     assume(abs(turn) > 1e-3 and abs(phi_e) > 1e-3)
-    r, law = Line().at(3.0), YangKim(PRINTED)
+    r, law = StraightLine().at(3.0), YangKim(PRINTED)
     x, y, towards = rho * math.cos(phi_e), rho * math.sin(phi_e), math.copysign(1e-10, turn)
     before, after = (law.control(r, Posture(x, y, side), 0.2, turn) for side in (-towards, towards))
     rise = stability.lyapunov(after.s1, after.s2) - stability.lyapunov(before.s1, before.s2)
@@ -152,7 +154,7 @@ def test_across_is_the_left_side_of_equation_12_with_the_sign_of_the_cosine(post
     assert math.copysign(1.0, across(posture)) == math.copysign(1.0, math.cos(phi - posture.theta_rad))
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()])
 def test_the_references_of_the_figures_keep_assumption_2_and_stay_away_from_assumption_3(path):
     assert path.at(0.0).rho_m == 0.0
     for index in range(1, 600):
@@ -167,7 +169,7 @@ def test_the_references_of_the_figures_keep_assumption_2_and_stay_away_from_assu
 @given(st.floats(0.02, 1.5), st.floats(0.1, 0.9))
 def test_u1_grows_like_one_over_the_sine_of_alpha(alpha, rho):
     """A robot at rest, alpha away from assumption 3's limit: u1 + v_r' is the braces of (16) over sin(alpha)."""
-    r = Line().at(3.0)
+    r = StraightLine().at(3.0)
     law = YangKim(PRINTED)
     u1 = law.control(r, Posture(rho, 0.0, HALF_PI - alpha), 0.0, 0.0).u1
     e = stability.polar_errors(r, Posture(rho, 0.0, HALF_PI - alpha), 0.0, 0.0)

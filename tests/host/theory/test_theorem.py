@@ -10,9 +10,9 @@ import pytest
 
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
-from miro_host.references.line import Line
+from miro_host.references.line import StraightLine
 from miro_host.theory import stability
-from miro_host.theory.simulation import Simulation
+from miro_host.theory.simulation import BodySimulation
 from tests.host.theory.ideal import (
     PRINTED,
     ROBOT,
@@ -25,7 +25,7 @@ from tests.host.theory.ideal import (
     random_starts,
 )
 
-ERRORS = [(Line(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
+ERRORS = [(StraightLine(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
 
 
 # Theorem 1.
@@ -49,7 +49,7 @@ def test_where_theta_e_crosses_0_v_jumps_by_twice_the_product_of_the_rate_and_ph
     """The proof drops the derivative of sgn(theta_e). In a run, within 5 %."""
     jumps = 0
     run = lyapunov_run(
-        Line(), (0.07, 0.30, -0.2), 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4
+        StraightLine(), (0.07, 0.30, -0.2), 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4
     )
     for one, two in pairwise(run):
         expected = stability.jump(one.turn, one.phi_e)
@@ -61,7 +61,7 @@ def test_where_theta_e_crosses_0_v_jumps_by_twice_the_product_of_the_rate_and_ph
 
 def test_with_gains_below_f_v_rises_and_the_surfaces_stay_within_reach():
     """Condition (17) is needed for V' <= 0. What is left without it is a bound: s_2 within (f - P) / Q."""
-    run = lyapunov_run(Line(), (0.05, 0.05, 0.05), 2.0, 5.0, (0.0, 2.0), True)
+    run = lyapunov_run(StraightLine(), (0.05, 0.05, 0.05), 2.0, 5.0, (0.0, 2.0), True)
     gap = stability.reach(PRINTED.p2_rad_s2, PRINTED.q2_per_s, 2.0)
     rises = [two.v - one.v for one, two in pairwise(run) if not one.crossed_before(two)]
     assert max(rises) > 1e-6
@@ -82,10 +82,10 @@ def test_both_surfaces_and_the_heading_error_go_to_zero(path, error):
 
 def test_with_the_heading_right_the_robot_runs_parallel_to_the_line_for_ever():
     """Theta_e = 0, 4 cm beside the line: the law answers with no turn at all, and rho sin(phi_e) stays."""
-    path = Line()
+    path = StraightLine()
     start, z = beside(path, 0.75, 0.0, 0.04, 0.0)
     start = Posture(math.sqrt(path.at(0.75).rho_m ** 2 - 0.04**2), 0.04, 0.0)  # on rho_e = 0
-    rows = list(Simulation(ROBOT, paper_law(PRINTED, path)).run(start, z, 0.75, 6.0, 0.001))
+    rows = list(BodySimulation(ROBOT, paper_law(PRINTED, path)).run(start, z, 0.75, 6.0, 0.001))
     assert {row.demand[1] for row in rows} == {0.0}
     assert abs(rows[-1].posture.y_m - 0.04) < 0.0002
     for row in rows[:: len(rows) // 10]:
@@ -99,7 +99,7 @@ def test_with_the_heading_right_the_robot_runs_parallel_to_the_line_for_ever():
     )  # it falls like 1 / rho, because the line gets longer: no convergence of the position
 
 
-@pytest.mark.parametrize("path", [Line(), Arc()])
+@pytest.mark.parametrize("path", [StraightLine(), Arc()])
 @pytest.mark.parametrize("phi_e", [-0.4, -0.1, 0.2])
 def test_the_zero_dynamics_of_the_surfaces_are_those_of_the_formula(path, phi_e):
     """A robot with s1 = s2 = rho_e = theta_e = 0 moves phi_e at this rate and at no other, whatever the gains."""

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_host.theory import computed_torque
-from miro_host.theory.unicycle import Body, inertia
+from miro_host.theory.unicycle import UnicycleBody, inertia
 from tests.host.theory.ideal import ROBOT
 from tests.host.theory.test_mechanics import BODIES
 
@@ -51,7 +51,7 @@ def test_the_robots_friction_is_a_disturbance_of_this_size():
 def test_a_wrong_model_makes_f_as_large_as_what_is_demanded():
     """The real robot is 20 % heavier: f1 = (1 - 1/1.2) (v_r' + u1), whatever bound was believed in."""
     real = inertia(
-        Body(**{name: getattr(ROBOT, name) for name in ROBOT.__struct_fields__} | {"mass_kg": 0.6})
+        UnicycleBody(**{name: getattr(ROBOT, name) for name in ROBOT.__struct_fields__} | {"mass_kg": 0.6})
     )
     for demanded in (0.1, 1.0, 8.0):
         applied = computed_torque.torque(inertia(ROBOT), NO_G, [demanded, 0.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_robot.inspect.trace import REGISTERS, Trace, registers
+from miro_robot.inspect.trace import REGISTERS, InstructionTrace, registers
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.inspect.test_listing import image_of
@@ -39,7 +39,7 @@ def traced(cycles: int, only: set[int] | None = None) -> list[str]:
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     lines: list[str] = []
-    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append, only))
+    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append, only))
     cpu.run(cycles)
     return lines
 
@@ -72,7 +72,7 @@ def test_sleep_is_one_line_however_the_run_is_cut():
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     lines: list[str] = []
-    trace = Trace(SymbolNames(image_of(code)), lines.append, heading="heading")
+    trace = InstructionTrace(SymbolNames(image_of(code)), lines.append, heading="heading")
     attach(cpu, trace)
     for cycle in (10, 20, 500):
         cpu.run(cycle)
@@ -85,7 +85,7 @@ def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
     code = assemble("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h")
     machine = BareMachine(image_of(code), code_in_xram=True)
     lines: list[str] = []
-    attach(machine.cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    attach(machine.cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     machine.run(max_cycles=30)
     shown = [line.split("MOV A,")[1].split()[0] for line in lines if "MOV A," in line]
     assert shown == ["#00h", "#01h", "#02h", "#03h", "#04h"]
@@ -107,7 +107,7 @@ def test_the_changed_registers_lead_from_the_first_state_to_the_last():
     cpu.load(code)
     state = dict(zip(REGISTERS, registers(cpu), strict=True))
     lines: list[str] = []
-    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     cpu.run(24)  # before the first interrupt, which pushes
     for line in lines:
         for change in line[78:].split():
@@ -127,6 +127,6 @@ def test_ports_show_the_pins_that_changed():
     code = assemble("CLR P1.3\nMOV P1,#5Ah\nMOV P1,#5Ah\nSETB P1.0\nMOV P2,#0Fh\nNOP")
     cpu = Cpu(RecordingBus())
     cpu.load(code)
-    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     cpu.run(8)
     assert [line[82:] for line in lines] == ["P1.3=0", "P1=5A", "", "P1.0=1", "P2=0F"]

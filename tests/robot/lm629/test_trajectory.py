@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS
-from miro_robot.lm629.trajectory import Trajectory
+from miro_robot.lm629.trajectory import ProfileGenerator
 from tests.example_count import examples
 from tests.naive.lm629 import NaiveLm629
 
 
-def generator(a: int, limit: int, target: int, **modes: int) -> Trajectory:
-    trajectory = Trajectory()
+def generator(a: int, limit: int, target: int, **modes: int) -> ProfileGenerator:
+    trajectory = ProfileGenerator()
     trajectory.acceleration, trajectory.max_velocity, trajectory.target = a, limit, target
     for name, value in modes.items():
         setattr(trajectory, name, value)
@@ -25,7 +25,7 @@ def generator(a: int, limit: int, target: int, **modes: int) -> Trajectory:
 
 
 def run(
-    trajectory: Trajectory, change: Callable[[Trajectory], None] | None = None
+    trajectory: ProfileGenerator, change: Callable[[ProfileGenerator], None] | None = None
 ) -> tuple[list[int], list[int]]:
     """Velocities and whole positions until the target; `change` is done before the 7th sample."""
     velocities, positions = [], []

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from miro_exact.state import restore, snapshot
-from miro_robot.bare.input import Piece
+from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from tests.robot.mcs51.test_bare import AUTOBAUD, ECHO, SERIAL, image
 
@@ -30,7 +30,7 @@ SLOW_POLLS = "MOV R7,#200\nw:\nDJNZ R7,w\nJB RXD,slow\nMOV PCON,#02h"  # five po
 
 def test_a_piece_begins_at_its_time_whether_the_program_seems_to_listen_or_not():
     text = "slow:\n" + SLOW_POLLS
-    machine = BareMachine(image(text), stdin=(Piece(b"\x00", delay_ticks=240_000),), baud=9600)
+    machine = BareMachine(image(text), stdin=(InputPiece(b"\x00", delay_ticks=240_000),), baud=9600)
     assert machine.run(max_cycles=100_000) == Ended.HALTED
     assert 20_000 <= machine.cpu.cycles <= 20_500
     plain = BareMachine(image(text), stdin=b"\x00", baud=9600)
@@ -38,7 +38,7 @@ def test_a_piece_begins_at_its_time_whether_the_program_seems_to_listen_or_not()
 
 
 def test_a_piece_with_a_time_waits_for_a_receiver_that_is_on_and_free():
-    machine = BareMachine(image(ECHO), stdin=(Piece(b"ab", delay_ticks=1_200_000),))
+    machine = BareMachine(image(ECHO), stdin=(InputPiece(b"ab", delay_ticks=1_200_000),))
     machine.run(max_cycles=90_000)
     assert machine.input.left == 2
     machine.run(max_cycles=120_000)
@@ -46,7 +46,7 @@ def test_a_piece_with_a_time_waits_for_a_receiver_that_is_on_and_free():
 
 
 def test_a_text_releases_what_waits_for_it_and_only_once():
-    pieces = (Piece(b"x", b">"), Piece(b"y", b">"), Piece(b"\r", b">"))
+    pieces = (InputPiece(b"x", b">"), InputPiece(b"y", b">"), InputPiece(b"\r", b">"))
     machine = BareMachine(image("MOV R0,#40h\n" + PROMPT), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.HALTED
     assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(3)) == b"xy\r"
@@ -54,7 +54,7 @@ def test_a_text_releases_what_waits_for_it_and_only_once():
 
 def test_a_text_counts_only_behind_the_piece_before():
     """Its first letter would fit the prompt that came before."""
-    pieces = (Piece(b"x", b">"), Piece(b"\r", b">>"))
+    pieces = (InputPiece(b"x", b">"), InputPiece(b"\r", b">>"))
     machine = BareMachine(image("MOV R0,#40h\n" + PROMPT), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.CYCLES
     assert (machine.input.waiting_for, machine.input.left) == (b">>", 1)
@@ -89,7 +89,12 @@ def test_keys_that_are_added_later_are_sent_and_wait_for_nothing_else():
 
 @pytest.mark.parametrize("step", [97, 1_001])
 def test_a_dialogue_that_is_cut_and_saved_is_the_same(step):
-    pieces = (Piece(b"x", b">", 5_000), Piece(b"y", b">"), Piece(b"", b"?"), Piece(b"z\r", delay_ticks=7))
+    pieces = (
+        InputPiece(b"x", b">", 5_000),
+        InputPiece(b"y", b">"),
+        InputPiece(b"", b"?"),
+        InputPiece(b"z\r", delay_ticks=7),
+    )
     whole, cut, other = (
         BareMachine(image("MOV R0,#40h\n" + PROMPT), stdin=pieces, gap_ticks=999) for _ in range(3)
     )

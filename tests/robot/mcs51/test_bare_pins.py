@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_exact.state import restore, snapshot
-from miro_robot.bare.input import Piece
+from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from tests.robot.mcs51.test_bare import SERIAL, image
@@ -73,7 +73,7 @@ def test_levels_on_rxd_are_characters_for_the_receiver():
     assert machine.cpu.a == 0x5A
 
 
-@pytest.mark.parametrize("options", [{"stdin": b"a"}, {"stdin": (Piece(b"a", b"> "),)}, {"live": True}])
+@pytest.mark.parametrize("options", [{"stdin": b"a"}, {"stdin": (InputPiece(b"a", b"> "),)}, {"live": True}])
 def test_rxd_is_driven_by_pins_or_by_input(options):
     with pytest.raises(ValueError, match=r"P3\.0 is RXD"):
         BareMachine(image("NOP"), pins=(PinEvent(0, 3, 0, 0),), **options)

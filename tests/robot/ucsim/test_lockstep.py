@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from miro_robot.mcs51.vectors import Bench
+from miro_robot.mcs51.vectors import VectorRunner
 from tests.robot.ucsim import s51, states, timers, vector_check
 from tests.robot.ucsim.exclusions import COMPARED
 from tests.robot.ucsim.lockstep import compare
@@ -67,7 +67,7 @@ def test_what_programs_read_from_running_timers_agrees():
 
 
 def test_one_published_vector_of_each_opcode_agrees():
-    bench = Bench()
+    bench = VectorRunner()
     chosen = {}
     for vector in vector_check.load(MCS51):
         if vector_check.comparable(vector, bench):

@@ -9,14 +9,14 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from miro_robot.mcs51.vectors import RESET, Bench, Vector, decode
+from miro_robot.mcs51.vectors import RESET, Vector, VectorRunner, decode
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, PSW, allowed
 
 _BATCH = 2000  # vectors per start of the simulator
 
 
-def comparable(vector: Vector, bench: Bench) -> bool:
+def comparable(vector: Vector, bench: VectorRunner) -> bool:
     """Whether ucsim is expected to agree."""
     state = vector.initial
     bench.prepare(state)
@@ -88,7 +88,7 @@ def load(folder: Path) -> list[Vector]:
 def main(folder: str) -> int:
     """Prints differences and figures; exit code 1 if there are any."""
     vectors = load(Path(folder))
-    bench = Bench()
+    bench = VectorRunner()
     run = [vector for vector in vectors if comparable(vector, bench)]
     found = list(differences(run))
     for line in found:

@@ -13,7 +13,7 @@ from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.drive import DifferentialDrive
-from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
+from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor, OpticalEncoder
 from tests import children
 from tests.naive.plant import NaiveDrive
 from tests.robot.lm629.bench import Bench
@@ -203,7 +203,7 @@ class DrivenBench(Bench):
 
 
 def test_two_indices_a_turn_of_the_motor_apart_are_caught_2048_counts_apart():
-    bench = DrivenBench(DriveParams(encoder=Encoder(index_pulse=True)))
+    bench = DrivenBench(DriveParams(encoder=OpticalEncoder(index_pulse=True)))
     origin = bench.chip.real_position - bench.plant.left_encoder.count
     captured = []
     while len(captured) < 4:

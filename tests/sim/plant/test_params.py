@@ -5,7 +5,7 @@ import math
 import msgspec
 import pytest
 
-from miro_sim.plant.params import Battery, Chassis, DriveParams, Encoder, Motor
+from miro_sim.plant.params import Battery, Chassis, DriveParams, Motor, OpticalEncoder
 
 PARAMS = DriveParams()
 
@@ -38,7 +38,7 @@ def test_each_wheel_has_its_own_radius():
 @pytest.mark.parametrize(
     ("kind", "field", "value"),
     [(Motor, "inductance_h", 0.0), (Battery, "voltage_v", -7.2), (Chassis, "mass_kg", math.nan)]
-    + [(Chassis, "rolling_resistance", -0.1), (Encoder, "lines", 0)],
+    + [(Chassis, "rolling_resistance", -0.1), (OpticalEncoder, "lines", 0)],
 )
 def test_impossible_figures_are_refused_by_name(kind, field, value):
     with pytest.raises(ValueError, match=f"{field} must be .* got"):
