@@ -17,6 +17,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
+from miro_robot.inspect.frames import StackFrame
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from miro_sim.world.conditions import CONDITIONS
 from mirotwin.debug.debugger import Debugger
@@ -250,7 +251,7 @@ class Console:
         self.tell(f"{self.time(found.tick)}  {rest} was last written by")
         self._frames(found.frames)
 
-    def _frames(self, frames: list[Frame], chosen: int = -1) -> None:
+    def _frames(self, frames: list[StackFrame], chosen: int = -1) -> None:
         """One line a frame, the innermost first."""
         symbols = self.debugger.symbols
         for at, frame in enumerate(frames):
