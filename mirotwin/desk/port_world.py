@@ -15,7 +15,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, ticks
 from miro_protocol.events import Received
 from miro_protocol.table import SEQ_MODULUS
 from miro_sim.periods import Period
-from miro_sim.scenario.keys import Network, Scenario
+from miro_sim.scenario.keys import NetworkSpec, Scenario
 from miro_sim.world.conditions import Answer, Condition, Heard, Sent
 from miro_sim.world.events import Event, HostLog
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
@@ -36,7 +36,7 @@ class NotObservable(Exception):
 class PortNetwork(msgspec.Struct, frozen=True):
     """The one network of a port. Nobody sees the inside of its robots."""
 
-    spec: Network
+    spec: NetworkSpec
     log: HostLog
     index: int = 0
     robots: tuple[()] = ()
