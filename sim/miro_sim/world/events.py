@@ -163,6 +163,8 @@ class RobotLog:
 class Cursor:
     """Who reads a log on, from now: `next` is the serial number of the first event that was not read."""
 
+    NOT_STATE = ("log", "next")
+
     def __init__(self, log: HostLog | RobotLog) -> None:
         self.log = log
         self.next = log.end
