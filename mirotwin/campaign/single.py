@@ -25,7 +25,7 @@ from mirotwin.report.summary import summarise
 from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.tracebacks import show_traceback
-from mirotwin.verify.checks.expect import Place, expectations_of
+from mirotwin.verify.checks.expect import RobotId, expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step
@@ -38,7 +38,7 @@ class Prepared(msgspec.Struct, frozen=True):
     """A scenario with its settings made, what it expects, and its steps."""
 
     text: ScenarioText
-    expected: dict[Place, list[Check]]
+    expected: dict[RobotId, list[Check]]
     steps: list[Step]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -49,6 +50,7 @@ class LiveSession(runner.Simulation, Protocol):
     def live(self) -> LiveFigures: ...
 
 
+@dataclass
 class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
@@ -56,36 +58,21 @@ class RunFiles:
     it runs as fast as it can. `stops`: where it saves the world, and ends. `live` is told what is recorded.
     """
 
-    def __init__(
-        self,
-        folder: OutputFolder,
-        source: RunSource,
-        world: World,
-        engine: str,
-        hold: Hold,
-        checks: Checks,
-        settings: tuple[str, ...] = (),
-        views: Sequence[View] = (),
-        player: Player | None = None,
-        session: LiveSession | None = None,
-        stops: Stops | None = None,
-        live: LiveView | None = None,
-    ) -> None:
-        self.folder = folder
-        self.source = source
-        self.world = world
-        self.engine = engine
-        self.hold = hold
-        self.checks = checks
-        self.settings = settings
-        self.views = views
-        self.player = player
-        self.session = session
-        self.stops = stops
-        self.live = live
-        self.tracks = Tracks()
-        self._wall_s = 0.0
-        self._flushed_s = -FLUSH_S
+    folder: OutputFolder
+    source: RunSource
+    world: World
+    engine: str
+    hold: Hold
+    checks: Checks
+    settings: tuple[str, ...] = ()
+    views: Sequence[View] = ()
+    player: Player | None = None
+    session: LiveSession | None = None
+    stops: Stops | None = None
+    live: LiveView | None = None
+    tracks: Tracks = field(default_factory=Tracks, init=False)
+    _wall_s: float = field(default=0.0, init=False)
+    _flushed_s: float = field(default=-FLUSH_S, init=False)
 
     def fill(self, bar: ProgressBar, title: str | None) -> Summary:
         """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.

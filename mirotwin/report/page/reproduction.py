@@ -21,7 +21,7 @@ from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.report.page.link import LinkLog, LinkMark
 from mirotwin.verify.cases.rerun import rerun
-from mirotwin.verify.checks.expect import Place
+from mirotwin.verify.checks.expect import RobotId
 from mirotwin.verify.checks.interface import Check, Expectation, Failure
 
 
@@ -52,7 +52,7 @@ class Reproduction(msgspec.Struct, frozen=True):
 def reproduce(
     world: World,
     until_tick: int | None,
-    expected: Mapping[Place, Sequence[Check]] | None = None,
+    expected: Mapping[RobotId, Sequence[Check]] | None = None,
     progress: Callable[[int], object] = lambda tick: None,
 ) -> Reproduction:
     """Runs `world` as `rerun` does, and on to the end of that control period. Raises TransmissionError as that does."""

@@ -30,7 +30,7 @@ EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 WHERE_CHECKS_ARE = (
     "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
 )
-Place = tuple[int, int]
+RobotId = tuple[int, int]
 """Network and slot of a robot."""
 
 
@@ -39,11 +39,11 @@ def struct_of(name: str) -> type[Check]:
     return cast(type[Check], CHECKS.find(name))
 
 
-def expectations_of(scenario: Scenario, origin: str) -> dict[Place, list[Check]]:
+def expectations_of(scenario: Scenario, origin: str) -> dict[RobotId, list[Check]]:
     """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
     end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
     for_all = checks_of_table(scenario, origin, "expect", scenario.expect, end_tick)
-    found: dict[Place, list[Check]] = {}
+    found: dict[RobotId, list[Check]] = {}
     for index, network in enumerate(scenario.networks):
         for at, robot in enumerate(network.robot):
             path = f"network[{index}].robot[{at}].expect"

@@ -28,13 +28,13 @@ from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import Place, expectations_of
+from mirotwin.verify.checks.expect import RobotId, expectations_of
 from mirotwin.verify.checks.hearing import receptions
 from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Monitor, Subject
 from mirotwin.verify.checks.plugin_problems import checked_monitor
 
 T = TypeVar("T")
-Expected = Mapping[Place, Sequence[Check]]
+Expected = Mapping[RobotId, Sequence[Check]]
 _FROM_RECEIVED = ("frame", "damaged")
 _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)

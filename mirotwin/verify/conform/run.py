@@ -16,7 +16,7 @@ from miro_robot.image import Image
 from miro_sim.world.world import World
 from mirotwin.verify.cases.case import SUFFIX, case_text
 from mirotwin.verify.cases.trace import Trace
-from mirotwin.verify.checks.expect import Place
+from mirotwin.verify.checks.expect import RobotId
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
@@ -68,7 +68,7 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
     trial = trial_of(rule)
     world = World(trial.scenario, seed, image, trial.script)
     trace = Trace(world)
-    checks = Checks(world, {place: [ConformsTo(rule=rule.id)] for place in _places(world)})
+    checks = Checks(world, {place: [ConformsTo(rule=rule.id)] for place in _robots(world)})
     run_trial(world)
     checks.finish()
     failures = [one for one in checks.failures if not one.fault]
@@ -83,7 +83,7 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
         found = (
             "more events than the robot's log holds" if world.finished else f"{MOST_FAULTS} firmware faults"
         )
-        failures = [Failure("conforms_to", *_places(world)[0], world.tick, wanted, found)]
+        failures = [Failure("conforms_to", *_robots(world)[0], world.tick, wanted, found)]
     cases = _cases(rule, world, trace, failures, faults) if keep else ()
     return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
 
@@ -107,7 +107,7 @@ def _cases(
     return tuple(found)
 
 
-def _places(world: World) -> list[Place]:
+def _robots(world: World) -> list[RobotId]:
     return [(network.index, robot.slot) for network in world.networks for robot in network.robots]
 
 
