@@ -24,16 +24,16 @@ from mirotwin.verify.boot import is_up
 RESET_TICKS = ms(1)
 """An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""
 UP_TICKS = ms(267)
-Told = Literal["drive", "stop", "off"]
+Mode = Literal["drive", "stop", "off"]
 
 
 class WheelState(msgspec.Struct, frozen=True):
-    """One wheel now. `told`: what its LM629 was told; `commanded`: the velocity, in 1/256 count per sample as a team
-    frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
+    """One wheel now. `mode`: what its LM629 was told to do; `commanded`: the velocity, in 1/256 count per sample as a
+    team frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
     `position`: counts of the LM629 as of its last sample.
     """
 
-    told: Told
+    mode: Mode
     commanded: int
     speed_m_s: float
     pwm: int
@@ -47,8 +47,8 @@ class WheelStates(msgspec.Struct, frozen=True):
     right: WheelState
 
     @property
-    def told(self) -> tuple[Told, Told]:
-        return self.left.told, self.right.told
+    def mode(self) -> tuple[Mode, Mode]:
+        return self.left.mode, self.right.mode
 
     @property
     def commanded(self) -> tuple[int, int]:
@@ -168,20 +168,20 @@ class RobotUnderTest:
     def __repr__(self) -> str:
         wheels = self.wheels
         return (
-            f"RobotUnderTest(net{self.network}/robot{self.slot}, {wheels.told}, commanded={wheels.commanded})"
+            f"RobotUnderTest(net{self.network}/robot{self.slot}, {wheels.mode}, commanded={wheels.commanded})"
         )
 
 
 def _wheel(chip: Lm629, speed_m_s: float) -> WheelState:
     buffer = chip.trajectory_buffer
     control = buffer.taken_control
-    told: Told = "drive"
+    mode: Mode = "drive"
     if control & OFF_WORD if chip.start_taken else chip.signals.word & MOTOR_OFF:
-        told = "off"
+        mode = "off"
     elif control & (STOP_ABRUPTLY | STOP_SMOOTHLY):
-        told = "stop"
-    velocity = buffer.taken_velocity >> 8 if told == "drive" else 0
+        mode = "stop"
+    velocity = buffer.taken_velocity >> 8 if mode == "drive" else 0
     if control & VELOCITY_MODE and not control & FORWARD:
         velocity = -velocity
     pwm = -chip.pwm_magnitude if chip.sign else chip.pwm_magnitude
-    return WheelState(told, velocity, speed_m_s, pwm, chip.real_position)
+    return WheelState(mode, velocity, speed_m_s, pwm, chip.real_position)

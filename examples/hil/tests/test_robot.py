@@ -21,7 +21,7 @@ def test_it_is_back_after_a_reset(link, robot, world):
     world.run_for(ms(50))
     robot.reset()
     robot.wait_until_up()
-    assert robot.wheels.told == ("off", "off")
+    assert robot.wheels.mode == ("off", "off")
     link.send(velocities={0: (200, 200)})
     world.run_for(ms(5))
     assert robot.wheels.commanded == (200, 200)

@@ -78,7 +78,7 @@ def _verdicts(trial: Trial, listener: Listener) -> Iterator[Row]:
     for one in trial.expected[listener.subject.network]:
         if one.slots and slot not in one.slots:
             continue
-        found = one.test(listener.seen)
+        found = one.test(listener.observed)
         if found is None:
             yield one.tick, "passed", one.wanted
         else:
@@ -152,7 +152,7 @@ def _characters(run: list[Event]) -> str:
 
 def _answer(run: list[Event], listener: Listener) -> str:
     """What the characters say, if they are an answer."""
-    for answer in listener.seen.answers_in(run[0].tick, run[-1].tick):
+    for answer in listener.observed.answers_in(run[0].tick, run[-1].tick):
         said = answer.said
         if not isinstance(said, TelemetryFrame):
             return ": an answer with unknown contents"

@@ -8,7 +8,7 @@ from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, Monitor, Subject
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.conform.seen import Seen
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.trial import Trial, run_trial
 
 
@@ -22,28 +22,28 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
 
 
 class Listener(Monitor[Listening]):
-    """`events`: all of one robot and its host, in the order of time; `seen` has what rules ask about."""
+    """`events`: all of one robot and its host, in the order of time; `observed` has what rules ask about."""
 
     EVENTS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
 
     def __init__(self, check: Listening, subject: Subject) -> None:
         super().__init__(check, subject)
         self.events: list[Event] = []
-        self.seen = Seen(subject.robots, subject.slot)
+        self.observed = Observed(subject.robots, subject.slot)
 
     def event(self, event: Event) -> None:
         self.events.append(event)
         if event.what in ("command", "heard", "answer"):
-            self.seen.take(event)
+            self.observed.take(event)
 
     def restarted(self, tick: int) -> None:
-        self.seen.restarted(tick)
+        self.observed.restarted(tick)
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        self.seen.take_period(tick, record, self.subject.robot.board)
+        self.observed.take_period(tick, record, self.subject.robot.board)
 
     def end(self, tick: int) -> None:
-        self.seen.end_tick = tick
+        self.observed.end_tick = tick
 
 
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:

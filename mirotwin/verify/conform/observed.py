@@ -41,7 +41,7 @@ class Setting(msgspec.Struct, frozen=True):
     words: Words
 
 
-class Seen:
+class Observed:
     """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: what came later was not told."""
 
     def __init__(self, robots: int, slot: int) -> None:

@@ -41,7 +41,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
         said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
         script.said += other.said
         script.wait_until(other.now)
-        script.expect(script.now, "", lambda seen: None)
+        script.expect(script.now, "", lambda observed: None)
 
     rule = Rule("P24", "", "", ways, (topology,))
     (listener,) = listen(make_trial(rule), image, seed)
@@ -64,7 +64,7 @@ def _other_layout(script: TrialScript) -> TrialScript:
 
 def _begins_again(listener: Listener) -> str:
     """Whether the firmware has reset LM629s that it had told to turn. The trial resets no processor."""
-    turned_tick = min((one.tick for one in listener.seen.commands if one.opcode == _STT), default=None)
+    turned_tick = min((one.tick for one in listener.observed.commands if one.opcode == _STT), default=None)
     board = listener.subject.robot.board
     if turned_tick is None or board.left.reset_tick <= turned_tick:
         return ""
@@ -97,7 +97,7 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
                 return f"its serial port took {sent - lost} of the trial's {sent} characters: off or too slow"
             if again := _begins_again(listener):
                 return again
-            last_tick = max((one.tick for one in listener.seen.commands), default=0)
+            last_tick = max((one.tick for one in listener.observed.commands), default=0)
             later = [one for one in trial.transmissions if one.network == network and one.tick > last_tick]
             if last_tick and len(later) > _UNHEARD:
                 when = f"{last_tick / TICKS_PER_MS:.0f} ms"
@@ -107,8 +107,8 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
 
 def _obeyed(listener: Listener, said: Sequence[tuple[str, Frame]]) -> str:
     for what, frame in said[1:]:
-        told = listener.seen.both_told(frame.end_tick + ACTING_TICKS)
-        if all(map(obeys, told, frame.for_robot(listener.seen.slot))):
+        told = listener.observed.both_told(frame.end_tick + ACTING_TICKS)
+        if all(map(obeys, told, frame.for_robot(listener.observed.slot))):
             return f"it obeys {what}"
     return ""
 
@@ -116,9 +116,9 @@ def _obeyed(listener: Listener, said: Sequence[tuple[str, Frame]]) -> str:
 def _chips(listener: Listener) -> str:
     if not listener.subject.robot.board.left.reset_level:
         return "it holds its LM629s in reset (/RST is low)"
-    if not listener.seen.commands:
+    if not listener.observed.commands:
         return "it tells its LM629s nothing at all"
-    known = {one.opcode for one in listener.seen.commands} & _KNOWN
+    known = {one.opcode for one in listener.observed.commands} & _KNOWN
     return (
         ""
         if known

@@ -15,8 +15,8 @@ from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial import trial_of
 
 
@@ -58,11 +58,11 @@ class RuleMonitor(Monitor[ConformsTo]):
         self.to_come: list[Transmission] = [
             one for one in trial.transmissions if one.network == subject.network
         ][::-1]
-        self.seen = Seen(subject.robots, subject.slot)
+        self.observed = Observed(subject.robots, subject.slot)
 
     def event(self, event: Event) -> None:
         if event.what != "sent":
-            self.seen.take(event)
+            self.observed.take(event)
             return
         said = self.to_come.pop() if self.to_come else None
         if said is None or (said.tick, said.data) != (event.tick, event.data):
@@ -73,24 +73,24 @@ class RuleMonitor(Monitor[ConformsTo]):
             self.fail(fault.tick, "no such firmware fault", str(fault), fault=True)
 
     def restarted(self, tick: int) -> None:
-        self.seen.restarted(tick)
+        self.observed.restarted(tick)
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        self.seen.take_period(tick, record, self.subject.robot.board)
+        self.observed.take_period(tick, record, self.subject.robot.board)
 
     def end(self, tick: int) -> None:
         if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
             self.failures.clear()
             self.failed = 0
             return
-        self.seen.end_tick = tick
+        self.observed.end_tick = tick
         found = []
         for expectation in self.expected:
             here = not expectation.slots or self.subject.slot in expectation.slots
             if not here or expectation.tick >= tick:
                 continue
             self.judged += 1
-            what = expectation.test(self.seen)
+            what = expectation.test(self.observed)
             if what is not None:
                 found.append((what[0], expectation.wanted, what[1]))
         for at, wanted, text in sorted(found, key=lambda one: one[0]):

@@ -43,8 +43,8 @@ from mirotwin.verify.conform.hints import (
     number,
     wheels_instead,
 )
+from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import Topology
-from mirotwin.verify.conform.seen import Answer, Seen
 
 _LTRJ = BY_NAME["LTRJ"].opcode
 _VELOCITY = 0x08
@@ -86,7 +86,7 @@ class Expectation:
 
     tick: int
     wanted: str
-    test: Callable[[Seen], Found]
+    test: Callable[[Observed], Found]
     slots: tuple[int, ...] = ()
 
 
@@ -255,7 +255,7 @@ class TrialScript:
     # ---- expecting -----------------------------------------------------------------------------------------
 
     def expect(
-        self, tick: int, wanted: str, test: Callable[[Seen], Found], slots: tuple[int, ...] = ()
+        self, tick: int, wanted: str, test: Callable[[Observed], Found], slots: tuple[int, ...] = ()
     ) -> None:
         self.expected.append(Expectation(tick, wanted, test, slots))
 
@@ -263,14 +263,14 @@ class TrialScript:
         """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
         deadline = frame.end_tick + ACTING_TICKS
 
-        def test(seen: Seen) -> Found:
-            told = seen.both_told(deadline)
-            wanted = frame.for_robot(seen.slot)
+        def test(observed: Observed) -> Found:
+            told = observed.both_told(deadline)
+            wanted = frame.for_robot(observed.slot)
             if all(obeys(order, word) for order, word in zip(told, wanted, strict=True)):
                 return None
             left, right = map(number, wanted)
             found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
-            return deadline, found + _instead(seen, frame, told)
+            return deadline, found + _instead(observed, frame, told)
 
         self.expect(deadline, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test, slots)
 
@@ -281,9 +281,9 @@ class TrialScript:
     def unchanged(self, after_tick: int, until_tick: int, wanted: str, slots: tuple[int, ...] = ()) -> None:
         """In between no wheel is told anything but what it was told last."""
 
-        def test(seen: Seen) -> Found:
-            for order in seen.ordered(after_tick, until_tick):
-                before = seen.told(order.side, after_tick)
+        def test(observed: Observed) -> Found:
+            for order in observed.ordered(after_tick, until_tick):
+                before = observed.told(order.side, after_tick)
                 if (order.what, order.velocity) != (before.what, before.velocity):
                     return order.tick, f"the {order.side} wheel told {in_words(order)}"
             return None
@@ -294,8 +294,8 @@ class TrialScript:
         """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
         until = frame.end_tick + ACTING_TICKS
 
-        def test(seen: Seen) -> Found:
-            for event in seen.wrote(frame.tick, until):
+        def test(observed: Observed) -> Found:
+            for event in observed.wrote(frame.tick, until):
                 found = str(event).partition(" command ")[2]
                 if since is None or abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) > ms(2.0):
                     return event.tick, found
@@ -309,20 +309,20 @@ class TrialScript:
         question: Frame,
         slot: int,
         wanted: str = "",
-        says: Callable[[Answer, Seen], str] | None = None,
+        says: Callable[[Answer, Observed], str] | None = None,
     ) -> None:
         """The robot in `slot` answers in time, and with this number. `says`: what is wrong with what it says, or ""."""
         deadline = over_by(question)
 
-        def test(seen: Seen) -> Found:
-            found = seen.answers_in(question.last_tick, deadline)
+        def test(observed: Observed) -> Found:
+            found = observed.answers_in(question.last_tick, deadline)
             if not found:
-                return deadline, _no_answer(seen, question, deadline)
+                return deadline, _no_answer(observed, question, deadline)
             answer = found[0]
             said = answer.said
             if said is None or (said.slot, said.seq) != (slot, question.seq):
                 return answer.tick, who(answer)
-            what = says(answer, seen) if says is not None else ""
+            what = says(answer, observed) if says is not None else ""
             return (answer.tick, what) if what else None
 
         self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,))
@@ -330,35 +330,35 @@ class TrialScript:
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
         """The PC hears nothing in between."""
 
-        def test(seen: Seen) -> Found:
-            spoke = seen.spoke(after_tick, until_tick)
+        def test(observed: Observed) -> Found:
+            spoke = observed.spoke(after_tick, until_tick)
             if spoke is None:
                 return None
-            heard = in_a_row([one for one in seen.heard if spoke.tick <= one.tick <= until_tick])
-            answer = next(iter(seen.answers_in(spoke.tick, heard[-1].tick)), None)
+            heard = in_a_row([one for one in observed.heard if spoke.tick <= one.tick <= until_tick])
+            answer = next(iter(observed.answers_in(spoke.tick, heard[-1].tick)), None)
             return spoke.tick, characters(heard) + (f": {who(answer)}" if answer is not None else "")
 
         self.expect(until_tick, f"silence: {why}", test)
 
 
-def _instead(seen: Seen, frame: Frame, told: tuple[Order, Order]) -> str:
+def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str:
     """What the robot made of the frame, where that is plain; else ""."""
     if max(order.tick for order in told) <= frame.tick:
-        late = _told_late(seen, frame)
+        late = _told_late(observed, frame)
         if late is not None:
             return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
-        wrote = seen.wrote(frame.tick, frame.end_tick + ACTING_TICKS)
+        wrote = observed.wrote(frame.tick, frame.end_tick + ACTING_TICKS)
         loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
         return ": loaded, but not started (STT)" if loaded else ": nothing was told"
-    what = wheels_instead(told, frame, seen.slot)
+    what = wheels_instead(told, frame, observed.slot)
     return f": {what}" if what else ""
 
 
-def _told_late(seen: Seen, frame: Frame) -> int | None:
+def _told_late(observed: Observed, frame: Frame) -> int | None:
     deadline = frame.end_tick + ACTING_TICKS
-    wanted = frame.for_robot(seen.slot)
-    for order in seen.ordered(deadline, deadline + CONTROL_PERIOD_TICKS):
-        if all(map(obeys, seen.both_told(order.tick), wanted)):
+    wanted = frame.for_robot(observed.slot)
+    for order in observed.ordered(deadline, deadline + CONTROL_PERIOD_TICKS):
+        if all(map(obeys, observed.both_told(order.tick), wanted)):
             return order.tick
     return None
 
@@ -369,10 +369,11 @@ def who(answer: Answer) -> str:
     return "unknown contents" if said is None else f"an answer of robot {said.slot} to question {said.seq}"
 
 
-def _no_answer(seen: Seen, question: Frame, deadline: int) -> str:
-    heard = [one for one in seen.heard if question.last_tick < one.tick <= deadline]
+def _no_answer(observed: Observed, question: Frame, deadline: int) -> str:
+    heard = [one for one in observed.heard if question.last_tick < one.tick <= deadline]
     late = next(
-        (one for one in seen.answers_in(deadline, seen.end_tick) if one.frame.seq == question.seq), None
+        (one for one in observed.answers_in(deadline, observed.end_tick) if one.frame.seq == question.seq),
+        None,
     )
     if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
         return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"

@@ -22,7 +22,7 @@ def test_numbers_count_by_themselves_and_velocities_go_by_slot():
     link.send(velocities={1: (7, 7)})
     one.world.run_for(ms(5))
     assert robot.wheels.commanded == (0, 0)
-    assert robot.wheels.told == ("drive", "drive")
+    assert robot.wheels.mode == ("drive", "drive")
     assert robot.read("frames_accepted") == 4
 
 

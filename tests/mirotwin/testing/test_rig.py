@@ -17,7 +17,7 @@ from tests.mirotwin.testing.rigs import HERE, rig
 def test_a_robot_is_up_and_stands_when_its_test_begins():
     one = rig()
     assert one.world.tick == CONTROL_PERIOD_TICKS
-    assert one.robots[0].wheels.told == ("off", "off")
+    assert one.robots[0].wheels.mode == ("off", "off")
     assert one.links[0].answers == []
     one.links[0].poll(0)
     assert one.links[0].expect(TelemetryFrame, within=ms(40)).accepted == 1
@@ -48,7 +48,7 @@ def test_a_scenario_with_a_controller_begins_at_power_on_and_drives_by_itself():
     one = rig(scenario="fig6")
     assert one.world.tick == 0
     one.world.run_for(ms(200))
-    assert one.robots[0].wheels.told == ("drive", "drive")
+    assert one.robots[0].wheels.mode == ("drive", "drive")
 
 
 def test_robots_and_links_of_all_networks_are_there():

@@ -37,11 +37,11 @@ def test_wheels_turn_stop_and_are_switched_off_as_the_failsafe_says():
     assert robot.wheels.left.position > robot.wheels.right.position > 0
     end = robot.break_at("motion_stop", within=ms(150))
     one.world.run_for(ms(1))
-    assert robot.wheels.told == ("stop", "stop")
+    assert robot.wheels.mode == ("stop", "stop")
     assert robot.wheels.commanded == (0, 0)
     robot.break_at("motion_off", within=ms(400))
     one.world.run_for(ms(1))
-    assert robot.wheels.told == ("off", "off")
+    assert robot.wheels.mode == ("off", "off")
     assert one.world.tick - end.tick > ms(389)
 
 
@@ -120,7 +120,7 @@ def test_a_radio_that_is_down_loses_frames_and_the_failsafe_stops_the_wheels():
     link.drive({0: (300, 300)}, ms(100))
     link.radio("down")
     link.drive({0: (300, 300)}, ms(150))
-    assert robot.wheels.told == ("stop", "stop")
+    assert robot.wheels.mode == ("stop", "stop")
     link.radio("up")
     link.drive({0: (300, 300)}, ms(34))
-    assert robot.wheels.told == ("drive", "drive")
+    assert robot.wheels.mode == ("drive", "drive")

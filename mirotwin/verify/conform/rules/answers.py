@@ -21,9 +21,9 @@ from miro_protocol.table import (
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
+from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import BOTH, THREE, Chapter, Topology
 from mirotwin.verify.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
-from mirotwin.verify.conform.seen import Answer, Seen
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms, over_by
 
 CHAPTER = Chapter("Answers")
@@ -70,8 +70,8 @@ def form(script: TrialScript) -> None:
         _formed(script, script.team(ask=True, what="question", gap_ms=36.0))
     end = script.now
 
-    def any_heard(seen: Seen) -> Found:
-        return None if seen.heard else (end, "none")
+    def any_heard(observed: Observed) -> Found:
+        return None if observed.heard else (end, "none")
 
     script.expect(end, f"an answer to some of {3 * script.n} questions in a row", any_heard)
 
@@ -80,17 +80,17 @@ def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> No
     """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
     until = question.end_tick + ms(56.0)
 
-    def test(seen: Seen) -> Found:
-        heard = [one for one in seen.heard if question.last_tick < one.tick <= until]
+    def test(observed: Observed) -> Found:
+        heard = [one for one in observed.heard if question.last_tick < one.tick <= until]
         heard = heard[: TELEMETRY.wire_size] if then_more else list(in_a_row(heard))
-        what = _badly_formed(heard, question, seen) if heard else ""
+        what = _badly_formed(heard, question, observed) if heard else ""
         return (heard[-1].tick, f"{characters(heard)}: {what}") if what else None
 
     wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
     script.expect(until, wanted, test, (script.topology.slots[0],))
 
 
-def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
+def _badly_formed(heard: list[Event], question: Frame, observed: Observed) -> str:
     if len(heard) != TELEMETRY.wire_size:
         return f"{len(heard)} without a pause"
     found = bytes(one.value for one in heard)[: len(_HEAD)]
@@ -101,7 +101,7 @@ def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
     baud = BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(heard) - 1) / (heard[-1].tick - heard[0].tick)
     if abs(baud - BAUD) > BAUD_TOLERANCE * BAUD:
         return f"{baud:.0f} baud"
-    if not seen.answers_in(heard[0].tick - 1, heard[-1].tick):
+    if not observed.answers_in(heard[0].tick - 1, heard[-1].tick):
         return no_answer(heard, question.seq)
     return ""
 
@@ -193,14 +193,14 @@ def flags(script: TrialScript) -> None:
 
 
 def _says(
-    script: TrialScript, wanted: str, says: Callable[[Answer, Seen], str], gap_ms: float = 36.0
+    script: TrialScript, wanted: str, says: Callable[[Answer, Observed], str], gap_ms: float = 36.0
 ) -> Frame:
     question = script.ask(script.topology.slots[0], gap_ms=gap_ms)
     script.answered(question, script.topology.slots[0], f"{wanted} in the answer to {question.what}", says)
     return question
 
 
-def _flagged(wanted: int, answer: Answer, seen: Seen) -> str:
+def _flagged(wanted: int, answer: Answer, observed: Observed) -> str:
     assert answer.said is not None
     return "" if answer.said.flags == wanted else f"{answer.said.flags:02X}h"
 
@@ -218,8 +218,8 @@ def status(script: TrialScript) -> None:
     _says(script, "the chips' status", _status, gap_ms=70.0)
     end = script.now
 
-    def differ(seen: Seen) -> Found:
-        last = seen.periods[-1][1]
+    def differ(observed: Observed) -> Found:
+        last = observed.periods[-1][1]
         if last.left.status == last.right.status:
             return end, f"{last.left.status:02X}h in both"
         return None
@@ -235,10 +235,10 @@ def _run_away(script: TrialScript) -> None:
         script.team(script.same(slot, 16000, 50), gap_ms=30.0)
 
 
-def _status(answer: Answer, seen: Seen) -> str:
+def _status(answer: Answer, observed: Observed) -> str:
     said = answer.said
     assert said is not None
-    before, after = _around(answer, seen)
+    before, after = _around(answer, observed)
     left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
     for side, (one, other), others, found in (
         ("left", left, right, said.status_left),
@@ -250,12 +250,12 @@ def _status(answer: Answer, seen: Seen) -> str:
     return ""
 
 
-def _around(answer: Answer, seen: Seen) -> tuple[RobotPeriod, RobotPeriod]:
+def _around(answer: Answer, observed: Observed) -> tuple[RobotPeriod, RobotPeriod]:
     """The robot at the start of the last control period before an answer was asked for, and of the first after it."""
     begun = answer.frame.start_tick - ms(14.0)
-    before = [record for tick, record in seen.periods if tick <= begun]
-    after = [record for tick, record in seen.periods if tick >= answer.tick]
-    return before[-1], (after or [seen.periods[-1][1]])[0]
+    before = [record for tick, record in observed.periods if tick <= begun]
+    after = [record for tick, record in observed.periods if tick >= answer.tick]
+    return before[-1], (after or [observed.periods[-1][1]])[0]
 
 
 @CHAPTER.rule(
@@ -300,10 +300,10 @@ def _stands(script: TrialScript, slot: int) -> None:
     script.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
 
 
-def _positions(answer: Answer, seen: Seen) -> str:
+def _positions(answer: Answer, observed: Observed) -> str:
     said = answer.said
     assert said is not None
-    before, after = _around(answer, seen)
+    before, after = _around(answer, observed)
     left = (before.left.real_position, after.left.real_position)
     right = (before.right.real_position, after.right.real_position)
     for side, ends, others, found in (
@@ -319,17 +319,17 @@ def _positions(answer: Answer, seen: Seen) -> str:
     return ""
 
 
-def _read_at_once(answer: Answer, seen: Seen) -> str:
+def _read_at_once(answer: Answer, observed: Observed) -> str:
     """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
     said = answer.said
     assert said is not None
     for side, found in (("left", said.position_left), ("right", said.position_right)):
-        read = seen.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
+        read = observed.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
         if read and found not in read:
             where = f"{number(found)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
             mixed = any(found in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
             return f"{where}: its bytes are of two samples" if mixed else where
-    return _positions(answer, seen)
+    return _positions(answer, observed)
 
 
 def _within(position: int, ends: tuple[int, int]) -> bool:
@@ -365,7 +365,7 @@ def accepted(script: TrialScript) -> None:
         counted(count)
 
 
-def _counts(name: str, wanted: int, answer: Answer, seen: Seen) -> str:
+def _counts(name: str, wanted: int, answer: Answer, observed: Observed) -> str:
     assert answer.said is not None
     found = int(getattr(answer.said, name))
     return "" if found == wanted % 256 else number(found, 2)

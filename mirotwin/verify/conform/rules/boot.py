@@ -8,9 +8,9 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import POWER_ON
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Power-on")
@@ -44,27 +44,27 @@ def reset_together(script: TrialScript) -> None:
     script.obeyed(first)
     end = script.now
 
-    def shown(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(ms(BOOTED_MS), first.tick):
+    def shown(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(ms(BOOTED_MS), first.tick):
             if chip.status not in (0x80, 0xC0):
                 return tick, f"{chip.status:02X}h of the {side} one"
         return None
 
-    def alone(seen: Seen) -> Found:
-        resets = [(one.tick, one.side) for one in seen.commands if one.opcode == _RESET]
+    def alone(observed: Observed) -> Found:
+        resets = [(one.tick, one.side) for one in observed.commands if one.opcode == _RESET]
         for tick, side in resets:
             if len([at for at, _ in resets if at == tick]) != len(SIDES):
                 return tick, f"RESET to the {side} one"
         return None
 
-    def other_mask(seen: Seen) -> Found:
-        for one in seen.commands:
+    def other_mask(observed: Observed) -> Found:
+        for one in observed.commands:
             if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
                 return one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
         return None
 
-    def apart(seen: Seen) -> Found:
-        for tick, left, right in seen.samples:
+    def apart(observed: Observed) -> Found:
+        for tick, left, right in observed.samples:
             if tick > ms(BOOTED_MS) and NEVER_TICK in (left, right):
                 return tick, "one in reset"
             if tick > ms(BOOTED_MS) and (left - right) % SAMPLE_TICKS:
@@ -92,14 +92,14 @@ def ready(script: TrialScript) -> None:
 def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
     """Expects both motors off in between; the chips have `BOOTED_MS` for their reset."""
 
-    def ordered(seen: Seen) -> Found:
-        for order in seen.ordered(after_tick, until_tick):
+    def ordered(observed: Observed) -> Found:
+        for order in observed.ordered(after_tick, until_tick):
             if order.what != "off":
                 return order.tick, f"the {order.side} one told {in_words(order)}"
         return None
 
-    def driven(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(after_tick + ms(BOOTED_MS), until_tick):
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(after_tick + ms(BOOTED_MS), until_tick):
             if chip.pwm_magnitude:
                 return tick, f"the {side} one driven"
             if not chip.status & MOTOR_OFF:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
+from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
 from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.seen import Answer, Seen
 from mirotwin.verify.conform.trial_script import Found, TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
@@ -73,8 +73,8 @@ def _tells_of_them(script: TrialScript) -> None:
         script.answered(script.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
     end = script.now
 
-    def driven(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(0, end):
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(0, end):
             if chip.pwm_magnitude:
                 return tick, f"the {side} one driven"
         return None
@@ -82,16 +82,16 @@ def _tells_of_them(script: TrialScript) -> None:
     script.expect(end, "both motors off", driven)
 
 
-def _free(answer: Answer, seen: Seen) -> str:
+def _free(answer: Answer, observed: Observed) -> str:
     said = answer.said
     assert said is not None
     if said.status_left & _BUSY or said.status_right & _BUSY:
         return f"status {said.status_left:02X}h and {said.status_right:02X}h, read while busy (01h)"
-    return _says(0, Flags.INIT_FAILED)(answer, seen)
+    return _says(0, Flags.INIT_FAILED)(answer, observed)
 
 
-def _says(wanted: int, among: int) -> Callable[[Answer, Seen], str]:
-    def says(answer: Answer, seen: Seen) -> str:
+def _says(wanted: int, among: int) -> Callable[[Answer, Observed], str]:
+    def says(answer: Answer, observed: Observed) -> str:
         assert answer.said is not None
         return "" if answer.said.flags & among == wanted else f"{answer.said.flags:02X}h"
 

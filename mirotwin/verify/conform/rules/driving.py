@@ -9,10 +9,10 @@ from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.probe import why_deaf
 from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial_script import ACTING_MS, Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")
@@ -133,11 +133,11 @@ def one_sample(script: TrialScript) -> None:
 
 
 def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) -> None:
-    def test(seen: Seen) -> Found:
-        left, right = seen.both_told(until_tick)
+    def test(observed: Observed) -> Found:
+        left, right = observed.both_told(until_tick)
         if min(left.tick, right.tick) <= after_tick:
             return until_tick, "a wheel that was told nothing"
-        grid = seen.samples[-1][1]
+        grid = observed.samples[-1][1]
         if (left.tick - grid) // SAMPLE_TICKS != (right.tick - grid) // SAMPLE_TICKS:
             return max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
         return None
@@ -160,14 +160,14 @@ def kept(script: TrialScript) -> None:
         _reached(script, frame)
 
 
-def _why_not_reached(seen: Seen, tick: int) -> str:
-    told = seen.both_told(tick)
+def _why_not_reached(observed: Observed, tick: int) -> str:
+    told = observed.both_told(tick)
     if not all(order.moves for order in told):
         return ""
     if not all(order.acceleration for order in told):
         return ": an acceleration of 0 is loaded"
-    begun = next(order.tick for order in seen.ordered(0, tick) if order.moves)
-    for one in seen.wrote(begun, tick):
+    begun = next(order.tick for order in observed.ordered(0, tick) if order.moves)
+    for one in observed.wrote(begun, tick):
         if one.opcode == _LTRJ and one.data[1] & _ACCELERATION:
             return f": at tick {one.tick} an acceleration was loaded in motion, {one.side} LTRJ {one.data.hex(' ')}"
     return ""
@@ -177,12 +177,12 @@ def _reached(script: TrialScript, frame: Frame) -> None:
     """Both chips run at the frame's velocities 20 ms after it."""
     after_tick, until_tick = frame.end_tick + ms(20.0), script.now
 
-    def test(seen: Seen) -> Found:
-        wanted = frame.for_robot(seen.slot)
-        for tick, record in seen.periods:
+    def test(observed: Observed) -> Found:
+        wanted = frame.for_robot(observed.slot)
+        for tick, record in observed.periods:
             found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
             if after_tick <= tick <= until_tick and found != wanted:
-                return tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(seen, tick)}"
+                return tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(observed, tick)}"
         return None
 
     assert until_tick - after_tick > CONTROL_PERIOD_TICKS

@@ -16,9 +16,9 @@ from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")
@@ -115,10 +115,10 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
     """From one control period to the next the velocities fall by what the acceleration makes in 97 or 98 samples."""
     samples = CONTROL_PERIOD_TICKS // SAMPLE_TICKS
 
-    def test(seen: Seen) -> Found:
+    def test(observed: Observed) -> Found:
         before: dict[str, int] = {}
         steps = 0
-        for tick, side, chip in seen.chips(after_tick, until_tick):
+        for tick, side, chip in observed.chips(after_tick, until_tick):
             now = abs(chip.desired_velocity)
             fallen = before.get(side, now) - now
             if side in before and now:  # the last step is a part of one
@@ -138,8 +138,8 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
 def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
     """No abrupt stop, and the motors stay on."""
 
-    def test(seen: Seen) -> Found:
-        for order in seen.ordered(last.end_tick + ACTING_TICKS, until_tick):
+    def test(observed: Observed) -> Found:
+        for order in observed.ordered(last.end_tick + ACTING_TICKS, until_tick):
             if order.abrupt or order.what == "off":
                 return order.tick, f"the {order.side} wheel told {in_words(order)}"
         return None
@@ -160,8 +160,8 @@ def off(script: TrialScript) -> None:
     off_behind(script, last)
     script.wait_until(last.end_tick + ms(700.0))
 
-    def driven(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(last.end_tick + ms(501.0), script_end):
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(last.end_tick + ms(501.0), script_end):
             if chip.pwm_magnitude or not chip.status & MOTOR_OFF:
                 return tick, f"the {side} one on"
         return None
@@ -189,14 +189,18 @@ def _turning(script: TrialScript, frame: Frame) -> None:
     """Both wheels turn as told, as seen from the encoders, when they had time for it."""
     until = frame.end_tick + ms(60.0)
 
-    def test(seen: Seen) -> Found:
-        *_, one, other = (record for tick, record in seen.periods if tick <= until)
+    def test(observed: Observed) -> Found:
+        *_, one, other = (record for tick, record in observed.periods if tick <= until)
         left = other.left.real_position - one.left.real_position
         right = other.right.real_position - one.right.real_position
-        for side, moved, word in zip(SIDES, (left, right), frame.for_robot(seen.slot), strict=True):
+        for side, moved, word in zip(SIDES, (left, right), frame.for_robot(observed.slot), strict=True):
             nominal = word * CONTROL_PERIOD_TICKS / SAMPLE_TICKS / 256
             if abs(moved - nominal) > abs(nominal) / 2:
-                why = "" if seen.set_to(side, until) else ": no filter was loaded into its LM629 (LFIL, UDF)"
+                why = (
+                    ""
+                    if observed.set_to(side, until)
+                    else ": no filter was loaded into its LM629 (LFIL, UDF)"
+                )
                 return (
                     until,
                     f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}{why}",
@@ -221,29 +225,29 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
     rule.begin(last.last_tick)
     earliest, latest = rule.earliest_tick(), rule.latest_tick()
 
-    def done(seen: Seen, side: str, tick: int) -> bool:
-        order = seen.told(side, tick)
+    def done(observed: Observed, side: str, tick: int) -> bool:
+        order = observed.told(side, tick)
         return order.what == "off" if what == "off" else not order.moves
 
-    def test(seen: Seen) -> Found:
+    def test(observed: Observed) -> Found:
         for side in SIDES:
-            if done(seen, side, earliest):
-                early = seen.told(side, earliest).tick
+            if done(observed, side, earliest):
+                early = observed.told(side, earliest).tick
                 if early <= last.tick:
                     return (
                         latest,
-                        f"the {side} one told {in_words(seen.told(side, earliest))} before it already",
+                        f"the {side} one told {in_words(observed.told(side, earliest))} before it already",
                     )
                 return early, f"the {side} one {in_ms(early - last.end_tick)} after its end"
-        if all(done(seen, side, latest) for side in SIDES):
+        if all(done(observed, side, latest) for side in SIDES):
             return None
-        return latest, ", ".join(when(seen, side) for side in SIDES)
+        return latest, ", ".join(when(observed, side) for side in SIDES)
 
-    def when(seen: Seen, side: str) -> str:
-        after = [order.tick for order in seen.orders[side] if order.tick > last.end_tick]
-        tick = next((one for one in after if done(seen, side, one)), None)
+    def when(observed: Observed, side: str) -> str:
+        after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]
+        tick = next((one for one in after if done(observed, side, one)), None)
         if tick is None:
-            return f"{side} not within {in_ms(seen.end_tick - last.end_tick)}"
+            return f"{side} not within {in_ms(observed.end_tick - last.end_tick)}"
         return f"{side} at {in_ms(tick - last.end_tick)}"
 
     window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"

@@ -6,11 +6,11 @@ from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import number
+from mirotwin.verify.conform.observed import Observed, Words
 from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.verify.conform.rules.failsafe import stops_behind
 from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.seen import Seen, Words
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Service frames and unknown contents")
@@ -64,9 +64,9 @@ def filter_words(script: TrialScript) -> None:
 def _filter_taken(script: TrialScript, frame: Frame, words: Words) -> None:
     deadline = frame.end_tick + ACTING_TICKS
 
-    def test(seen: Seen) -> Found:
+    def test(observed: Observed) -> Found:
         for side in SIDES:
-            found = seen.set_to(side, deadline)
+            found = observed.set_to(side, deadline)
             if found != words:
                 return deadline, f"{_listed(found)} in the {side} one"
         return None
@@ -139,8 +139,8 @@ def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
     script.obeyed(frame)
     deadline = frame.end_tick + ACTING_TICKS
 
-    def test(seen: Seen) -> Found:
-        for order in seen.both_told(deadline):
+    def test(observed: Observed) -> Found:
+        for order in observed.both_told(deadline):
             if order.acceleration != value:
                 return deadline, f"{number(order.acceleration, 8)} in the {order.side} one"
         return None
@@ -173,9 +173,9 @@ def addressed(script: TrialScript) -> None:
 def _only_of(script: TrialScript, frame: Frame, slot: int, words: Words) -> None:
     deadline = frame.end_tick + ACTING_TICKS
 
-    def test(seen: Seen) -> Found:
+    def test(observed: Observed) -> Found:
         for side in SIDES:
-            found = seen.set_to(side, deadline)
+            found = observed.set_to(side, deadline)
             if found != words:
                 return deadline, f"{_listed(found)} in the {side} one"
         return None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from miro_protocol.table import SYNC, Opcode
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FAULTS, POWER_ON
 from mirotwin.verify.conform.rules.boot import keeps_off
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Soundness")
@@ -18,8 +18,8 @@ def nothing_refused(script: TrialScript) -> None:
     """Expects that no LM629 refused a command up to now."""
     end = script.now
 
-    def refused(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(0, end):
+    def refused(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(0, end):
             if chip.status & COMMAND_ERROR:
                 return tick, f"command error of the {side} one"
         return None
