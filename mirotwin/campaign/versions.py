@@ -12,8 +12,22 @@ from pathlib import Path
 import msgspec
 
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
-NOT_OF_RUNS = ("cli", "bridges", "capture", "foxglove", "looking", "page", "reproduce", "starter", "testing")
-"""Rooms of `mirotwin` that no run of a campaign uses."""
+NOT_OF_RUNS = (
+    "camera",
+    "campaign/reproduce",
+    "debug",
+    "desk",
+    "firmware",
+    "fuzz",
+    "ports",
+    "recording/capture",
+    "replay",
+    "report/foxglove",
+    "report/page",
+    "run",
+    "testing",
+)
+"""Folders of `mirotwin` that no run of a campaign uses."""
 GROUPS = ("mirotwin.laws", "mirotwin.estimators", "mirotwin.references", "mirotwin.checks")
 
 
@@ -66,9 +80,9 @@ def _code() -> str:
         root = Path(spec.origin).parent
         files = [path for suffix in ("*.py", "*.pxd", "*.pyx", "*.toml") for path in root.rglob(suffix)]
         for path in sorted(files, key=lambda path: path.relative_to(root).as_posix()):
-            place = path.relative_to(root)
-            if package == "mirotwin" and place.parts[0] in NOT_OF_RUNS:
+            name = path.relative_to(root).as_posix()
+            if package == "mirotwin" and name.startswith(tuple(f"{folder}/" for folder in NOT_OF_RUNS)):
                 continue
-            digest.update(f"{package}/{place.as_posix()}\0".encode())
+            digest.update(f"{package}/{name}\0".encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]

@@ -6,15 +6,18 @@ import signal
 import sys
 import threading
 from concurrent.futures import Executor, Future
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
+import mirotwin
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
 from miro_sim.world.world import World
 from mirotwin import campaign
 from mirotwin.campaign.drive import Drive
+from mirotwin.campaign.versions import NOT_OF_RUNS
 from mirotwin.campaign.worker import RunOutcome, work
 from mirotwin.campaign.workers import Processes, Workers
 from tests import children
@@ -109,6 +112,20 @@ def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
     )
     done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_run_uses_no_source_that_is_left_out_of_the_hash_of_its_sources():
+    script = (
+        "import sys; from tests.mirotwin.campaign.plans import plan_of\n"
+        "from mirotwin.campaign.worker import work\n"
+        "from mirotwin.campaign.versions import NOT_OF_RUNS\n"
+        "assert not work(plan_of().work(0)).error\n"
+        "rooms = tuple(f\"mirotwin.{name.replace('/', '.')}.\" for name in NOT_OF_RUNS)\n"
+        "print([name for name in sys.modules if name.startswith(rooms)])"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+    assert all((Path(mirotwin.__file__).parent / name).is_dir() for name in NOT_OF_RUNS)
 
 
 def test_the_uncompiled_engine_writes_the_same_bytes(tmp_path):
