@@ -7,10 +7,9 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, shortened
@@ -21,6 +20,9 @@ from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.command import Argument, Option
 from mirotwin.shell.times import TimeType
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 
 class Whole(click.IntRange):
@@ -70,6 +72,8 @@ class ScenarioName(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
+        from click.shell_completion import CompletionItem  # only a shell that completes needs it
+
         names = [name for name in builtin_names() if name.startswith(incomplete)]
         return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
 
