@@ -228,8 +228,12 @@ class DeclaredOption(click.Option):
         return extra
 
 
-class _Command(click.Command):
-    """A command whose help shows options that have a heading below that."""
+class RecordCommand(click.Command):
+    """A command of a record; its help shows options that have a heading below that."""
+
+    def __init__(self, *args: Any, record: type[Options], **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.record = record
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         groups: dict[str, list[tuple[str, str]]] = {"": []}
@@ -252,8 +256,9 @@ def command_of(record: type[Record]) -> Callable[[Callable[[Record], int | None]
             options.refuse()
             return function(options)
 
-        return _Command(
+        return RecordCommand(
             function.__name__,
+            record=record,
             callback=called,
             params=list(_parameters(record)),
             help=cleandoc(function.__doc__ or ""),

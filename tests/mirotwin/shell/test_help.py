@@ -1,11 +1,17 @@
 """The help of all commands and groups: it can be shown, and it leaves no option without a word."""
 
+import shlex
 from collections import defaultdict
 
 import click
+import pytest
 
 from mirotwin.commands import main
-from mirotwin.shell.command import DeclaredOption
+from mirotwin.run.run_options import DEFAULT, RunOptions
+from mirotwin.shell.command import DeclaredOption, RecordCommand
+from mirotwin.testing.test_command import TestOptions
+from mirotwin.verify.cases.artifacts import report_line
+from mirotwin.verify.cases.replay_line import replay_line
 
 
 def commands(command, name):
@@ -71,3 +77,27 @@ def test_the_list_of_commands_fits_a_screen():
     lines = main.get_help(click.Context(main, info_name="mirotwin")).splitlines()
     assert len(lines) <= 40
     assert max(map(len, lines)) <= 80
+
+
+def test_every_record_knows_the_words_of_its_command():
+    wrong = {
+        name: command.record.COMMAND
+        for name, command in commands(main, "mirotwin")
+        if isinstance(command, RecordCommand) and name != f"mirotwin {command.record.COMMAND}"
+    }
+    assert wrong == {}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        replay_line("-a b.stream", "late.ihx", "mine.py:never"),
+        report_line("-folder").removeprefix("page: "),
+        TestOptions(paths=("a", "b"), seed=3, settings=("x=1",), expected=("no_fault",)).command_line(),
+        RunOptions(scenario="fig6", settings=("duration_s=1",), live=DEFAULT, pace=0.0).command_line(),
+    ],
+)
+def test_a_line_that_is_printed_is_one_that_the_program_takes(line):
+    _, name, *words = shlex.split(line)
+    command = main.get_command(click.Context(main), name)
+    assert command.make_context(name, words).params
