@@ -196,7 +196,7 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_left(mirotwin, short, 
 
     refused(vcd(short, "--from", "5ms", "--to", "5ms", "--out", out), "the window is empty")
     refused(vcd(short, "--from", "9s", "--out", out), "the run ends at tick 4804800; look earlier")
-    refused(vcd(short), "Missing option '--out'")
+    refused(vcd(short), "Missing option '-o' / '--out'")
     refused(vcd(short, "--out", tmp_path / "no" / "x.vcd"), "there is no folder")
     refused(vcd(short, "--out", tmp_path), "is a folder")
     refused(vcd(short, "--out", tmp_path / "x.gtkw"), "name of the GTKWave save file")

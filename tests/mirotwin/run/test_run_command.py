@@ -216,7 +216,7 @@ def test_the_shortest_duration_is_one_control_period(mirotwin, tmp_path):
     ("arguments", "expected"),
     [
         (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
-        (["--out", ""], "Invalid value for '--out': the path is empty."),
+        (["--out", ""], "Invalid value for '-o' / '--out': the path is empty."),
         (["--firmware", ""], "Invalid value for '--firmware': the path is empty."),
         (
             ["--firmware", "no.ihx"],

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from miro_sim.scenario.file import builtin_text, parse
 from mirotwin.commands import main
-from mirotwin.shell.program import Program
+from mirotwin.shell.program import MainGroup
 from mirotwin.verify.checks.registry import CHECKS
 
 
@@ -95,7 +95,7 @@ FULL_DISK = OSError(28, "No space left on device", "out/run.mcap")
     ],
 )
 def test_what_comes_from_outside_is_no_traceback_either(raised, code, line):
-    @click.group(cls=Program)
+    @click.group(cls=MainGroup)
     def group() -> None: ...
 
     @group.command()
@@ -107,7 +107,7 @@ def test_what_comes_from_outside_is_no_traceback_either(raised, code, line):
 
 
 def test_a_mistake_of_the_program_itself_asks_for_a_report():
-    @click.group(cls=Program)
+    @click.group(cls=MainGroup)
     def group() -> None: ...
 
     @group.command()
