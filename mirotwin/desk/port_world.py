@@ -48,11 +48,11 @@ class PortWorld:
     `accepted` and `rejected` count from there, as from a power-on.
     """
 
-    def __init__(self, port: RobotPort, scenario: Scenario) -> None:
+    def __init__(self, port: RobotPort, scenario: Scenario, next_seq: int = 0) -> None:
         self.port = port
         self.scenario = scenario
         spec = scenario.networks[0]
-        self.greeting: Greeting = greet(port, spec.robots)
+        self.greeting: Greeting = greet(port, spec.robots, next_seq)
         self.began_tick = port.tick
         self.end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
         self.networks = [PortNetwork(spec, HostLog(0, lambda tick: tick))]

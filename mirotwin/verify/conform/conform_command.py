@@ -12,6 +12,7 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
+from mirotwin.desk.options import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.firmware_image import load_firmware
@@ -40,6 +41,7 @@ from mirotwin.verify.cases.artifacts import (
     report_line,
 )
 from mirotwin.verify.cases.case import write_case
+from mirotwin.verify.conform.by_answers import PORT_VERDICTS, PortOutcome, try_at_port
 from mirotwin.verify.conform.causes import begin_with, causes_first, folded
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
@@ -75,6 +77,7 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     seed: Annotated[int, SEED.saying("Seed of the noise between keyed frames.")] = 0
     stack_from: StackFrom = None
     engine: Engine = None
+    desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No progress bar, and of the table the rules that failed.")] = False
 
 
@@ -86,6 +89,10 @@ def conform(options: ConformOptions) -> int:
     no symbols. Each trial is a world of its own that ends after a known time, whatever the firmware does.
 
     Rules presuppose others. One whose presupposition failed is not judged; the table begins with what to repair first.
+
+    With --port the rules that answers can show are tried on a real robot. A rule that they cannot show is not
+    observable, one that needs times which the PC cannot keep, or motion that is not allowed, is not judged; neither is
+    passed.
 
     Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials.
     """
@@ -99,6 +106,10 @@ def conform(options: ConformOptions) -> int:
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", options.image)
+    if options.desk.port:
+        if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
+            raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
+        return _conform_at_port(rules, options, options.desk.port)
     firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
     if options.explain is not None:
         return _explain(find(options.explain), firmware, options.seed)
@@ -131,6 +142,43 @@ def conform(options: ConformOptions) -> int:
     return _report_faults(outcomes) or (
         DONE if all(outcome.passed for outcome in outcomes) else EXPECTATION_FAILED
     )
+
+
+def _conform_at_port(rules: Sequence[Rule], options: ConformOptions, url: str) -> int:
+    """Tries rules on the robot at the port; the exit code."""
+    outcomes: list[PortOutcome] = []
+    names = {rule.id: rule.name for rule in rules}
+    with ProgressBar("trying rules", len(rules), options.quiet) as bar:
+        for outcome in try_at_port(rules, url, options.desk.limits):
+            outcomes.append(outcome)
+            bar.to(len(outcomes))
+            if options.as_json:
+                click.echo(msgspec.json.encode(outcome))
+    if options.junit is not None:
+        verdicts = {"passed": "passed", "failed": "failure"}
+        cases = [
+            TestCase(
+                name=f"{one.rule} {names[one.rule]}",
+                classname="conform.port",
+                verdict=verdicts.get(one.verdict, "skipped"),  # type: ignore[arg-type]
+                lines=[one.text] if one.text else [],
+            )
+            for one in outcomes
+        ]
+        with whole_file(options.junit, "--junit") as part:
+            part.write_bytes(junit_xml("mirotwin conform", cases, {"port": url}))
+    if not options.as_json:
+        table = Table(box=None, pad_edge=False)
+        for head in ("rule", "name", "verdict", "why"):
+            table.add_column(head, overflow="fold")
+        for one in outcomes:
+            if one.verdict == "failed" or not options.quiet:
+                table.add_row(one.rule, names[one.rule], one.verdict, one.text)
+        if table.rows:
+            show(table)
+        counts = [f"{sum(one.verdict == verdict for one in outcomes)} {verdict}" for verdict in PORT_VERDICTS]
+        show(f"{len(outcomes)} rules: {', '.join(counts)}")
+    return EXPECTATION_FAILED if any(one.verdict == "failed" for one in outcomes) else DONE
 
 
 def _explain(rule: Rule, firmware: Image, seed: int) -> int:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+from mirotwin.verify.conform.by_answers import LEFT_OUT, NOT_OBSERVABLE
 from mirotwin.verify.conform.rule import Rule, Topology
 from mirotwin.verify.conform.table import CHAPTERS
 
@@ -17,13 +18,22 @@ def render() -> str:
 
 def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
     yield f"### {title}\n"
-    yield "| rule | name | a robot must | from | tried with | presupposes |"
-    yield "|---|---|---|---|---|---|"
+    yield "| rule | name | a robot must | from | tried with | presupposes | by answers |"
+    yield "|---|---|---|---|---|---|---|"
     for rule in rules:
         topologies = "; ".join(dict.fromkeys(map(_topology, rule.topologies))) + _chips(rule.lm629)
         text, before = rule.text.replace("|", chr(92) + "|"), ", ".join(rule.presupposes)
-        yield f"| {rule.id} | {rule.name} | {text} | {_source(rule.source)} | {topologies} | {before} |"
+        cells = (rule.id, rule.name, text, _source(rule.source), topologies, before, _by_answers(rule))
+        yield f"| {' | '.join(cells)} |"
     yield ""
+
+
+def _by_answers(rule: Rule) -> str:
+    """Whether a port shows it, and what of its trial no PC can do."""
+    if rule.id in NOT_OBSERVABLE:
+        return f"no: {NOT_OBSERVABLE[rule.id]}"
+    left_out = [what for what, ids in LEFT_OUT.items() if rule.id in ids]
+    return f"yes, without {' and '.join(left_out)}" if left_out else "yes"
 
 
 def _source(source: str) -> str:

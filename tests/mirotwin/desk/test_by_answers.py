@@ -1,0 +1,91 @@
+"""`mirotwin conform --port`: the rules that answers can show, on a robot in virtual time."""
+
+import json
+
+import pytest
+
+from mirotwin.verify.conform.by_answers import ANSWERS, COUNTED, NOT_OBSERVABLE
+from mirotwin.verify.conform.table import ALL
+from tests.mirotwin.desk.rig import ROBOT
+from tests.mutants.build import build, compiler
+from tests.mutants.draw import source_files
+from tests.mutants.planted import PLANTED
+
+QUICK = "set=camera={kind=%22gaussian%22}"
+SEEN = tuple(rule for rule in (*ANSWERS, *COUNTED) if rule != "P61")
+
+
+def verdicts(mirotwin, robot, rules, *options):
+    code, out, err = mirotwin(
+        *("conform", "--json", "-q", "--port", robot, *options),
+        *(word for rule in rules for word in ("--rule", rule)),
+    )
+    found = {line["rule"]: line for line in map(json.loads, out.splitlines())}
+    assert code == (1 if any(one["verdict"] == "failed" for one in found.values()) else 0), err
+    return found
+
+
+def test_every_rule_is_either_seen_or_said_why_not():
+    seen = [*ANSWERS, *COUNTED, *NOT_OBSERVABLE]
+    assert sorted(seen) == sorted(rule.id for rule in ALL)
+
+
+@pytest.mark.parametrize("rule", SEEN)
+def test_the_shipped_firmware_passes_each_rule_that_answers_show(mirotwin, rule):
+    found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])
+    assert found[rule] == {"rule": rule, "verdict": "passed", "text": ""}
+
+
+def test_what_answers_do_not_show_is_never_passed(mirotwin):
+    found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", NOT_OBSERVABLE)
+    assert {one["verdict"] for one in found.values()} == {"not observable"}
+
+
+def test_verdicts_are_counted(mirotwin):
+    code, out, _ = mirotwin("conform", "--port", f"{ROBOT}&{QUICK}", "--rule", "P05", "--rule", "P24")
+    assert code == 0
+    assert out.splitlines()[-1] == "2 rules: 1 passed, 0 failed, 0 not judged, 1 not observable"
+
+
+def test_options_of_the_twin_are_refused(mirotwin):
+    code, _, err = mirotwin("conform", "--port", ROBOT, "--seed", 3)
+    assert (code, "--seed: is not for a robot at a port" in err) == (2, True)
+
+
+FOUND = {
+    "acts on a frame that is repeated": "P20",
+    "takes step 0 for fresh": "P17",
+    "takes any other step for fresh": "P17",
+    "takes frames with a bad CRC": "P07",
+    "takes frames of another layout too": "P06",
+    "loses sync for good after a bad CRC": "P07",
+    "does not count damaged frames": "P49",
+    "counts stale frames as accepted": "P17",
+    "goes off 100 ms late": "P45",
+    "answers frames that ask nobody": "P43",
+    "tells what happened again and again": "P45",
+}
+"""Mistakes that answers show, and the rule that finds them."""
+UNSEEN = ("stops by opening the loops", "takes bad stop bits", "takes the velocities of the robot before it")
+
+
+def robot_with(name):
+    planted = PLANTED[name]
+    made = build({planted.file: planted.applied(source_files()[planted.file])})
+    return f"{ROBOT}&{QUICK}&firmware={made.image}"
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@pytest.mark.parametrize("name", FOUND)
+def test_a_mistake_that_answers_show_is_found(mirotwin, name):
+    rule = FOUND[name]
+    found = verdicts(mirotwin, robot_with(name), [rule])[rule]
+    assert (found["verdict"], found["text"][:6]) == ("failed", "wanted")
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@pytest.mark.parametrize("name", UNSEEN)
+def test_a_mistake_that_answers_do_not_show_passes_nothing_that_it_breaks(mirotwin, name):
+    rules = {"stops by opening the loops": "P31", "takes bad stop bits": "P09"}
+    rule = rules.get(name, "P22")
+    assert verdicts(mirotwin, robot_with(name), [rule])[rule]["verdict"] == "not observable"
