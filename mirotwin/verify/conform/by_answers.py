@@ -22,8 +22,8 @@ from mirotwin.desk.guard import MotionLimits
 from mirotwin.desk.port_world import PortWorld
 from mirotwin.desk.robot_port import RobotPort
 from mirotwin.desk.session import Greeting, greet, play
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial import make_trial
 from mirotwin.verify.conform.trial_script import Expectation, Frame, How, Pairs, TrialScript
 
@@ -179,7 +179,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[str, int]:
     trial = make_trial(msgspec.structs.replace(rule, topologies=(topology,)))
     world = PortWorld(port, trial.scenario, script.first_seq())
     first = len(port.late_ticks)
-    seen = Seen(topology.robots, topology.slots[0])
+    seen = Observed(topology.robots, topology.slots[0])
     cursor = world.networks[0].log.end
 
     def gather(one: Transmission | None = None) -> None:
