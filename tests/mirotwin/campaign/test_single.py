@@ -12,6 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
@@ -20,6 +24,8 @@ from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers, processes
 from mirotwin.recording.reader import read
+from mirotwin.recording.track import Tracks
+from mirotwin.report.summary import tracking_of
 
 SHORT = "duration_s=1.0"
 
@@ -39,6 +45,17 @@ def test_without_delay_noise_and_error_the_camera_sees_the_truth():
         (job,) = jobs(range(1, 2), camera)
         found = run_single(job).figures
         assert found["seen_position_cm"] == pytest.approx(found["rms_position_cm"], rel=near)
+
+
+def test_of_several_robots_the_worst_error_has_a_column(short):
+    job = plan_of_levels("test", [Level("a", scenario=str(short))], range(5, 6)).work(0)
+    world, tracks = World(load(str(short)).scenario, 5, load_hex(image_path())), Tracks()
+    while not world.finished:
+        tracks.add(world.step())
+    errors = [tracking_of(track.errors).rms_position_cm for track in tracks.robots.values()]
+    found = run_single(job).figures
+    assert len(set(errors)) == 2
+    assert (found["rms_position_cm"], found["worst_rms_position_cm"]) == (errors[0], max(errors))
 
 
 def test_outcomes_come_in_the_order_of_the_jobs_and_are_the_same_from_processes():
