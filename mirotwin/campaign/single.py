@@ -20,12 +20,12 @@ from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.recording.recorder import Recorder, source_of
-from mirotwin.recording.track import Tracks
+from mirotwin.recording.track import RobotId, Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.tracebacks import show_traceback
-from mirotwin.verify.checks.expect import RobotId, expectations_of
+from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step

@@ -14,7 +14,7 @@ import msgspec
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording.track import error_of
+from mirotwin.recording.track import RobotId, error_of
 from mirotwin.report.foxglove import camera, frames, notes, paths, pitch, robots, topics
 from mirotwin.report.foxglove.messages import (
     CompressedImage,
@@ -29,9 +29,6 @@ from mirotwin.report.foxglove.shapes import Point
 
 AGAIN = 30
 """Control periods from one message about what stands still to the next."""
-
-RobotId = tuple[int, int]
-"""Network and slot of a robot."""
 
 
 class ErrorMessage(msgspec.Struct, frozen=True):

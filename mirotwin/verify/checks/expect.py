@@ -21,6 +21,7 @@ from miro_host.plugins import PluginError
 from miro_host.raised import raised
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
+from mirotwin.recording.track import RobotId
 from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.plugin_problems import problem_of_class
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
@@ -30,8 +31,6 @@ EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 WHERE_CHECKS_ARE = (
     "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
 )
-RobotId = tuple[int, int]
-"""Network and slot of a robot."""
 
 
 def struct_of(name: str) -> type[Check]:

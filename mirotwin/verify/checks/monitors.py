@@ -28,7 +28,8 @@ from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import RobotId, expectations_of
+from mirotwin.recording.track import RobotId
+from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.hearing import receptions
 from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Monitor, Subject
 from mirotwin.verify.checks.plugin_problems import checked_monitor

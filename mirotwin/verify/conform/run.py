@@ -14,9 +14,9 @@ import msgspec
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_sim.world.world import World
+from mirotwin.recording.track import RobotId
 from mirotwin.verify.cases.case import SUFFIX, case_text
 from mirotwin.verify.cases.trace import Trace
-from mirotwin.verify.checks.expect import RobotId
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
