@@ -19,7 +19,7 @@ from typing import NamedTuple
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
 from miro_exact.state import Flat
 from miro_robot.board import Board
-from miro_robot.event_log import EventLog
+from miro_robot.event_log import REACHED, EventLog
 from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.execute import Executor
 from miro_sim.world.conditions import Condition
@@ -350,8 +350,9 @@ class Timeline:
 
         while not self.run.over and self.machine.tick < until_tick:
             end_tick = (self.machine.tick // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
-            with self._asking(traps, tell):
-                self.run.to(min(end_tick, until_tick))
+            if not self._passes(traps, min(end_tick, until_tick)):
+                with self._asking(traps, tell):
+                    self.run.to(min(end_tick, until_tick))
             if found:
                 return self._land(min(found, key=_order))
             if self.machine.tick == end_tick:
@@ -360,6 +361,25 @@ class Timeline:
                 break
         self._settle()
         return None
+
+    def _passes(self, traps: Mapping[int, Trap], end_tick: int) -> bool:
+        """Runs to `end_tick` without asking, if no instruction that a trap names is executed; else it stays."""
+        machine = self.machine
+        marks = {at: trap.addresses for at, trap in traps.items() if trap.addresses is not None}
+        if not isinstance(machine, _RobotMachine) or len(marks) < len(traps):
+            return False
+        begin_tick, ends = machine.tick, [robot.board.log.end for robot in machine.robots]
+        self.save()
+        for at, addresses in marks.items():
+            machine.robots[at].marks = tuple(addresses)
+        self.run.to(end_tick)
+        for robot in machine.robots:
+            robot.marks = ()
+        logs = zip((robot.board.log for robot in machine.robots), ends, strict=True)
+        if all(log.first <= end and not _reached(log, end) for log, end in logs):
+            return True
+        self._load(bisect.bisect_left(self._kept, begin_tick, key=_tick))
+        return False
 
     def find_back(self, traps: Mapping[int, Trap], closely: bool = False) -> Hit | None:
         """Goes back to the last moment before this one at which a trap finds something; None, at the begin of the run
@@ -429,6 +449,10 @@ class Timeline:
 
 def _tell(tell: Callable[[Hit], bool], core: int, cycle: int, found: object) -> bool:
     return tell(Hit(cycle, core, found))
+
+
+def _reached(log: EventLog, since: int) -> bool:
+    return any(log.event(serial)[1] == REACHED for serial in range(since, log.end))
 
 
 def _tick(one: _Checkpoint) -> int:

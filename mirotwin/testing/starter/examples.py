@@ -20,6 +20,7 @@ EXAMPLES = {
     "checks": "A check in a distribution of its own, to install.",
     "fuzz-slip": "An 8051 firmware that is no robot, its wire format, its check.",
     "foxglove": "A layout for Foxglove.",
+    "vscode": "The extension for VS Code: debugging firmware, backwards too.",
 }
 """Name, and what `mirotwin examples` says of it."""
 PROJECT = "hil"

@@ -1,0 +1,173 @@
+"""The debugger's last writers and stacks beside brute force: `python -m tests.mirotwin.debug.proofs`.
+
+Which bytes an instruction writes is told by executing it twice on a copy of the processor, once with all variables
+complemented: a byte is written if one of the two changes it. Stacks are those of the calls, interrupts and returns that
+were executed. The tests prove a part of it.
+"""
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from miro_exact.clock import CYCLE_TICKS
+from miro_exact.state import Flat
+from miro_robot.bare.machine import BareMachine
+from miro_robot.image import load_hex
+from miro_robot.inspect.frames import Unwinder
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.inspect.watcher import Watcher, attach
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
+from mirotwin.rerun.inspected_run import BareRun
+from tests import children
+from tests.mirotwin.debug.runs import debugger_of, robot_run
+
+RETURNS, JBC = (0x22, 0x32), 0x10
+MIX = Path(__file__).parents[2] / "robot" / "ucsim" / "programs" / "mix.c"
+
+
+def written_bytes(run, begin_tick, end_tick, first, last):
+    """[(cycle, bytes written by the instruction that begins there)] of internal RAM from `first` to `last`."""
+    cpu, state = run.cpu, Flat(run.cpu)
+    copy = Cpu()
+    copy.load(run.image.code)
+    copied = Flat(copy)
+    run.to(begin_tick)
+    run.to(cpu.cycles * CYCLE_TICKS)
+    found = []
+    while cpu.cycles * CYCLE_TICKS < end_tick:
+        if not cpu.idle:
+            before, written = state.save(), set()
+            for mask in (0x00, 0xFF):
+                copied.load(before)
+                if mask and ROW[copy.code_at(copy.pc)] == JBC:
+                    continue  # whether it writes depends on the bit
+                for place in range(first, last):
+                    copy.poke_iram(place, copy.peek_iram(place) ^ mask)
+                seen = [copy.peek_iram(place) for place in range(first, last)]
+                executed = copy.instructions
+                copy.step()
+                if copy.instructions != executed:
+                    written |= {
+                        first + at for at, value in enumerate(seen) if copy.peek_iram(first + at) != value
+                    }
+            found.append((cpu.cycles, written))
+        run.to(cpu.cycles * CYCLE_TICKS + 1)
+    return found
+
+
+def wrong_writers(begin_tick, end_tick, count, seed=0):
+    """(variable, tick, what was found) where the last writer is not that of brute force; and how many were asked."""
+    debugger = debugger_of(robot_run())
+    stack = debugger.symbols.image.symbols.stack()[0]
+    writes = written_bytes(robot_run(), begin_tick, end_tick, 0x20, stack)
+    variables = [
+        one for one in debugger.symbols.variables_in("") if one.space == "iram" and one.address >= 0x20
+    ]
+    ever = set().union(*(written for _, written in writes))
+    often = [one for one in variables if not ever.isdisjoint(range(one.address, one.address + one.type.size))]
+    chance, wrong, asked = random.Random(seed), [], 0
+    for _ in range(count):
+        variable, at = (
+            chance.choice(chance.choice((often, often, variables))),
+            chance.randrange(1, len(writes)),
+        )
+        places = range(variable.address, variable.address + variable.type.size)
+        before = [cycle for cycle, written in writes[:at] if not written.isdisjoint(places)]
+        debugger.timeline.go_to(writes[at][0] * CYCLE_TICKS)
+        found = debugger.last_writer(debugger.bytes_of(variable.name))
+        cycle = None if found is None else found.tick // CYCLE_TICKS
+        asked += bool(before)
+        if (before and cycle != before[-1]) or (not before and cycle is not None and cycle >= writes[0][0]):
+            wrong.append((variable.name, writes[at][0], cycle))
+    return wrong, asked
+
+
+class Shadow(Watcher):
+    """Compares the frames at random instructions with the calls that were made."""
+
+    def __init__(self, image, share, seed=0):
+        self.unwinder = Unwinder(image, SymbolNames(image))
+        self.calls = []
+        self.share, self.chance = share, random.Random(seed)
+        self.compared, self.wrong = 0, []
+
+    def compare(self, cpu):
+        if self.chance.random() < self.share:
+            frames = self.unwinder.frames(cpu)
+            self.compared += 1
+            if [frame.pc for frame in frames[1:]] != self.calls[::-1] or not frames[-1].known:
+                self.wrong.append(cpu.pc)
+
+    def executed(self, cpu, pc, start):
+        opcode = cpu.code_at(pc)
+        if is_call(opcode):
+            self.calls.append(pc + LENGTH[opcode])
+        elif opcode in RETURNS and self.calls:
+            self.calls.pop()
+        self.compare(cpu)
+
+    def interrupted(self, cpu, source, pc, start):
+        self.calls.append(pc)
+        self.compare(cpu)
+
+
+def stacks(run, end_tick, share):
+    """A shadow of the run's stack, compared at a share of its instructions."""
+    shadow = Shadow(run.image, share)
+    attach(run.cpu, shadow)
+    run.to(end_tick)
+    return shadow
+
+
+def assembled(source):
+    """A run of a program in assembler on the bare processor."""
+    from tests.mirotwin.verify.bare.firmwares import image
+
+    return BareRun(BareMachine(image(source), stop_on_fault=False), None, None)
+
+
+def compiled(folder):
+    """A run of the C program that the lock-step with ucsim executes, built by SDCC."""
+    target = Path(folder) / "mix.ihx"
+    children.run(["sdcc", "-mmcs51", "--model-small", "--debug", str(MIX), "-o", str(target)], check=True)
+    return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--writers", type=int, default=1000)
+    parser.add_argument("--stacks", type=int, default=100_000, help="of each firmware")
+    given = parser.parse_args()
+    begun = time.process_time()
+    wrong, asked = wrong_writers(24_000, 2_400_000, given.writers)
+    print(
+        f"last writers: {given.writers} asked, {asked} of them with one in the window; {len(wrong)} wrong {wrong[:5]}"
+    )
+    bad = bool(wrong)
+    from tests.mirotwin.debug.test_debug_command import ASM
+
+    with tempfile.TemporaryDirectory() as folder:
+        runs = {
+            "the robot's own": robot_run("sine"),
+            "SDCC's mix.c": compiled(folder),
+            "assembler": assembled(ASM),
+        }
+        for name, run in runs.items():
+            shadow = stacks(run, 10_000, 0.0)
+            end_tick = 10_000
+            shadow.share = 0.5
+            while shadow.compared < given.stacks and not run.over:
+                end_tick += 2_400_000
+                run.to(end_tick)
+            print(f"stacks of {name}: {shadow.compared} compared, {len(shadow.wrong)} wrong")
+            bad |= bool(shadow.wrong)
+    print(f"{time.process_time() - begun:.1f} s of processor time")
+    return int(bad)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
