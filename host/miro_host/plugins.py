@@ -76,13 +76,13 @@ class Registry(Generic[Plugin]):
             raise PluginError(
                 f"{self.word} {name!r} is in {' and in '.join(sources)}", "uninstall one of them"
             )
-        place = f"{entries[0].value}, from {sources[0]}"
+        entry_point = f"{entries[0].value}, from {sources[0]}"
         try:
             found = entries[0].load()
         except (Exception, SystemExit) as error:
-            what = f"{self.word} {name!r} ({place}) cannot be imported: {raised(error)}"
+            what = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
             raise PluginError(what, f"repair or uninstall {sources[0]}") from error
-        return self._checked(found, name, place)
+        return self._checked(found, name, entry_point)
 
     def _choices(self, name: str) -> str:
         names = self.names()
@@ -90,9 +90,9 @@ class Registry(Generic[Plugin]):
         choices = f"use {', '.join(others)} or {last}" if others else f"use {last}"
         return did_you_mean(name, names, choices)
 
-    def _checked(self, found: Any, name: str, place: str) -> type[Plugin]:
+    def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
         """`found` if it is a struct of parameters as this kind of plug-in needs it."""
-        found_as = f"{self.word} {name!r} ({place})"
+        found_as = f"{self.word} {name!r} ({entry_point})"
         if not (isinstance(found, type) and issubclass(found, _loaded(self.base))):
             raise PluginError(f"{found_as} is not a struct of parameters", f"derive it from {self.base}")
         struct: Any = found
@@ -104,9 +104,9 @@ class Registry(Generic[Plugin]):
         return found
 
 
-def _loaded(place: str) -> Any:
+def _loaded(entry_point: str) -> Any:
     """The attribute that `module:attribute` names."""
-    module, _, attribute = place.partition(":")
+    module, _, attribute = entry_point.partition(":")
     return getattr(import_module(module), attribute)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_sim.periods import Period
+from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of

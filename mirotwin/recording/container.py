@@ -81,7 +81,7 @@ class _Container:
     def __init__(self, source: ByteSource, path: str) -> None:
         self.source = source
         self.path = path
-        self.place = 0  # of the record under way
+        self.offset = 0  # of the record under way
         self.checksum = 0  # of what the next section's CRC covers, so far
         self.data_ended = False
         self.last = b""  # bytes that were read, after the first magic
@@ -100,7 +100,7 @@ class _Container:
             whole = len(body) == size
             try:
                 for record in _in(opcode, body, whole):
-                    yield self.place, record
+                    yield self.offset, record
             except _Compressed as compressed:
                 remedy = "make an uncompressed copy of the file with `mcap decompress`"
                 self._fail(f"a chunk is compressed ({compressed}), which this program does not read", remedy)
@@ -109,7 +109,7 @@ class _Container:
             if not whole:
                 self._cut(opcode)
             self._check(opcode, head, body)
-            self.place += len(head) + len(body)
+            self.offset += len(head) + len(body)
         self._end()
 
     def _begin(self) -> None:
@@ -119,7 +119,7 @@ class _Container:
                 self._cut()
             what = "not an MCAP file" if magic else "empty file"
             self._fail(what, "give a run.mcap that `mirotwin run` wrote")
-        self.place = len(magic)
+        self.offset = len(magic)
         self.checksum = crc32(magic)
 
     def _check(self, opcode: int, head: bytes, body: bytes) -> None:
@@ -143,7 +143,7 @@ class _Container:
             if len(magic) < len(MAGIC):
                 self._cut()
             self._damaged("the closing bytes of an MCAP file are missing here")
-        self.place += len(magic)
+        self.offset += len(magic)
         if self.source.read(1):
             self._fail("there are bytes after the end of the recording", "remove it")
 
@@ -158,15 +158,15 @@ class _Container:
             self._damaged("its length is more than the file holds")
         if not self.data_ended and (within is None or within in _IN_CHUNKS):
             what = "the recording has no end: the run that wrote it was broken off"
-            raise BrokenOff(self.path, f"offset {self.place}", what, "record the run again for a whole one")
+            raise BrokenOff(self.path, f"offset {self.offset}", what, "record the run again for a whole one")
         what, remedy = "the file ends in the middle of a record", "copy it again, or record the run again"
-        raise Cut(self.path, f"offset {self.place}", what, f"it was cut short; {remedy}")
+        raise Cut(self.path, f"offset {self.offset}", what, f"it was cut short; {remedy}")
 
     def _damaged(self, what: str) -> NoReturn:
         self._fail(f"damaged record ({what})", "copy the file again, or record the run again")
 
     def _fail(self, what: str, remedy: str) -> NoReturn:
-        raise RecordingError(self.path, f"offset {self.place}", what, remedy) from None
+        raise RecordingError(self.path, f"offset {self.offset}", what, remedy) from None
 
 
 def _in(opcode: int, body: bytes, whole: bool) -> Iterator[McapRecord]:
@@ -209,16 +209,16 @@ def _in_chunk(body: bytes, whole: bool) -> Iterator[McapRecord]:
     yield from _in_row(body, first, whole)
 
 
-def _in_row(body: bytes, place: int, whole: bool) -> Iterator[McapRecord]:
-    """The records that follow each other in a chunk from `place` on."""
-    while place + _HEAD.size <= len(body):
-        opcode, size = _HEAD.unpack_from(body, place)
-        first, end = place + _HEAD.size, place + _HEAD.size + size
+def _in_row(body: bytes, offset: int, whole: bool) -> Iterator[McapRecord]:
+    """The records that follow each other in a chunk from `offset` on."""
+    while offset + _HEAD.size <= len(body):
+        opcode, size = _HEAD.unpack_from(body, offset)
+        first, end = offset + _HEAD.size, offset + _HEAD.size + size
         if end > len(body):
             break
         if opcode == Opcode.CHUNK:
             raise ValueError("a chunk within a chunk")
         yield from _in(opcode, body[first:end], True)
-        place = end
-    if whole and place != len(body):
+        offset = end
+    if whole and offset != len(body):
         raise ValueError("the last record of a chunk ends after it")

@@ -18,7 +18,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_sim.periods import Period, RobotPeriod
+from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.pitch import ground as pitch
 from mirotwin.recording.channels import TheoryMessage
 from mirotwin.recording.theory_track import TheoryTrack
@@ -30,8 +30,6 @@ NAN = math.nan
 LONGEST_FRAMES = 40
 """More than any camera's delay: so long a reference is kept."""
 
-RobotId = tuple[int, int]
-"""Network and slot of a robot."""
 Column: TypeAlias = "array[float]"
 
 
@@ -184,14 +182,14 @@ class Tracks:
     def add(self, period: Period) -> None:
         """Takes over what is needed of the next control period."""
         for robot in period.robots:
-            place = (robot.network, robot.slot)
-            track = self.robots.get(place)
+            robot_id = (robot.network, robot.slot)
+            track = self.robots.get(robot_id)
             if track is None:
-                track = self.robots[place] = RobotTrack(self.delay_frames)
+                track = self.robots[robot_id] = RobotTrack(self.delay_frames)
             track.add(robot, period.tick)
             track.theory.add(robot, period.tick)
             if robot.control is not None:
-                self._add_inner(place, period.tick, robot.control.inner)
+                self._add_inner(robot_id, period.tick, robot.control.inner)
         self.count += 1
         self.digest = period.digest
 
@@ -201,11 +199,11 @@ class Tracks:
             if track.theory.now is not None:
                 yield network, slot, track.theory.now
 
-    def _add_inner(self, place: RobotId, tick: int, inner: dict[str, float]) -> None:
+    def _add_inner(self, robot_id: RobotId, tick: int, inner: dict[str, float]) -> None:
         for name, value in inner.items():
-            series = self.inner.setdefault(name, {}).get(place)
+            series = self.inner.setdefault(name, {}).get(robot_id)
             if series is None:
-                series = self.inner[name][place] = Series()
+                series = self.inner[name][robot_id] = Series()
             series.append(tick, value)
 
 

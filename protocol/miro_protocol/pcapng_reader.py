@@ -97,12 +97,12 @@ class _BlockReader:
         self.stream = stream
         self.source = source
         self.passed_over = passed_over
-        self.place = 0  # of the block under way
+        self.offset = 0  # of the block under way
         self.order = "<"
         self.interfaces: list[_Interface] = []
 
     def packets(self) -> Iterator[Transmission]:
-        while (head := self.stream.read(_HEAD)) or self.place == 0:
+        while (head := self.stream.read(_HEAD)) or self.offset == 0:
             kind, body = self._block(head)
             if kind == SECTION:
                 self._section(body)
@@ -116,10 +116,10 @@ class _BlockReader:
             elif kind in _OLD_PACKETS:
                 reason = f"{_OLD_PACKETS[kind]} block, which this program does not read"
                 raise self.error(reason, "save the capture again with Wireshark")
-            self.place += len(body) + 12
+            self.offset += len(body) + 12
 
     def error(self, reason: str, remedy: str) -> CaptureError:
-        return CaptureError(self.source, self.place, reason, remedy)
+        return CaptureError(self.source, self.offset, reason, remedy)
 
     def cut(self) -> CaptureError:
         return self.error(
@@ -130,8 +130,8 @@ class _BlockReader:
         return self.error(f"damaged block: {what}", "copy the file again")
 
     def _block(self, head: bytes) -> tuple[int, bytes]:
-        """Kind and body of the block at `place` which begins with `head`, its lengths checked."""
-        if self.place == 0 and not head.startswith(MAGIC):
+        """Kind and body of the block at `offset` which begins with `head`, its lengths checked."""
+        if self.offset == 0 and not head.startswith(MAGIC):
             raise self.error(*_foreign(head))
         if len(head) < _HEAD:
             raise self.cut()
@@ -177,15 +177,15 @@ class _BlockReader:
         return _Interface(link_type, units, struct.unpack(self.order + "q", offset)[0])
 
     def _options(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        place = 0
-        while place + 4 <= len(data):
-            code, size = struct.unpack_from(self.order + "HH", data, place)
+        offset = 0
+        while offset + 4 <= len(data):
+            code, size = struct.unpack_from(self.order + "HH", data, offset)
             if code == 0:
                 return
-            if place + 4 + size > len(data):
+            if offset + 4 + size > len(data):
                 raise self.malformed("option beyond the end of its block")
-            yield code, data[place + 4 : place + 4 + size]
-            place += 4 + size + -size % 4
+            yield code, data[offset + 4 : offset + 4 + size]
+            offset += 4 + size + -size % 4
 
     def _enhanced(self, body: bytes) -> Transmission | None:
         """The packet, or None when it carries no characters."""

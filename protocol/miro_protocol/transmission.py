@@ -44,7 +44,7 @@ class Transmission(msgspec.Struct, frozen=True, gc=False):
     def symbols(self) -> list[Symbol]:
         """The characters one by one, as decoders take them: byte, stop bit good, tick of the start bit."""
         step, bad = character_ticks(self.direction), set(self.bad_stop)
-        return [(byte, place not in bad, self.tick + place * step) for place, byte in enumerate(self.data)]
+        return [(byte, index not in bad, self.tick + index * step) for index, byte in enumerate(self.data)]
 
 
 def character_ticks(direction: str) -> int:
@@ -55,11 +55,11 @@ def character_ticks(direction: str) -> int:
 def check_bad_stop(bad_stop: tuple[int, ...], count: int) -> None:
     """Raises ValueError unless these are indices of `count` characters, ascending."""
     before = -1
-    for place in bad_stop:
-        if not before < place < count:
-            what = f"bad_stop holds {place} behind {before}" if before >= 0 else f"bad_stop holds {place}"
+    for index in bad_stop:
+        if not before < index < count:
+            what = f"bad_stop holds {index} behind {before}" if before >= 0 else f"bad_stop holds {index}"
             raise ValueError(f"{what}: must be ascending indices of {count} characters")
-        before = place
+        before = index
 
 
 def follows(last_tick: int, tick: int) -> bool:
@@ -95,5 +95,5 @@ def joined(one: Transmission, other: Transmission) -> Transmission | None:
         return None
     if not follows(one.end_tick - step, other.tick):
         return None
-    shifted = tuple(len(one.data) + place for place in other.bad_stop)
+    shifted = tuple(len(one.data) + index for index in other.bad_stop)
     return msgspec.structs.replace(one, data=one.data + other.data, bad_stop=one.bad_stop + shifted)

@@ -15,6 +15,9 @@ from miro_protocol.transmission import Transmission
 CommandRecord = tuple[int, int, str]
 """A complete LM629 command: (tick of its last byte, opcode, data bytes in hex)."""
 
+RobotId = tuple[int, int]
+"""Network and slot of a robot."""
+
 
 class Axis(msgspec.Struct, frozen=True):
     """One LM629 as an observer sees it, in the chip's own units.

@@ -49,16 +49,16 @@ def units_line() -> str:
 
 
 def head_line(timed: bool) -> str:
-    place = f"{'tick':>12}  {'t [s]':>10}" if timed else f"{'offset':>10}"
-    return f"{place}  dir  net  {'frame':<12}  seq  {'state':<12}  fields"
+    position = f"{'tick':>12}  {'t [s]':>10}" if timed else f"{'offset':>10}"
+    return f"{position}  dir  net  {'frame':<12}  seq  {'state':<12}  fields"
 
 
 def table_line(row: DecodedRow, timed: bool) -> str:
     """One row; damage shows its first bytes."""
     event = row.event
     tick = event.start_tick
-    place = f"{tick:>12}  {seconds(tick):>10.4f}" if timed else f"{row.offset:>10}"
-    head = f"{place}   {row.direction}   {row.network:>3}"
+    position = f"{tick:>12}  {seconds(tick):>10.4f}" if timed else f"{row.offset:>10}"
+    head = f"{position}   {row.direction}   {row.network:>3}"
     if isinstance(event, Damaged):
         shown = event.data[:SHOWN_BYTES].hex(" ") + (" .." if len(event.data) > SHOWN_BYTES else "")
         return f"{head}  {'damage':<12}    -  {reason(event):<12}  {len(event.data)} bytes: {shown}"
@@ -102,7 +102,7 @@ def _shown(value: Any) -> str:
 def json_line(row: DecodedRow, timed: bool) -> bytes:
     """One row as a JSON object."""
     event = row.event
-    place = {
+    position = {
         "offset": row.offset,
         "tick": event.start_tick if timed else None,
         "time_s": seconds(event.start_tick) if timed else None,
@@ -110,9 +110,9 @@ def json_line(row: DecodedRow, timed: bool) -> bytes:
         "network": row.network,
     }
     if isinstance(event, Damaged):
-        found = {"event": "damage", **place, "reason": reason(event), "data": event.data.hex()}
+        found = {"event": "damage", **position, "reason": reason(event), "data": event.data.hex()}
         return msgspec.json.encode(found)
-    frame: dict[str, Any] = {"event": "frame", **place, "type": kind(event, row.message), "seq": event.seq}
+    frame: dict[str, Any] = {"event": "frame", **position, "type": kind(event, row.message), "seq": event.seq}
     frame["fresh"] = row.fresh
     frame["fields"] = None if row.message is None else _fields(row.message)
     if row.unknown:

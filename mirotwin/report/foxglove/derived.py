@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from miro_sim.periods import Period, RobotPeriod
+from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import RobotId, error_of

@@ -13,11 +13,11 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_sim.periods import RobotId
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.container import Cut
 from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import Messages
-from mirotwin.recording.track import RobotId
 
 QUALITY = 72
 """Of a JPEG; noise of the picture is hardly kept below 60."""

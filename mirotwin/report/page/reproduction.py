@@ -16,7 +16,7 @@ from miro_robot.inspect.coverage import Counts, counts_of
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from miro_robot.inspect.watcher import attach, detach
-from miro_sim.periods import Period
+from miro_sim.periods import Period, RobotId
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.recording.track import RobotId

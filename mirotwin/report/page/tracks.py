@@ -13,9 +13,9 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS, TICKS_PER_SECOND
 from miro_host.wheels import UNITS_PER_COUNT, Wheels
 from miro_robot.lm629.commands import BY_OPCODE
-from miro_sim.periods import Axis, Period, RobotPeriod
+from miro_sim.periods import Axis, Period, RobotId, RobotPeriod
 from mirotwin.recording.channels import SampleMessage
-from mirotwin.recording.track import NAN, RobotId, RobotTrack, Series, column
+from mirotwin.recording.track import NAN, RobotTrack, Series, column
 
 SIDES = ("left", "right")
 M_S_PER_COUNT = UNITS_PER_COUNT / Wheels().units_per_m_s

@@ -19,6 +19,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_host.plugins import PluginError
 from miro_host.raised import raised
+from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import RobotId

@@ -23,12 +23,11 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.plugins import PluginError
 from miro_host.raised import raised
 from miro_protocol.robot_receiver import RobotReceiver
-from miro_sim.periods import Period
+from miro_sim.periods import Period, RobotId
 from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.recording.track import RobotId
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.hearing import receptions
 from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Monitor, Subject

@@ -13,6 +13,7 @@ import msgspec
 
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
+from miro_sim.periods import RobotId
 from miro_sim.world.world import World
 from mirotwin.recording.track import RobotId
 from mirotwin.verify.cases.case import SUFFIX, case_text

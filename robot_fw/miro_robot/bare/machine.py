@@ -149,7 +149,7 @@ class BareMachine:
         if cpu.cycles >= self.next_feed:
             self.next_feed = min(self.input.feed(), self.pins.feed())
         if cpu.cycles >= self.next_check:
-            self.ends = tuple(place for place in self.loops if jumps_to_itself(cpu.code_at, place))
+            self.ends = tuple(address for address in self.loops if jumps_to_itself(cpu.code_at, address))
             self.next_check = cpu.cycles + _SLICE
         end = min(self.next_feed, self.next_check, stop)
         reason = cpu.run_until_any(self.ends if until is None else (*self.ends, until), end)
@@ -167,12 +167,12 @@ class BareMachine:
 
     def _jump_to_itself(self) -> None:
         """Executes it once: the end, or a place where the program waits for interrupts."""
-        place = self.cpu.pc
+        address = self.cpu.pc
         self.cpu.step()
-        if self.cpu.pc == place and not self._interruptible():
+        if self.cpu.pc == address and not self._interruptible():
             self.dead = True
         else:
-            self.ends = tuple(end for end in self.ends if end != place)
+            self.ends = tuple(end for end in self.ends if end != address)
 
     def _sleep_on(self, until_cycle: int) -> None:
         """Runs without asking what could wake the CPU."""
@@ -236,8 +236,8 @@ class BareMachine:
             if loaded:
                 self.cpu.write_code(address, code[address])
         names = self.image.symbols
-        for place, fault in enumerate(self.faults):
-            self.faults[place] = FirmwareFault(fault.kind, fault.tick, fault.pc, names.name_at(fault.pc))
+        for index, fault in enumerate(self.faults):
+            self.faults[index] = FirmwareFault(fault.kind, fault.tick, fault.pc, names.name_at(fault.pc))
 
 
 def _loops(image: Image) -> tuple[int, ...]:

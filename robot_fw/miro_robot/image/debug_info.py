@@ -80,12 +80,12 @@ class DebugInfo:
         index = bisect.bisect_right(self._starts, address) - 1
         if index < 0:
             return None
-        place, line = self.lines[index]
-        if bisect.bisect_right(self._symbols, address) > bisect.bisect_right(self._symbols, place):
+        start, line = self.lines[index]
+        if bisect.bisect_right(self._symbols, address) > bisect.bisect_right(self._symbols, start):
             return None
         if self.functions:
             function = self.function_at(address)
-            if function is None or place < function.first:
+            if function is None or start < function.first:
                 return None
         return line
 
@@ -118,7 +118,7 @@ class Sources:
         if file not in self._found:
             names = dict.fromkeys((file, _name(file)))
             places = (_inside(folder, name) for name in names for folder in self.folders)
-            self._found[file] = next((place for place in places if place is not None), None)
+            self._found[file] = next((path for path in places if path is not None), None)
         return self._found[file]
 
     def text(self, line: SourceLine) -> str:
@@ -145,11 +145,11 @@ def _cdb_functions(cdb: CdbFile, code: bytes, paths: dict[str, str]) -> Iterator
 def _inside(folder: Path, file: str) -> Path | None:
     """The regular file of that name in the folder; None where there is none, or it lies elsewhere."""
     try:
-        place = (folder / file).resolve()
-        there = place.is_relative_to(folder.resolve()) and place.is_file()
+        path = (folder / file).resolve()
+        there = path.is_relative_to(folder.resolve()) and path.is_file()
     except (OSError, ValueError, RuntimeError):  # a name that is too long, or has a NUL; a circle of links
         return None
-    return folder / place.relative_to(folder.resolve()) if there else None
+    return folder / path.relative_to(folder.resolve()) if there else None
 
 
 def _name(path: str) -> str:
@@ -164,7 +164,7 @@ def listings(image: Path, link_map: str) -> Iterator[Path]:
             _inside(image.parent, f"{module}.rst"),
             _inside(Path(), f"{module}.rst"),
         )
-        found = next((place for place in places if place is not None), None)
+        found = next((path for path in places if path is not None), None)
         if found is not None:
             yield found
 

@@ -55,7 +55,7 @@ def check_cdb(found: CdbFile, code: bytes, loaded: bytes) -> Contradiction | Non
 
 
 def _check_start_up(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> Contradiction | None:
-    by_name = {place.name: place for place in places}
+    by_name = {symbol.name: symbol for symbol in places}
     start_up, main = by_name.get("__sdcc_program_startup"), by_name.get("_main")
     if start_up is None or main is None or not all(loaded[start_up.address : start_up.address + 3]):
         return None
@@ -70,7 +70,7 @@ def _check_start_up(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> 
 
 
 def _check_places(places: Sequence[CodePlace], loaded: bytes) -> Contradiction | None:
-    missing = [place for place in places if not loaded[place.address]]
+    missing = [symbol for symbol in places if not loaded[symbol.address]]
     if len(places) < _FEW_NAMES or 2 * len(missing) <= len(places):
         return None
     first = missing[0]
@@ -81,20 +81,20 @@ def _check_places(places: Sequence[CodePlace], loaded: bytes) -> Contradiction |
 
 def _check_functions(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> Contradiction | None:
     functions = [
-        place
-        for place in places
-        if not place.area.startswith(_NO_FUNCTIONS)
-        and all(loaded[max(0, place.address - 3) : place.address + 1])
+        symbol
+        for symbol in places
+        if not symbol.area.startswith(_NO_FUNCTIONS)
+        and all(loaded[max(0, symbol.address - 3) : symbol.address + 1])
     ]
     before = [functions[0], *functions[:-1]] if functions else []
     strays = [
-        place
-        for place, label in zip(functions, before, strict=True)
-        if _runs_into(code, place.address) and not _is_reached(code, label.address, place.address)
+        symbol
+        for symbol, label in zip(functions, before, strict=True)
+        if _runs_into(code, symbol.address) and not _is_reached(code, label.address, symbol.address)
     ]
     if len(strays) >= _FEW_STRAYS:
         called = {target(code, address) for address in range(_SPACE) if loaded[address]}
-        strays = [place for place in strays if place.address not in called]
+        strays = [symbol for symbol in strays if symbol.address not in called]
     if len(strays) < _FEW_STRAYS or 6 * len(strays) <= len(functions):
         return None
     first = strays[0]

@@ -73,14 +73,14 @@ def parse_variables(text: str) -> Variables:
             kind = type_of(symbol[5], int(symbol[4]), symbol[6] == "S")
             if kind is not None and kind.kind not in ("function", "void") and symbol[7] in CDB_SPACES:
                 declared.setdefault((symbol[1], symbol[2], symbol[3]), (kind, CDB_SPACES[symbol[7]], module))
-        elif line.startswith("L:") and (place := _PLACE.match(line)):
-            known = declared.get((place[1], place[2], place[3]))
-            address = int(place[4], 16)
+        elif line.startswith("L:") and (record := _PLACE.match(line)):
+            known = declared.get((record[1], record[2], record[3]))
+            address = int(record[4], 16)
             if known is not None and address < MOST_BYTES:  # beyond any memory is damage
                 kind, space, where = known
-                scope = _scope(place[1])
-                variable = Variable(place[2], scope, address, space, kind, where)
-                found.setdefault(place[2], {})[scope] = variable
+                scope = _scope(record[1])
+                variable = Variable(record[2], scope, address, space, kind, where)
+                found.setdefault(record[2], {})[scope] = variable
     bits = {
         (name, _scope(where)): Variable(name, _scope(where), -1, space, kind, module)
         for (where, name, _), (kind, space, module) in declared.items()
@@ -121,7 +121,7 @@ def variables_of(image: Image) -> Variables:
     by_name = dict(found.by_name)
     for bit in found.unplaced:
         own = [texts[bit.module]] if bit.scope and bit.module in texts else list(texts.values())
-        places = {place for text in own for place in parse_bits(text).get(f"_{bit.name}", ())}
+        places = {address for text in own for address in parse_bits(text).get(f"_{bit.name}", ())}
         if len(places) == 1:
             placed = msgspec.structs.replace(bit, address=places.pop())
             by_name[bit.name] = (*by_name.get(bit.name, ()), placed)

@@ -187,7 +187,7 @@ def _checked(
         try:
             scenario = _converted(raw, origin, also)
             if notes is not None:
-                notes += [f"{place} leaves out {', '.join(keys)}" for place, keys in dropped.items()]
+                notes += [f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items()]
             return scenario
         except ScenarioError as error:
             found = drop_other_kind(error, made)
@@ -229,18 +229,18 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
             try:
                 network = {**network, "radio": with_profiles(network["radio"])}
             except ProfileError as error:
-                place = f"network[{index}].radio.profile"
-                raise ScenarioError(origin, place, error.what, error.remedy) from None
+                path = f"network[{index}].radio.profile"
+                raise ScenarioError(origin, path, error.what, error.remedy) from None
         complete.append(network)
     return {**raw, "network": complete}
 
 
 def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:
-    what, _, place = message.partition(" (at ")
-    place = place.rstrip(")")
-    if place == "end of document":
-        place = f"line {text.count(chr(10)) + 1}"
-    return ScenarioError(origin, place, f"not TOML: {what}")
+    what, _, position = message.partition(" (at ")
+    position = position.rstrip(")")
+    if position == "end of document":
+        position = f"line {text.count(chr(10)) + 1}"
+    return ScenarioError(origin, position, f"not TOML: {what}")
 
 
 def _check_finite(raw: dict[str, Any], origin: str) -> None:

@@ -37,16 +37,16 @@ def check_places(scenario: Scenario, origin: str) -> None:
     check_camera(scenario, origin)
     for number, network in enumerate(scenario.networks):
         for index, robot in enumerate(network.robot):
-            place = f"network[{number}].robot[{index}]"
+            path = f"network[{number}].robot[{index}]"
             try:
-                _check(robot, scenario, origin, place)
+                _check(robot, scenario, origin, path)
             except PluginError as error:
-                raise ScenarioError(origin, f"{place}.reference", error.what, error.remedy) from error
+                raise ScenarioError(origin, f"{path}.reference", error.what, error.remedy) from error
             except DomainError as error:  # a heading of a million radians
-                raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
+                raise ScenarioError(origin, f"{path}.reference", f"leaves the pitch: {error}") from error
 
 
-def _check(robot: RobotSpec, scenario: Scenario, origin: str, place: str) -> None:
+def _check(robot: RobotSpec, scenario: Scenario, origin: str, path: str) -> None:
     from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
     from miro_sim.scenario.build import reference_for
     from miro_sim.scenario.drives import limits_problem, origin_problem
@@ -65,8 +65,8 @@ def _check(robot: RobotSpec, scenario: Scenario, origin: str, place: str) -> Non
         of_reference = _off_pitch(at) is not None
         key = "reference" if of_reference else f"start_error_{axis}_cm"
         remedy = "begin the reference elsewhere" if of_reference else "start nearer to the reference"
-        raise ScenarioError(origin, f"{place}.{key}", f"the robot starts off the pitch: {what}", remedy)
-    check_start(scenario, start, origin, place)
+        raise ScenarioError(origin, f"{path}.{key}", f"the robot starts off the pitch: {what}", remedy)
+    check_start(scenario, start, origin, path)
     on_s = 0.0
     for t_s in _instants(reference, duration_s):
         off = _off_pitch(reference.at(t_s).posture)
@@ -75,7 +75,7 @@ def _check(robot: RobotSpec, scenario: Scenario, origin: str, place: str) -> Non
             remedy = f"let it stop before, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
             if not hasattr(robot.reference, "drive_s"):
                 remedy = f"choose other parameters for it, or duration_s = {int(100.0 * on_s) / 100.0:g}"
-            raise ScenarioError(origin, f"{place}.reference", what, remedy if on_s else "start it elsewhere")
+            raise ScenarioError(origin, f"{path}.reference", what, remedy if on_s else "start it elsewhere")
         on_s = t_s
     law = robot.controller
     assert isinstance(law, LawParameters)
@@ -83,7 +83,7 @@ def _check(robot: RobotSpec, scenario: Scenario, origin: str, place: str) -> Non
         ((t_s, reference.at(t_s)) for t_s in _instants(reference, duration_s)), law
     ) or limits_problem(((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s)), law)
     if problem is not None:
-        raise ScenarioError(origin, f"{place}.reference", *problem)
+        raise ScenarioError(origin, f"{path}.reference", *problem)
 
 
 def _instants(reference: Trajectory, duration_s: float) -> Iterator[float]:

@@ -52,8 +52,8 @@ class Setting(msgspec.Struct, frozen=True):
 
     def concerns(self, path: str) -> bool:
         """Whether an error at this path may be the setting's."""
-        ours = [place for place in (self.path, self.table) if place]
-        return any(_inside(path, place) for place in ours) or _inside(self.path, path)
+        ours = [key_path for key_path in (self.path, self.table) if key_path]
+        return any(_inside(path, key_path) for key_path in ours) or _inside(self.path, path)
 
 
 def _option(text: str, option: str) -> str:
@@ -156,20 +156,20 @@ class _Path:
         if not isinstance(at, dict):
             raise _Refused(f"{path} is a value and has no keys", f"end KEY with {path.rpartition('.')[2]}")
         key, *rest = keys
-        place = f"{path}.{key}" if path else key
+        key_path = f"{path}.{key}" if path else key
         if rest:
             if key not in at:
-                self.table = self.table or place
-            return self.put(at.setdefault(key, {}), rest, value, place)
+                self.table = self.table or key_path
+            return self.put(at.setdefault(key, {}), rest, value, key_path)
         below = at.get(key)
         if isinstance(value, dict) and isinstance(below, list) and len(below) == 1:
-            return self._put_in_list(below, ["0"], value, place)
+            return self._put_in_list(below, ["0"], value, key_path)
         others = at if key in _TAGS and _another_kind(at, key, value) else {}
         if key in ERROR_KEYS:  # either says the same: the last one holds
             for other in ERROR_KEYS:
                 at.pop(other, None)
         at[key] = value
-        return Setting(self.text, place, path if key in _TAGS else self.table, others=others)
+        return Setting(self.text, key_path, path if key in _TAGS else self.table, others=others)
 
     def _put_in_list(self, at: list[Any], keys: Sequence[str], value: Any, path: str) -> Setting:
         if not keys[0].isdecimal():
@@ -185,11 +185,11 @@ class _Path:
                 what,
                 "give the whole list to add one, or add it to the file that `mirotwin scenarios show NAME` prints",
             )
-        place = f"{path}[{number}]"
+        key_path = f"{path}[{number}]"
         if rest:
-            return self.put(at[number], rest, value, place)
+            return self.put(at[number], rest, value, key_path)
         at[number] = value
-        return Setting(self.text, place, self.table)
+        return Setting(self.text, key_path, self.table)
 
 
 def _another_kind(table: Table, key: str, value: Any) -> bool:
@@ -212,13 +212,13 @@ def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[
     return None
 
 
-def _deeper(place: str, setting: Setting, raw: Table) -> str:
+def _deeper(key_path: str, setting: Setting, raw: Table) -> str:
     """Where a key stands that was looked for too far above: at the top, in a network or in a robot."""
-    key = place.rpartition(".")[2]
+    key = key_path.rpartition(".")[2]
     found = re.search(rf"(?:^|\.){re.escape(key)}([.=\[].*)", setting.text, re.DOTALL)
-    if found is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", place):
+    if found is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", key_path):
         return ""
-    network, robot = _robot_near(place, raw)
+    network, robot = _robot_near(key_path, raw)
     rest = _with_tag(key, found[1])
     if key == "robot":
         path = robot if not re.match(r"\.\d|\[", rest) else f"{network}.robot"
@@ -241,10 +241,10 @@ def _with_tag(key: str, rest: str) -> str:
     )
 
 
-def _robot_near(place: str, raw: Table) -> tuple[str, str]:
+def _robot_near(key_path: str, raw: Table) -> tuple[str, str]:
     """The paths of the network and of the robot that a place is in, else of the first one; an index for one of many."""
     paths = []
-    named = dict(re.findall(r"(network|robot)\[(\d+)\]", place))
+    named = dict(re.findall(r"(network|robot)\[(\d+)\]", key_path))
     at: Any = raw
     for key in ("network", "robot"):
         entries = at.get(key) if isinstance(at, dict) else None
@@ -262,20 +262,20 @@ def blamed(error: ScenarioError, settings: Sequence[Setting], raw: Table) -> Sce
     """
     if not settings:
         return error
-    place = f"{error.place}"
-    concerned = [setting for setting in settings if setting.concerns(place)]
+    key_path = f"{error.place}"
+    concerned = [setting for setting in settings if setting.concerns(key_path)]
     if not concerned:
         made = " ".join(setting.place for setting in settings)
-        return ScenarioError(f"{error.path} with {made}", place, error.what, error.remedy)
+        return ScenarioError(f"{error.path} with {made}", key_path, error.what, error.remedy)
     setting = concerned[-1]
     remedy = error.remedy
-    if error.what == "unknown key" and _inside(setting.path, place):
-        remedy = _deeper(place, setting, raw) or remedy
+    if error.what == "unknown key" and _inside(setting.path, key_path):
+        remedy = _deeper(key_path, setting, raw) or remedy
     key, _, value = setting.text.partition("=")
-    tagged = _with_tag(place.rpartition(".")[2], f"={value}")
-    if place == setting.path and error.what.startswith("expected a table") and tagged[0] == ".":
+    tagged = _with_tag(key_path.rpartition(".")[2], f"={value}")
+    if key_path == setting.path and error.what.startswith("expected a table") and tagged[0] == ".":
         remedy = f"write {_option(key + tagged, setting.option)}"
     if not remedy and error.what.startswith("expected a string"):
         remedy = f"to give text, write --set '{key}=\"..\"'"
-    what = error.what if place == setting.path else f"{place}: {error.what}"
+    what = error.what if key_path == setting.path else f"{key_path}: {error.what}"
     return ScenarioError(f"{error.path}", setting.place, what, remedy)

@@ -83,7 +83,7 @@ class Waits:
         for index, network in enumerate(self.world.networks):
             for robot in network.robots:
                 self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
-        self.states = {place: Flat(decoder) for place, decoder in self.decoders.items()}
+        self.states = {robot_id: Flat(decoder) for robot_id, decoder in self.decoders.items()}
 
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
         """See `World.run_until`."""
@@ -116,7 +116,7 @@ class Waits:
         world = self.world
         world.begin_period()
         until_tick = world.rendezvous(until_tick)
-        place, mark = _Place(self, watch), world.mark()
+        before, mark = _Before(self, watch), world.mark()
         world.run_piece(until_tick)
         self._gather(watch)
         wanted = [entry for entry in self.backlog if watch.wants(entry[1])]
@@ -126,7 +126,7 @@ class Waits:
         first, event = min(wanted, key=lambda entry: entry[0])
         if first[0] < until_tick:
             tick = max(first[0], mark.tick)
-            self._again_to(watch, place, mark, tick)
+            self._again_to(watch, before, mark, tick)
             if any(key == first for key, _ in self.backlog):
                 return
             if (
@@ -134,13 +134,13 @@ class Waits:
             ):  # the CPU stands before the instruction and has not looked at it again
                 self.backlog.append((first, event))
             else:  # it happens with the cycle that begins there
-                self._again_to(watch, place, mark, tick + 1)
+                self._again_to(watch, before, mark, tick + 1)
 
-    def _again_to(self, watch: Watch, place: _Place, mark: Mark, tick: int) -> None:
+    def _again_to(self, watch: Watch, before: _Before, mark: Mark, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""
         self.world.go_back(mark)
-        self._go_back(place)
-        watch.begin_again(place.next_edge)
+        self._go_back(before)
+        watch.begin_again(before.next_edge)
         self.world.run_piece(tick)
         self._gather(watch)
 
@@ -181,30 +181,30 @@ class Waits:
                     self._decode(source, serial, event)
         self.backlog += watch.edges()
 
-    def _decode(self, place: tuple[int, int], serial: int, event: Event) -> None:
+    def _decode(self, robot_id: tuple[int, int], serial: int, event: Event) -> None:
         """Gives a character to the robot's decoder; a frame that it completes is an event right after it."""
         symbol = (event.value, event.good_stop, event.tick)
-        for result in self.decoders[place].feed_symbols([symbol]):
+        for result in self.decoders[robot_id].feed_symbols([symbol]):
             if isinstance(result, Received):
-                network, slot = place
+                network, slot = robot_id
                 frame = Event(tick=event.tick, what="frame", network=network, slot=slot, frame=result)
                 self.backlog.append(((event.tick, network, slot, serial), frame))
 
     # Going back
 
-    def _go_back(self, place: _Place) -> None:
-        self.backlog = list(place.backlog)
-        for source, serial in place.read.items():
+    def _go_back(self, before: _Before) -> None:
+        self.backlog = list(before.backlog)
+        for source, serial in before.read.items():
             self.cursors[source].next = serial
-        for key, state in place.states.items():
+        for key, state in before.states.items():
             self.states[key].load(state)
 
 
-class _Place:
+class _Before:
     """What a wait had seen at the start of a piece."""
 
     def __init__(self, waits: Waits, watch: Watch) -> None:
         self.next_edge = watch.next_edge
         self.backlog = list(waits.backlog)
         self.read = {source: cursor.next for source, cursor in waits.cursors.items()}
-        self.states = {place: state.save() for place, state in waits.states.items()}
+        self.states = {robot_id: state.save() for robot_id, state in waits.states.items()}

@@ -35,13 +35,13 @@ class Watch:
         self.next_edge = _EDGES
 
     def __enter__(self) -> Watch:
-        for place, condition in self.conditions:
+        for robot_id, condition in self.conditions:
             if isinstance(condition, Reached):
                 assert condition.address is not None
-                robot = self.world.robot(*place)
+                robot = self.world.robot(*robot_id)
                 robot.marks = (*robot.marks, condition.address)
             elif isinstance(condition, When | WheelSpeeds):
-                self.world.robot(*place).asked.append((condition.predicate, condition.at))
+                self.world.robot(*robot_id).asked.append((condition.predicate, condition.at))
         self.begin_again(_EDGES)
         return self
 
@@ -56,8 +56,8 @@ class Watch:
 
     def wants(self, event: Event) -> bool:
         """Whether one of the conditions is met by `event`."""
-        for place, condition in self.conditions:
-            if (event.network, event.slot) == place and condition.met_by(event):
+        for robot_id, condition in self.conditions:
+            if (event.network, event.slot) == robot_id and condition.met_by(event):
                 return True
         return False
 
@@ -68,9 +68,9 @@ class Watch:
         self.next_edge = next_edge
         self._close_pins()
         pins: dict[tuple[int, int], set[str]] = {}
-        for place, condition in self.conditions:
+        for robot_id, condition in self.conditions:
             if isinstance(condition, Edge):
-                pins.setdefault(place, set()).add(condition.pin)
+                pins.setdefault(robot_id, set()).add(condition.pin)
         for (network, slot), names in pins.items():
             self.pins[network, slot] = PinWatch(self.world.robot(network, slot).board, frozenset(names))
 
