@@ -20,7 +20,7 @@ from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.recording.recorder import Recorder, source_of
-from mirotwin.recording.track import RobotId, Tracks
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware

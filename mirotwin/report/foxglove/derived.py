@@ -14,7 +14,7 @@ import msgspec
 from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording.track import RobotId, error_of
+from mirotwin.recording.track import error_of
 from mirotwin.report.foxglove import camera, frames, notes, paths, pitch, robots, topics
 from mirotwin.report.foxglove.messages import (
     CompressedImage,

@@ -19,7 +19,6 @@ from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period, RobotId
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
-from mirotwin.recording.track import RobotId
 from mirotwin.report.page.link import LinkLog, LinkMark
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.interface import Check, Expectation, Failure

@@ -22,7 +22,6 @@ from miro_host.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording.track import RobotId
 from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.plugin_problems import problem_of_class
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS

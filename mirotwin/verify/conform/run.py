@@ -15,7 +15,6 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
-from mirotwin.recording.track import RobotId
 from mirotwin.verify.cases.case import SUFFIX, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.faults import NoFault
