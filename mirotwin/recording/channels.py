@@ -3,8 +3,6 @@
 Every message carries its tick; a period's messages are closed by its `/period` message.
 
 Where a channel stands: `topics`.
-
-Long because each channel has a struct.
 """
 
 from collections.abc import Iterator

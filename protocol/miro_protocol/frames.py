@@ -4,8 +4,6 @@ Every size, range and offset comes from `table.py`.
 
 Two error types: `EncodeError` for a message that must not be sent; `ContentError` for bytes whose CRC is good but
 whose content no correct sender makes.
-
-Long because every message type stands here with its own ranges, and encoding stands beside decoding.
 """
 
 from __future__ import annotations

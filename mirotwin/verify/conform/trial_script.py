@@ -7,8 +7,6 @@
 
 A trial is open: what is said does not depend on what the robots do. So everything is known in advance, and so is the
 tick at which each expectation is over.
-
-Long because these are all words of the language in which rules are written.
 """
 
 from __future__ import annotations

@@ -6,8 +6,6 @@ the control period, where the caller wants to stop, the contact grid. In a piece
 may come up before its end, the air of all networks is settled a little beyond it, each robot runs alone to it (networks
 by index, slot order), and the PC's receivers hear what came back. At the end of the period the state is hashed.
 How a run is cut into pieces does not change a bit of it.
-
-Long because one class holds the order in which all parts act; the parts themselves are in other files.
 """
 
 from __future__ import annotations

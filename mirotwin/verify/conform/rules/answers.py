@@ -1,7 +1,4 @@
-"""Rules about what a robot says: when, in which form, and what is in it.
-
-Long because every field of the answer has its rule.
-"""
+"""Rules about what a robot says: when, in which form, and what is in it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Rules about what is a valid frame: sync, stop bits, spacing, CRC, and the window that is emptied.
-
-Long because each point of the reception rule is tried from both sides.
-"""
+"""Rules about what is a valid frame: sync, stop bits, spacing, CRC, and the window that is emptied."""
 
 from __future__ import annotations
 
