@@ -16,6 +16,7 @@ from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.frames import Extras, extras_of
+from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
 from mirotwin.report.summary import Summary
@@ -74,11 +75,20 @@ def material_of(wanted: PageSubject) -> Material:
     return _of_case(wanted, file, job, image)
 
 
+def page_of_port(wanted: PageSubject) -> bytes | None:
+    """The page of robots at a port beside their twin; None for a subject that was not recorded at one."""
+    file = _file_of(wanted.subject)
+    if is_bare_case(file):
+        return None
+    job, image = load_job(file, wanted.firmware, wanted.engine)
+    return port_page(job, image, file, wanted.quiet) if job.origin else None
+
+
 def page_of_failure(folder: str) -> bytes:
     """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
     require_bokeh()
     wanted = PageSubject(folder, 0, None, True, None, (), None, True)
-    return run_page(material_of(wanted))
+    return page_of_port(wanted) or run_page(material_of(wanted))
 
 
 def _file_of(subject: str) -> str:

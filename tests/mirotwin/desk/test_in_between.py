@@ -1,0 +1,170 @@
+"""Other people's programs between PC and robot, and adapters that keep characters: socat, ser2net, RFC 2217, FTDI.
+
+The robot is another process, `mirotwin serve` in real time. How late its answers come depends on what else the machine
+does, and is told; nothing else may differ.
+"""
+
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from tests import children
+from tests.mirotwin.desk.rig import stream_text
+from tests.mirotwin.ports.rig import PROGRAM, served
+
+SETTINGS = ("--set", "network.radio.bit_error_rate=0", "--set", 'camera={kind="gaussian"}')
+FRAMES = 20
+BRIDGE = """
+import socket, sys, threading, serial, serial.rfc2217
+port = serial.serial_for_url(sys.argv[1], timeout=0.002)
+listening = socket.create_server(("127.0.0.1", 0))
+print(listening.getsockname()[1], flush=True)
+client, _ = listening.accept()
+class Client:
+    def write(self, data):
+        client.sendall(data)
+manager = serial.rfc2217.PortManager(port, Client())
+def up():
+    while True:
+        data = port.read(256)
+        if data:
+            client.sendall(b"".join(manager.escape(data)))
+threading.Thread(target=up, daemon=True).start()
+while data := client.recv(4096):
+    port.write(b"".join(manager.filter(data)))
+"""
+"""pyserial's own RFC 2217 server."""
+
+
+@contextmanager
+def running(*command, **more):
+    process = children.start(command, **more)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(timeout=30)
+
+
+def waited(there):
+    """The first true answer, in at most 20 s."""
+    until_s = time.monotonic() + 20
+    while not (found := there()):
+        assert time.monotonic() < until_s
+        time.sleep(0.02)
+    return found
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as found:
+        return found.getsockname()[1]
+
+
+@contextmanager
+def directly(session, folder):
+    yield f"socket://127.0.0.1:{session.number()}"
+
+
+@contextmanager
+def socat(session, folder):
+    link = folder / "adapter"
+    with running("socat", f"PTY,link={link},raw,echo=0", f"TCP:127.0.0.1:{session.number()}"):
+        waited(link.exists)
+        yield str(link)
+
+
+@contextmanager
+def ser2net(session, folder):
+    number = free_port()
+    (folder / "ser2net.yaml").write_text(
+        f"connection: &robot\n  accepter: telnet(rfc2217),tcp,127.0.0.1,{number}\n"
+        f"  connector: serialdev,{session.ports['pty'][0]},9600n81,local\n"
+    )
+    command = (shutil.which("ser2net", path="/usr/sbin:/usr/bin"), "-n", "-c", str(folder / "ser2net.yaml"))
+    with running(*command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
+
+        def listens():
+            with suppress(OSError), socket.create_connection(("127.0.0.1", number), timeout=1):
+                return True
+            return False
+
+        waited(listens)
+        time.sleep(0.5)  # until the look above has let go of the port
+        yield f"rfc2217://127.0.0.1:{number}"
+
+
+@contextmanager
+def rfc2217_server(session, folder):
+    url = f"socket://127.0.0.1:{session.number()}"
+    with running(sys.executable, "-c", BRIDGE, url, stdout=subprocess.PIPE, text=True) as process:
+        yield f"rfc2217://127.0.0.1:{int(process.stdout.readline())}"
+
+
+def adapter(keeps_s):
+    """One that hands characters on when it has 62 of them or its timer is over, as FTDI's do."""
+
+    @contextmanager
+    def between(session, folder):
+        with socket.create_server(("127.0.0.1", 0)) as listening:
+            thread = threading.Thread(target=carry, args=(listening, session.number(), keeps_s), daemon=True)
+            thread.start()
+            yield f"socket://127.0.0.1:{listening.getsockname()[1]}"
+
+    return between
+
+
+def carry(listening, number, keeps_s):
+    client, _ = listening.accept()
+    robot = socket.create_connection(("127.0.0.1", number))
+
+    def up():
+        with suppress(OSError):
+            while data := robot.recv(62):
+                time.sleep(keeps_s)
+                client.sendall(data)
+
+    threading.Thread(target=up, daemon=True).start()
+    with suppress(OSError):
+        while data := client.recv(4096):
+            robot.sendall(data)
+    robot.close()
+
+
+@pytest.mark.parametrize(
+    "between",
+    [
+        directly,
+        pytest.param(socat, marks=pytest.mark.skipif(not shutil.which("socat"), reason="needs socat")),
+        pytest.param(
+            ser2net,
+            marks=pytest.mark.skipif(
+                not shutil.which("ser2net", path="/usr/sbin:/usr/bin"), reason="needs ser2net"
+            ),
+        ),
+        rfc2217_server,
+        *(pytest.param(adapter(ms / 1000), id=f"{ms} ms") for ms in (1, 4, 16)),
+    ],
+)
+def test_nothing_differs_but_times(tmp_path, between):
+    (tmp_path / "drive.stream").write_text(stream_text(FRAMES))
+    with (
+        served(
+            "fig6", "--tcp", 0, "--pty", tmp_path / "pty", *SETTINGS, "--out", tmp_path / "session"
+        ) as session,
+        between(session, tmp_path) as url,
+    ):
+        command = [sys.executable, "-c", PROGRAM, "replay", "drive.stream", "--port", url]
+        done = children.run(
+            [*command, "--allow-motion", "--json", "--all"], cwd=tmp_path, capture_output=True, text=True
+        )
+    assert done.returncode in (0, 4), done.stderr
+    assert f"{FRAMES} transmissions sent, 99 % less than" in done.stderr
+    found = json.loads(done.stdout)["differences"]
+    assert [one for one in found if "late" not in str(one["robot"])] == [], done.stderr
