@@ -43,6 +43,8 @@ STATUS = 0xA2
 SAMPLE_TICKS = 8192
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 """A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
+NEAR = 2
+"""Answers before and after one that tell how late frames were that nobody answered."""
 LIMITS_TICKS = (FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, FAILSAFE_OFF_TICKS)
 
 
@@ -218,6 +220,14 @@ class _Judge:
         self.tolerance = tolerance
         self.network = network
         self.not_judged = 0
+        delays = [
+            one.port.tick - one.twin.tick - telemetry.way_ticks
+            for one in telemetry.pairs
+            if one.port is not None and one.twin is not None
+        ]
+        self._near = [max(delays[max(0, at - NEAR) : at + NEAR + 1]) for at in range(len(delays))]
+        """How late the answers around each one were: so late were the frames between them, perhaps."""
+        self._place = 0
 
     def differences(self) -> Iterator[Difference]:
         before: MatchedAnswers | None = None
@@ -236,9 +246,10 @@ class _Judge:
             if before is not None:
                 yield from self._fields(before, both)
             before = both
+            self._place += 1
 
     def _fields(self, before: MatchedAnswers, both: MatchedAnswers) -> Iterator[Difference]:
-        unsure = self._unsure(before) + self._unsure(both)
+        unsure = self._near[self._place - 1] + self._near[self._place]
         timely = not self.sent.near_a_limit(before.twin.tick, both.twin.tick, unsure)
         for name, take, exact in _FIELDS:
             mine, twins = take(before.port.said, both.port.said), take(before.twin.said, both.twin.said)

@@ -84,7 +84,7 @@ def socat(session, folder):
 def ser2net(session, folder):
     number = free_port()
     (folder / "ser2net.yaml").write_text(
-        f"connection: &robot\n  accepter: telnet(rfc2217),tcp,127.0.0.1,{number}\n"
+        f"connection: &robot\n  accepter: tcp,127.0.0.1,{number}\n"
         f"  connector: serialdev,{session.ports['pty'][0]},9600n81,local\n"
     )
     command = (shutil.which("ser2net", path="/usr/sbin:/usr/bin"), "-n", "-c", str(folder / "ser2net.yaml"))
@@ -97,7 +97,7 @@ def ser2net(session, folder):
 
         waited(listens)
         time.sleep(0.5)  # until the look above has let go of the port
-        yield f"rfc2217://127.0.0.1:{number}"
+        yield f"socket://127.0.0.1:{number}"
 
 
 @contextmanager
