@@ -24,8 +24,6 @@ from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIM
 from mirotwin.shell.times import Time, TimeType
 
 STDIN = "-"
-BARE = "Image on the bare processor"
-"""The heading of its options."""
 _SCON, _NINE_BITS = 0x98, 0x80
 
 
@@ -47,33 +45,29 @@ CRYSTAL = Option(
     type=Whole(32_768, 100_000_000),
     metavar="HZ",
     help="Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000.",
-    heading=BARE,
 )
 BAUD = Option(
     "--baud",
     type=Whole(50),
     metavar="RATE",
     help="Bit rate of --stdin. Default: that of the receiver. Needed by programs that measure the bit rate.",
-    heading=BARE,
 )
 
 
 class BareOptions(Options, frozen=True, kw_only=True):
     """What the command line says about the bare processor."""
 
+    HEADING = "Image on the bare processor"
+
     until: Annotated[
         str | None,
         Option(
-            metavar="SYMBOL|ADDRESS",
-            help="Stop before the instruction at this address (0x..) or symbol.",
-            heading=BARE,
+            metavar="SYMBOL|ADDRESS", help="Stop before the instruction at this address (0x..) or symbol."
         ),
     ] = None
     max_cycles: Annotated[
         int | None,
-        Option(
-            type=Whole(1), metavar="N", help="Stop after N machine cycles, with exit code 42.", heading=BARE
-        ),
+        Option(type=Whole(1), metavar="N", help="Stop after N machine cycles, with exit code 42."),
     ] = None
     stdin: Annotated[
         tuple[str, ...],
@@ -82,7 +76,6 @@ class BareOptions(Options, frozen=True, kw_only=True):
             metavar="FILE|-",
             help="File of bytes for the serial port, sent when the program listens; may be repeated, files are sent in"
             " order.",
-            heading=BARE,
         ),
     ] = ()
     stdin_when: Annotated[
@@ -90,28 +83,19 @@ class BareOptions(Options, frozen=True, kw_only=True):
         Option(
             metavar="TEXT",
             help="Send --stdin when the program has sent TEXT. One for each --stdin, or for each but the first.",
-            heading=BARE,
         ),
     ] = ()
     stdin_by_line: Annotated[
         bool,
-        Option(help="Send one line of --stdin each time the program has sent TEXT.", heading=BARE),
+        Option(help="Send one line of --stdin each time the program has sent TEXT."),
     ] = False
     stdin_after: Annotated[
         Time | None,
-        Option(
-            type=TimeType(),
-            help="Delay of --stdin after the start, or after its TEXT, such as 200ms.",
-            heading=BARE,
-        ),
+        Option(type=TimeType(), help="Delay of --stdin after the start, or after its TEXT, such as 200ms."),
     ] = None
     stdin_gap: Annotated[
         Time | None,
-        Option(
-            type=TimeType(),
-            help="Shortest pause between two characters of --stdin. Default 0.",
-            heading=BARE,
-        ),
+        Option(type=TimeType(), help="Shortest pause between two characters of --stdin. Default 0."),
     ] = None
     baud: Annotated[int | None, BAUD] = None
     pins: Annotated[
@@ -120,19 +104,16 @@ class BareOptions(Options, frozen=True, kw_only=True):
             type=NAME,
             metavar="FILE",
             help="Levels for port pins: lines TICK * P1.0 0|1 in order of time; # begins a comment.",
-            heading=BARE,
         ),
     ] = None
     go_on: Annotated[
         bool,
-        Option(help="Continue after firmware faults; list them at the end, with exit code 3.", heading=BARE),
+        Option(help="Continue after firmware faults; list them at the end, with exit code 3."),
     ] = False
     start: Annotated[
         str | None,
         Option(
-            metavar="SYMBOL|ADDRESS",
-            help="Begin there instead of at 0x0000, as after a jump by a monitor.",
-            heading=BARE,
+            metavar="SYMBOL|ADDRESS", help="Begin there instead of at 0x0000, as after a jump by a monitor."
         ),
     ] = None
     crystal: Annotated[int | None, CRYSTAL] = None
@@ -179,10 +160,7 @@ def target_of(path: str, image: Image, options: BareOptions) -> int | None:
 
 
 def make_machine(
-    image: Image,
-    options: BareOptions,
-    output: Callable[[bytes], object] | None = None,
-    live: bool = False,
+    image: Image, options: BareOptions, output: Callable[[bytes], object] | None = None, live: bool = False
 ) -> BareMachine:
     """The machine that was asked for. Raises BadInput, and errors of the files read."""
 

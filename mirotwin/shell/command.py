@@ -77,6 +77,8 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
 
     COMMAND: ClassVar[str] = ""
     """Its words after `mirotwin`."""
+    HEADING: ClassVar[str] = ""
+    """The group of the help for options that have no heading of their own."""
 
     def command_line(self) -> str:
         """The command with what differs from its defaults, quoted for a shell."""
@@ -125,6 +127,7 @@ class _Field(NamedTuple):
     record: type[Options] | None
     default: Any
     required: bool
+    heading: str = ""
 
     @property
     def several(self) -> bool:
@@ -173,6 +176,7 @@ class _Field(NamedTuple):
         return DeclaredOption(
             [self.name, *(declared.names or (self.label,))],
             declared=declared,
+            heading=declared.heading or self.heading,
             help=declared.help,
             type=declared.type,
             metavar=declared.metavar,
@@ -189,7 +193,7 @@ def _fields(record: type[Options]) -> tuple[_Field, ...]:
     for field in msgspec.structs.fields(record):
         declared = next((one for one in get_args(field.type) if isinstance(one, Argument | Option)), None)
         nested = field.type if declared is None else None
-        found.append(_Field(field.name, declared, nested, field.default, field.required))
+        found.append(_Field(field.name, declared, nested, field.default, field.required, record.HEADING))
     return tuple(found)
 
 
@@ -217,9 +221,10 @@ def _read(record: type[Record], given: dict[str, Any]) -> Record:
 class DeclaredOption(click.Option):
     """An option that knows its declaration."""
 
-    def __init__(self, *args: Any, declared: Option, **named: Any) -> None:
+    def __init__(self, *args: Any, declared: Option, heading: str, **named: Any) -> None:
         super().__init__(*args, **named)
         self.declared = declared
+        self.heading = heading
 
     def get_help_extra(self, ctx: click.Context) -> Any:
         extra = super().get_help_extra(ctx)
@@ -240,7 +245,7 @@ class RecordCommand(click.Command):
         for param in self.get_params(ctx):
             line = param.get_help_record(ctx)
             if line is not None and isinstance(param, click.Option):
-                heading = param.declared.heading if isinstance(param, DeclaredOption) else ""
+                heading = param.heading if isinstance(param, DeclaredOption) else ""
                 groups.setdefault(heading, []).append(line)
         for heading, lines in groups.items():
             with formatter.section(heading or "Options"):
