@@ -476,7 +476,7 @@ class Adapter:
         text = given["expression"].strip()
         if given.get("context") == "repl" and text.partition(" ")[0] in self.its_console.verbs():
             self.lines.clear()
-            before, self.paused = self.its.timeline.tick, False
+            before, self.paused, self.changed = self.its.timeline.tick, False, False
             self.its_console.do(text)
             if self.its.timeline.tick != before:
                 self.run_after = partial(self._stopped, "goto")

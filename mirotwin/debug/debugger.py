@@ -434,8 +434,11 @@ class Debugger:
         if hit is not None and not written.are_written(self.cpu):
             self.timeline.step_back()  # the hardware's call of a routine wrote it
         found = None if hit is None else Written(self.timeline.tick, self.frames())
+        interrupted = hit is None and self._went
         self.timeline.focus = focus
         self.timeline.go_to(here)
+        if interrupted:
+            raise BadInput("", "who", "was interrupted before a writer was found")
         return found
 
 

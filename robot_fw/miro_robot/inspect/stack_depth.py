@@ -120,6 +120,8 @@ class StackReader:
             reached[address] = at
             size, after, odd = self._after(address, at)
             unknown |= odd
+            if size == len(_FRAME):  # three instructions, of which the last one moves SP
+                reached.update({address + 2: at, address + 4: at})
             opcode = self.code[address]
             if goes_on(opcode):
                 waiting.append((address + size, after))

@@ -106,8 +106,8 @@ class Shadow(Watcher):
         opcode = cpu.code_at(pc)
         if is_call(opcode):
             self.calls.append(pc + LENGTH[opcode])
-        elif opcode in RETURNS and self.calls:
-            self.calls.pop()
+        elif opcode in RETURNS and self.calls and self.calls[-1] == cpu.pc:
+            self.calls.pop()  # any other RET is a jump: SDCC goes so to what a pointer names
         self.compare(cpu)
 
     def interrupted(self, cpu, source, pc, start):

@@ -58,6 +58,11 @@ def test_what_cannot_be_told_is_said(text, said):
     assert said in depth(text).unknown
 
 
+def test_each_instruction_that_makes_room_has_its_height():
+    heights = StackReader(image("PUSH ACC\nMOV A,SP\nADD A,#28h\nMOV SP,A\nend:\nSJMP end")).heights(0)
+    assert heights == {0: 0, 2: 1, 4: 1, 6: 1, 8: 0x29}
+
+
 def test_the_jumps_of_a_table_are_followed():
     text = "JMP @A+DPTR\nLJMP one\nLJMP two\none:\nPUSH ACC\nend:\nSJMP end\ntwo:\nPUSH ACC\nPUSH B\nSJMP end"
     assert depth(text).main.size == 2
