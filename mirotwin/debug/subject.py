@@ -21,9 +21,9 @@ from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run
 from mirotwin.replay.replay_firmware import LinesFrom, load_images
 from mirotwin.rerun.inspected_run import BareRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
-from mirotwin.shell.command import Argument, Option
+from mirotwin.shell.command import Argument
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import AT, NAME, choose_engine
+from mirotwin.shell.options import AT, RESUME, choose_engine
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.cases.artifacts import CASES
@@ -37,9 +37,7 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
 
     subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
-    resume: Annotated[
-        str | None, Option(metavar="FILE.world", type=NAME, help="Scenario: begin with a saved world of it.")
-    ] = None
+    resume: Annotated[str | None, RESUME.saying("Scenario: begin with a saved world of it.")] = None
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
 

@@ -12,10 +12,10 @@ from mirotwin.rerun.pacing import FASTEST
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import (
     FORCE,
-    NAME,
     OUT,
     PATH,
     QUIET,
+    RESUME,
     SET,
     TO,
     Engine,
@@ -137,11 +137,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
     to_time: Annotated[Time | None, TO.saying("End the run there.")] = None
     resume: Annotated[
         str | None,
-        Option(
-            type=NAME,
-            metavar="FILE.world",
-            help="Go on from a saved world of the same scenario, settings, seed and firmware.",
-        ),
+        RESUME,
     ] = None
     live: Annotated[
         Address | None,

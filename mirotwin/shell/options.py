@@ -123,6 +123,12 @@ SLOT = Option("--slot", type=Whole(0, 4), help="Slot of the robot.")
 JOBS = Option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
 ALL = Option("--all", help="List everything, not only what comes first.")
 FROM = Option("--from", type=TimeType(), help="Begin there, such as 1.5s, 20ms or 48000t.")
+RESUME = Option(
+    "--resume",
+    type=NAME,
+    metavar="FILE.world",
+    help="Go on from a saved world of the same scenario, settings, seed and firmware.",
+)
 AT = Option("--at", type=TimeType(), help="A moment of the run, such as 1.5s, 20ms or 48000t.")
 TO = Option("--to", type=TimeType(), help="End there.")
 
