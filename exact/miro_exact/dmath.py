@@ -3,8 +3,6 @@
 The method is that of fdlibm (Sun Microsystems 1993): reduce the argument by a split constant, evaluate a
 polynomial on the small interval, carry the low part of the reduced argument. Coefficients are fdlibm's
 published ones. Bit tricks are replaced by comparisons and by products with powers of two, which are exact.
-
-Long because the functions share argument reductions, and each brings its coefficients and error bounds.
 """
 
 import math

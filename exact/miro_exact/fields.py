@@ -2,8 +2,6 @@
 
 All bytes are little-endian, without padding, as Python's `struct` writes them with `<`. What comes from bytes is
 checked here: a value out of its range, a length beyond the room, NaN and an early end are a ValueError.
-
-Long because all kinds share their checks of range and length, and each has its own read, write, encode and decode.
 """
 
 from __future__ import annotations

@@ -28,8 +28,6 @@ replaced afterwards.
 
 In the compiled engine the build adds to each compiled module where the fields of its classes lie (`_places_NAME`), and
 neighbouring fields are copied by `memory.pyx`. Both engines give the same bytes.
-
-Long because the copy, the checks before it and the names of fields have to walk the tables in one order.
 """
 
 from __future__ import annotations

@@ -6,8 +6,6 @@ comparison each; the CRC is computed only for a window that begins with a sync. 
 character, on any input. The characters since the last event are kept, at most `run_limit` + F - 1 of them.
 
 The CRC runs over the characters as received: whitening is taken off in the same step.
-
-Long because the window, its ways in and what it gives out share one set of fields, and a compiled class is one file.
 """
 
 from __future__ import annotations

@@ -13,8 +13,6 @@
 Order on one tick: the plant moves first (its encoder edges reach the decoders), then the left LM629, the right
 LM629, the bridge inputs, the interrupt lines, and last what the CPU did to its port pins on that tick. Everything
 but the CPU is advanced at its own events only, never "up to now", so reading a part at any time changes no bit.
-
-Long because all wires of the board meet in one class, and a compiled class is one file.
 """
 
 from __future__ import annotations

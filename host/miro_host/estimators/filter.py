@@ -14,8 +14,6 @@
 theta, an encoder the way of a rim. Measurements with independent errors are taken one number after another, each in
 Joseph's form P = (1 - k h) P (1 - k h)^T + k r k^T, of which only one half is computed: the covariance stays symmetric
 and positive.
-
-Long because the products of sparse matrices are written out: half of the derivative F is 0 or 1.
 """
 
 from __future__ import annotations

@@ -24,8 +24,6 @@ Velocity -32768 is an encoding error, which no host sends: -32767 goes out in it
 
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
 a count - 1 (low 5 bits, times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
-
-Long because one class reads the input and writes the characters, and a compiled class is one file.
 """
 
 from __future__ import annotations

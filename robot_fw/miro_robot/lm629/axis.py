@@ -2,8 +2,6 @@
 
 Time is in 24 MHz ticks; a chip clock is 4, a PWM period 2048, a sample 8192 of them. Rule names in comments (T1, D1,
 ...) are those of README.md in this folder.
-
-Long because reset, sample and PWM share one clock and one class, and a compiled class is one file.
 """
 
 from __future__ import annotations

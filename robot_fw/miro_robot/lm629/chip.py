@@ -22,8 +22,6 @@
 
 What it does by itself is `axis.py`'s; how bytes make words is `host_port.py`'s. Rule names in comments (T1, D1, ...)
 are those of README.md in this folder. Pins: data sheet SNVS781, connection diagram of the 28-pin package.
-
-Long because it has one method for each command of the data sheet, and its pins and data flow drawn above.
 """
 
 from __future__ import annotations

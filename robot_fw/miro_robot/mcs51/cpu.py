@@ -23,8 +23,6 @@
 
 Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. README.md in this folder draws how `Core`,
 `Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1, ..) are in it, and sources like 4316E.
-
-Long because it is the chip's one public class, with pins and data flow drawn above; a compiled class is one file.
 """
 
 from __future__ import annotations

@@ -9,9 +9,6 @@ with `limit` once per instruction and knows nothing else about time.
 
 The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
 (`miro_exact.threaded`); what the head asks has to be rare.
-
-Long because the loop has one branch for each row of the opcode table, and the build needs all of them in one
-function.
 """
 
 from __future__ import annotations

@@ -13,8 +13,6 @@ Registers of the core itself (ACC, PSW, PCON ...) are in `Cpu`.
 
 Timers and serial port are not stepped until one of them could raise a flag (`timer_wait`, `serial_wait`) or one of
 their registers is read or written (`settle`). Letters are rules in README.md.
-
-Long because every register address and every pin is routed in this one class, and a compiled class is one file.
 """
 
 from __future__ import annotations

@@ -15,8 +15,6 @@ Timing (4316E section 2.13; letters are rules in README.md), all in crystal tick
 one rollover apart, TI with the stop bit. Receiver: tests RXD on every 16x tick for a fall, samples each bit in counter
 states 7, 8, 9, acts in state 10; RI shows at the next S3P1 (U6). Between bits nothing is stepped: an idle
 receiver takes the next edge from the Line.
-
-Long because transmitter and receiver share SCON, SBUF and the clock, and a compiled class is one file.
 """
 
 from __future__ import annotations

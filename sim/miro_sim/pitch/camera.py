@@ -13,8 +13,6 @@ each other, the first one is. All in um and integers. `fall` is taken at the mid
 A pixel whose samples are sure to see one paint is not sampled: if its middle sees that paint, and would still do so if
 all edges were nearer by `Rays.spread_um`. So any pixel gives the same bits in any window. One test does for all
 instants of the exposure if its edges are nearer by as much more as the robot moves between them (`margin_um`).
-
-Long because the kinds of surface share one coordinate frame and one way of being sure.
 """
 
 from __future__ import annotations
