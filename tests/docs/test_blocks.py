@@ -17,6 +17,8 @@ from tests.docs import blocks, running, sandbox
 from tests.docs.shell import Shell, commands_of, fits, plain
 from tests.mutants import build
 
+pytestmark = pytest.mark.slow
+
 DOCUMENTS = sandbox.documents()
 GIVEN = {
     "protocol/README.md": """\

@@ -21,6 +21,8 @@ from tests import children
 from tests.docs import sandbox
 from tests.mirotwin.report.page import browser
 
+pytestmark = pytest.mark.slow
+
 ROOT = sandbox.ROOT
 FETCHED = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?(?:src|href)=["']?(https?:)?//[^"'\s>]+""")
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]

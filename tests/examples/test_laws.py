@@ -14,6 +14,8 @@ from mirotwin.recording.reader import read
 from tests import children
 from tests.host.distribution import install
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "laws"
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 SHORTENED = {

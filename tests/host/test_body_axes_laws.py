@@ -1,7 +1,4 @@
-"""The laws beside the paper's: their equations, where they lead a robot from, and what they never exceed.
-
-Long because three laws share the paths and starts that they are tried on.
-"""
+"""The laws beside the paper's: their equations, where they lead a robot from, and what they never exceed."""
 
 import math
 

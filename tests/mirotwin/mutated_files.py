@@ -5,8 +5,6 @@
 prints how many files of each kind ended in which exit code. A case is a pure function of (seed, number): `--only N`
 runs one again and leaves its file in the current folder. What belongs here: good files, how they are damaged, and
 which command reads them. What does not: what a format means.
-
-Long because each kind of file brings a good example, its own ways of damage and the commands that read it.
 """
 
 from __future__ import annotations

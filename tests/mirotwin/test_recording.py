@@ -1,7 +1,4 @@
-"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one.
-
-Long because each kind of record in the file has its own damage.
-"""
+"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one."""
 
 import io
 import json

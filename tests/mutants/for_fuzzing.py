@@ -1,7 +1,4 @@
-"""Mistakes that a fuzzer has to find: each needs an input that a bench hardly sends.
-
-Long because it is a table with some lines a mistake.
-"""
+"""Mistakes that a fuzzer has to find: each needs an input that a bench hardly sends."""
 
 from __future__ import annotations
 

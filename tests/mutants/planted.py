@@ -1,7 +1,4 @@
-"""Mistakes that people make in such firmware, each planted by hand: one text of one file becomes another one.
-
-Long because it is a table with a few lines a mistake.
-"""
+"""Mistakes that people make in such firmware, each planted by hand: one text of one file becomes another one."""
 
 from __future__ import annotations
 

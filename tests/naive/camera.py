@@ -1,8 +1,6 @@
 """Slow, obvious twin of the camera: every pixel of a window from all of its samples, no shortcut.
 
 Arrays hold all samples of a window at once: [row, column, sample row, sample column].
-
-Long because it has no part in common with the camera that it is compared with.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """A slow, obvious LM629: the rules of `miro_robot.lm629` put down a second time in another shape.
 
-Commands are generators that wait for their words; it shares nothing with the package but its options. Long because
-it is a whole chip in one class.
+Commands are generators that wait for their words; it shares nothing with the package but its options.
 """
 
 from __future__ import annotations

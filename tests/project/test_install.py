@@ -17,6 +17,8 @@ from miro_exact import engine, hot_modules
 from miro_robot.mcs51 import opcodes
 from tests import children
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
 SOURCES = ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin")

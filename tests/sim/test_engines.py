@@ -5,6 +5,8 @@ import pytest
 from miro_exact import engine
 from tests.sim.engines import Checkpoint, compare, lockstep
 
+pytestmark = pytest.mark.slow
+
 LINES = [Checkpoint(0, 100_003 * n, 500 * n, n, 2 * n, 3 * n, f"{n:064x}").line() + "\n" for n in range(5)]
 
 

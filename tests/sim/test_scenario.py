@@ -1,7 +1,4 @@
-"""Scenario files: what is accepted, and the one line that says what is wrong.
-
-Long because each mistake in a scenario file is listed with its message.
-"""
+"""Scenario files: what is accepted, and the one line that says what is wrong."""
 
 import math
 import time

@@ -1,7 +1,4 @@
-"""`mirotwin fw disasm|trace|profile|coverage`: looking into an image, a scenario, a recording, a stream.
-
-Long because four commands that take the same subjects and options are tested with the same runs.
-"""
+"""`mirotwin fw disasm|trace|profile|coverage`: looking into an image, a scenario, a recording, a stream."""
 
 from __future__ import annotations
 

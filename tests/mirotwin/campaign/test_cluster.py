@@ -21,6 +21,8 @@ from mirotwin.campaign.workers import Workers
 from mirotwin.commands import main
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 distributed = pytest.importorskip("distributed", reason="needs Dask: the extra cluster")
 

@@ -23,6 +23,8 @@ from mirotwin.campaign.workers import Processes, Workers
 from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
 

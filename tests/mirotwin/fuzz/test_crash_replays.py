@@ -15,6 +15,8 @@ from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
 
+pytestmark = pytest.mark.slow
+
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 CRASHES = {
     "takes frames with a bad CRC": (b"\x0c\x09\x01\x00\x10\x00\x20\x00", "accepts_only_sent", 1),

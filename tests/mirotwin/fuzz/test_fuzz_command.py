@@ -13,6 +13,8 @@ from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 
+pytestmark = pytest.mark.slow
+
 MISTAKE = "takes frames with a bad CRC"
 
 

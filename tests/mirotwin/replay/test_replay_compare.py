@@ -1,7 +1,4 @@
-"""`mirotwin replay --compare`: how strictly a replay is compared, what is told of it, and the first instruction.
-
-Long because every option has its odd inputs, and all share two recordings.
-"""
+"""`mirotwin replay --compare`: how strictly a replay is compared, what is told of it, and the first instruction."""
 
 import json
 from typing import Any

@@ -1,8 +1,6 @@
 """Every fault that firmware can make, by the shortest program that makes it: kind, tick, instruction and symbol.
 
 Ticks are counted by hand: 12 a machine cycle, LJMP takes 2 cycles, so `main` begins in cycle 2.
-
-Long because each kind of fault has a program, and each program its ticks counted beside it.
 """
 
 from __future__ import annotations

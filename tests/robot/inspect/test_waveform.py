@@ -1,7 +1,4 @@
-"""Waveforms: every edge of every wire on its tick, against a twin that looks on every tick.
-
-Long because each kind of wire has its own stimulus and its own expected edges.
-"""
+"""Waveforms: every edge of every wire on its tick, against a twin that looks on every tick."""
 
 import io
 import itertools

@@ -1,7 +1,4 @@
-"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read.
-
-Long because one state machine has a rule for each pin and each command.
-"""
+"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on.
-
-Long because each command of the data sheet has its byte sequences.
-"""
+"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Every rule that was chosen can be read the other way, and then the chip does otherwise.
-
-Long because each option has a session for each of its readings.
-"""
+"""Every rule that was chosen can be read the other way, and then the chip does otherwise."""
 
 from __future__ import annotations
 

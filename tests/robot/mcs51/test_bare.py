@@ -1,7 +1,4 @@
-"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps.
-
-Long because each way in which a run ends has its own program.
-"""
+"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps."""
 
 from pathlib import Path
 

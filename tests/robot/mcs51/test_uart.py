@@ -1,8 +1,6 @@
 """The serial port on line levels: timing of the data sheet, two CPUs joined by Lines, and the naive twin.
 
 4316E is Atmel's 8051 Hardware Manual.
-
-Long because each mode and each flag of the serial port has a test, and they share a naive port.
 """
 
 import itertools

@@ -43,6 +43,8 @@ from mirotwin.campaign.reproduce.rows import (
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.commands import main
 
+pytestmark = pytest.mark.slow
+
 DAY = "2026-11-22"
 VALUES = {
     "rms_x_cm": 0.5,

@@ -1,7 +1,4 @@
-"""`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file.
-
-Long because each topic has its messages compared, field for field, with one recording.
-"""
+"""`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file."""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ import pytest
 from tests import children
 from tests.mirotwin.report.page.conftest import called
 
+pytestmark = pytest.mark.slow
+
 TESTS = """
 import pytest
 from mirotwin import Telemetry, ms

@@ -27,9 +27,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-pytestmark = pytest.mark.skipif(
-    not (browser.CHROMIUM and browser.CHROMEDRIVER), reason="needs chromium and chromedriver"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (browser.CHROMIUM and browser.CHROMEDRIVER), reason="needs chromium and chromedriver"
+    ),
+]
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,4 @@
-"""Mistakes to plant in the firmware's source, and the rules that each must fail.
-
-Long because it is one table, with a mistake for each rule at least.
-"""
+"""Mistakes to plant in the firmware's source, and the rules that each must fail."""
 
 from __future__ import annotations
 

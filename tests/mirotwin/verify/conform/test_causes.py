@@ -23,6 +23,8 @@ from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
 
+pytestmark = pytest.mark.slow
+
 LINES = 3
 
 

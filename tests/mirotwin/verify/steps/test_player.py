@@ -1,7 +1,4 @@
-"""Steps are done in virtual time: actions take none, waits end at their event and lose nothing.
-
-Long because each test has the steps of its own scenario.
-"""
+"""Steps are done in virtual time: actions take none, waits end at their event and lose nothing."""
 
 from __future__ import annotations
 
