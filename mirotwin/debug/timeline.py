@@ -282,9 +282,15 @@ class Timeline:
         self._settle()
 
     def _settle(self) -> None:
-        """Everything else on to where the processor in focus stands: it may have gone past a tick by an instruction."""
+        """Everything else on to where the processor in focus stands: it may have gone past a tick by an instruction.
+
+        The boards too, which are otherwise as far as the tick before it.
+        """
         if not self.run.over:
             self.run.to(self.tick)
+            for core in self.cores:
+                if core.board is not None:
+                    core.board.sync(self.machine.tick)
 
     def _run_to(self, tick: int, every: int = CONTROL_PERIOD_TICKS) -> None:
         while self.machine.tick < tick and not self.run.over:

@@ -55,3 +55,13 @@ def test_a_search_is_interrupted_between_two_pieces():
     timeline = Timeline(robot_run(), lambda: True)
     assert timeline.find({0: Trap((0x1FFF,), lambda core: True)}) is None
     assert 0 < timeline.tick < SECOND // 10
+
+
+def test_steps_leave_chips_and_encoders_where_a_straight_run_has_them():
+    timeline = Timeline(robot_run())
+    timeline.go_to(14_075_000)
+    stops = []
+    for _ in range(400):
+        timeline.step()
+        stops.append((timeline.tick, timeline.machine.save()))
+    assert differences(stops, robot_run()) == []
