@@ -38,13 +38,13 @@ SIX = Path(__file__).parents[1] / "examples" / "two_teams.toml"
 
 
 def run_of(scenario: str, seconds: float) -> RobotRun:
-    """A run at its begin; the circle goes on as long as is needed."""
+    """A run at its start; the circle goes on as long as is needed."""
     text = load(scenario, [f"duration_s={seconds + 0.5}"] if scenario == "curve" else [])
     return RobotRun(World(text.scenario, 0, load_firmware()))
 
 
 def debugger_of(run: RobotRun, everyone: bool = True) -> Debugger:
-    """At the begin of `run`, with the sources of the robot's own firmware."""
+    """At the start of `run`, with the sources of the robot's own firmware."""
     folder = source_folder()
     assert folder is not None
     return Debugger(Timeline(run), Symbols(run.image, [folder]), everyone)

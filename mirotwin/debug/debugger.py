@@ -89,7 +89,7 @@ class Debugger:
 
     @property
     def _went(self) -> bool:
-        """Whether it stands behind the begin of the run."""
+        """Whether it stands behind the start of the run."""
         return self.timeline.tick > self.timeline.begin_tick
 
     @property
@@ -99,7 +99,7 @@ class Debugger:
     # Breakpoints
 
     def add(self, text: str, addresses: Collection[int], condition: str = "", count: str = "") -> Breakpoint:
-        """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is none."""
+        """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is not one."""
         self._numbers += 1
         found = Breakpoint(self._numbers, text, frozenset(addresses))
         found.condition = expression(condition) if condition else None
@@ -197,7 +197,7 @@ class Debugger:
         return False
 
     def _count_up(self) -> None:
-        """Counts the hits from the begin of the run up to now, where a breakpoint asks for their number."""
+        """Counts the hits from the start of the run up to now, where a breakpoint asks for their number."""
         behind = [
             one for one in self.breakpoints if one.count is not None and one.counted_to < self.timeline.tick
         ]
@@ -414,7 +414,7 @@ class Debugger:
         return "begin" if hit is None else str(hit.found)
 
     def _begin_of_line(self) -> None:
-        """To where the line began that is under way: behind the last other line of this frame, or its entry."""
+        """To where the line began that is under way: after the last other line of this frame, or its entry."""
         timeline, frame, line = self.timeline, self.frames()[0], self._line_is(self.core)
         if self.cpu.pc == frame.entry:
             return

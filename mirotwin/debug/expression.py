@@ -190,7 +190,7 @@ class _Reader:
         self.next()
 
     def next(self) -> str:
-        """Takes the token that is next, and looks at the one behind it."""
+        """Takes the token that is next, and looks at the one after it."""
         taken = getattr(self, "token", "")
         found = _TOKEN.match(self.text, self.at)
         if found is None and self.text[self.at :].strip():

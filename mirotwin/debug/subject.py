@@ -114,7 +114,7 @@ def _nameless(path: Path) -> str:
 
 
 def _case(options: DebugSubject) -> tuple[Job, Any] | None:
-    """The job and the image of a case; None for what is none."""
+    """The job and the image of a case; None for what is not one."""
     path = options.subject or ""
     if not os.path.isfile(path) or path.lower().endswith((*IMAGE_SUFFIXES, ".toml")):
         return None

@@ -197,7 +197,7 @@ class _BareMachine:
 
 
 class Timeline:
-    """`run` from its begin on. `interrupted` is asked between pieces: true ends a search where it is."""
+    """`run` from its start on. `interrupted` is asked between pieces: true ends a search where it is."""
 
     def __init__(self, run: RobotRun | BareRun, interrupted: Callable[[], bool] = lambda: False) -> None:
         self.machine = _RobotMachine(run) if isinstance(run, RobotRun) else _BareMachine(run)
@@ -321,7 +321,7 @@ class Timeline:
             self._settle()
 
     def step_back(self) -> bool:
-        """To before the last instruction or interrupt entry, or to the begin of sleep; False where there is none."""
+        """To before the last instruction or interrupt entry, or to the start of sleep; False where there is none."""
         cpu, cycle = self.core.cpu, self.core.cpu.cycles
         self._look_closely(self.tick)
         self._load(self._before(self.tick))
@@ -388,7 +388,7 @@ class Timeline:
         return False
 
     def find_back(self, traps: Mapping[int, Trap], closely: bool = False) -> Hit | None:
-        """Goes back to the last moment before this one at which a trap finds something; None, at the begin of the run
+        """Goes back to the last moment before this one at which a trap finds something; None, at the start of the run
         or where it was interrupted, if there is none. `closely`: it is likely to be near.
         """
         now = (self.core.cpu.cycles, self.focus)

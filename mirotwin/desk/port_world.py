@@ -43,7 +43,7 @@ class PortNetwork(msgspec.Struct, frozen=True):
 
 
 class PortWorld:
-    """The robots at `port`, whose network and duration are those of `scenario`; tick 0 is behind the greeting.
+    """The robots at `port`, whose network and duration are those of `scenario`; tick 0 is after the greeting.
 
     `accepted` and `rejected` count from there, as from a power-on.
     """

@@ -75,9 +75,7 @@ def _talk(
     )
     offset = -(-port.tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS + CONTROL_PERIOD_TICKS
     offset = max(offset - sent[0].tick, 0)
-    complain(
-        f"all times are {seconds(offset):.3f} s later than in the file, which begins behind the greeting"
-    )
+    complain(f"all times are {seconds(offset):.3f} s later than in the file, which begins after the greeting")
     with ProgressBar("sending", sent[-1].end_tick, quiet) as bar:
 
         def went(one: Transmission) -> None:
@@ -125,7 +123,7 @@ def _default(file: str) -> Path:
 def twin_source(
     scenario: Scenario, seed: int, image: Image, duration_s: float, firmware: bytes = b""
 ) -> RunSource:
-    """What the twin of robots at a port is made from; `firmware` is the image's file where that is none on the disk."""
+    """What the twin of robots at a port is made from; `firmware`: the file of an image that is not on the disk."""
     twin = _twin(scenario, duration_s + SPARE_S)
     return RunSource(
         scenario_name=twin.name,

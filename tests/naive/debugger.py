@@ -42,7 +42,7 @@ class History(Watcher):
 
 
 def history(run, until_tick):
-    """The moments of a run from its begin on."""
+    """The moments of a run from its start on."""
     watcher = History()
     watcher.note(run.cpu)
     attach(run.cpu, watcher)

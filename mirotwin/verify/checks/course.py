@@ -38,7 +38,7 @@ class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
 
 
 class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
-    """From so long after the begin of the run on the robot stays within `position_cm` and `heading_rad` of its
+    """From so long after the start of the run on the robot stays within `position_cm` and `heading_rad` of its
     reference.
     """
 

@@ -140,7 +140,7 @@ class Monitor(Generic[C_co]):
         """The firmware did what it must not."""
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        """The robot as it was at `tick`, the begin of the control period that is over."""
+        """The robot as it was at `tick`, the start of the control period that is over."""
 
     def until(self, tick: int) -> None:
         """All events before `tick` have been told."""

@@ -51,7 +51,7 @@ BOOTED_MS = 40.0
 """A robot is ready for its first frame so long after power-on (a camera frame and a little more). Chosen."""
 ACTING_MS = ACTING_TICKS / TICKS_PER_MS
 GAP_MS = ACTING_MS + 2.0
-"""From the end of a frame to the begin of the next, unless a rule says otherwise: time to act."""
+"""From the end of a frame to the start of the next, unless a rule says otherwise: time to act."""
 Pairs = tuple[tuple[int, int], ...]
 Found = tuple[int, str] | None
 """What is wrong: since which tick, and what was found instead. None: nothing."""

@@ -43,7 +43,7 @@ class InputPiece(NamedTuple):
 class SerialInput:
     """Sends `pieces` to the serial port of `cpu`, bit by bit at `baud`, or at the rate that its receiver is set to.
 
-    `gap_ticks`: least time from the end of a character to the begin of the next. `live`: more may be added any time.
+    `gap_ticks`: least time from the end of a character to the start of the next. `live`: more may be added any time.
     Raises ValueError for a rate that the crystal does not allow.
     """
 

@@ -134,7 +134,7 @@ class StackReader:
         return {address: at.height for address, at in reached.items()}, unknown
 
     def _table(self, address: int) -> Iterator[int]:
-        """The jumps that follow JMP @A+DPTR one behind the other, as SDCC writes a table."""
+        """The jumps that follow JMP @A+DPTR one after the other, as SDCC writes a table."""
         while self._loaded(address) and self.code[address] in _TABLE_JUMPS:
             yield address
             address += LENGTH[self.code[address]]

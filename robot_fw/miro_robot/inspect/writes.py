@@ -85,7 +85,7 @@ def cpu_bit(cpu: Cpu, bit: int) -> int:
 
 
 def instructions_of(code: bytes, used: Iterable[tuple[int, int]], known: Iterable[int]) -> set[int]:
-    """Where instructions may begin: the `known` places, and those one behind the other from each of them on."""
+    """Where instructions may begin: the `known` places, and those one after the other from each of them on."""
     found: set[int] = set()
     loaded = [range(first, end) for first, end in used]
     waiting = sorted({*known, *(one.start for one in loaded)})

@@ -18,5 +18,5 @@ def robot_run(scenario="fig6", seed=3, firmware=None, index=0):
 
 
 def debugger_of(run, everyone=False):
-    """A debugger at the begin of `run`, with the sources of the robot's own firmware."""
+    """A debugger at the start of `run`, with the sources of the robot's own firmware."""
     return Debugger(Timeline(run), Symbols(run.image, [source_folder()]), everyone)
