@@ -130,7 +130,8 @@ def test_the_same_by_a_check(link, world):
     assert "2 failed" in failed.stdout
     assert "motion_stop was not reached within 111 ms" in failed.stdout
     (line, _) = re.findall(r"^  (pytest .*)$", failed.stdout, re.MULTILINE)
-    (replay,) = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    replay, debug = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    assert debug == replay.replace("mirotwin replay", "mirotwin debug")
     left = re.search("left/[^/]+/firmware.ihx", replay)
     assert left is not None
     assert replay.endswith(f"/case.stream --firmware {left[0]}")
@@ -182,7 +183,7 @@ def test_counts(link):
 """
     options = ["--mirotwin-firmware", "mine.ihx", "--mirotwin-artifacts=left"]
     failed = session(tmp_path / "session", *options, tests=tests)
-    (line,) = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    line, _ = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
     shutil.move(tmp_path / "session" / "left", tmp_path / "elsewhere" / "left")
     shutil.rmtree(tmp_path / "session")
     (folder,) = (tmp_path / "elsewhere" / "left").iterdir()
