@@ -10,7 +10,6 @@ from mirotwin.shell.console import show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.bare.case import replay_bare
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path
 from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
@@ -40,6 +39,8 @@ def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
         raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
+    from mirotwin.verify.bare.case import replay_bare  # loads the bare processor
+
     return _say(replay_bare(path, load_firmware(firmware, SPACE_BYTES), check))
 
 

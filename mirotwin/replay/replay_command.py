@@ -22,7 +22,6 @@ from mirotwin.replay.differences import differences_as_json, print_differences, 
 from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.replay_case import replay_bare_case, replay_case
 from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, firmwares_apart, load_images
-from mirotwin.replay.replay_port import compare_with_twin, record_at_port
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.rerun.job import Job, load_job, rerun_job
 from mirotwin.rerun.runner import report_faults
@@ -125,12 +124,16 @@ def replay(options: ReplayOptions) -> int:
     checked_sources(options.sources)
     desk = options.desk
     if desk.port:
+        from mirotwin.replay.replay_port import record_at_port  # loads pyserial
+
         recorded = record_at_port(
             job, image, file, desk, desk.port, options.out, options.force, options.quiet
         )
         file = str(recorded)
         job, image = load_job(file, None, options.engine)
     if job.origin:
+        from mirotwin.replay.replay_port import compare_with_twin
+
         tolerance = compare.tolerance(file)
         return compare_with_twin(
             job, image, file, tolerance, options.everything, options.quiet, compare.as_json

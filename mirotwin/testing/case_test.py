@@ -13,7 +13,6 @@ from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES
 from mirotwin.rerun.job import load_stream, rerun_job
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.bare.case import check_of_case, replay_bare
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.registry import ALWAYS_ON
 from mirotwin.verify.steps.running import Outcome
@@ -39,6 +38,8 @@ class CaseTests:
         """The one of --check that a case names."""
         if not self.checks or not is_bare_case(path):
             return None
+        from mirotwin.verify.bare.case import check_of_case  # loads the bare processor
+
         name = check_of_case(path)
         return next((text for text in self.checks if text.rpartition(":")[2] == name), None)
 
@@ -61,6 +62,8 @@ class CaseTests:
         )
 
     def _run_bare(self, path: str) -> Outcome:
+        from mirotwin.verify.bare.case import replay_bare
+
         if self.firmware is None:
             remedy = "give --firmware IMAGE.ihx"
             raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)

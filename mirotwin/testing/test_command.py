@@ -26,7 +26,6 @@ from mirotwin.shell.options import (
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.testing.case_test import CaseTests
-from mirotwin.testing.port_test import NOTED, run_port_test
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_debug_line, case_line, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
@@ -140,6 +139,8 @@ def test(options: TestOptions) -> int:
     for file in chosen:
         began_s = time.perf_counter()
         if desk.port:
+            from mirotwin.testing.port_test import run_port_test  # loads pyserial
+
             again = options.line_for(file)
             image = load_firmware(options.firmware)
             outcome = run_port_test(file, image, desk, desk.port, settings, options.artifacts)
@@ -213,7 +214,7 @@ def _summary(outcomes: Sequence[Outcome]) -> int:
     }
     said = ", ".join(f"{count} {words[verdict]}" for verdict, count in counted.items() if count)
     unseen = sum(one.unseen for one in outcomes)
-    show_line(said + (f"; {unseen} steps and expectations are {NOTED}" if unseen else ""))
+    show_line(said + (f"; {unseen} steps and expectations are not observable on a port" if unseen else ""))
     return next(code for verdict, code in CODES.items() if counted[verdict])
 
 

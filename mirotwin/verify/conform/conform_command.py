@@ -41,7 +41,6 @@ from mirotwin.verify.cases.artifacts import (
     report_line,
 )
 from mirotwin.verify.cases.case import write_case
-from mirotwin.verify.conform.by_answers import PORT_VERDICTS, PortOutcome, try_at_port
 from mirotwin.verify.conform.causes import begin_with, causes_first, folded
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
@@ -146,6 +145,8 @@ def conform(options: ConformOptions) -> int:
 
 def _conform_at_port(rules: Sequence[Rule], options: ConformOptions, url: str) -> int:
     """Tries rules on the robot at the port; the exit code."""
+    from mirotwin.verify.conform.by_answers import PORT_VERDICTS, PortOutcome, try_at_port  # loads pyserial
+
     outcomes: list[PortOutcome] = []
     names = {rule.id: rule.name for rule in rules}
     with ProgressBar("trying rules", len(rules), options.quiet) as bar:

@@ -78,6 +78,20 @@ def test_help_loads_click_and_nothing_that_is_slow():
     ]
 
 
+@pytest.mark.parametrize("arguments", [["replay", "--help"], ["test", "--help"], ["conform", "--list"]])
+def test_a_command_without_a_port_loads_nothing_for_ports_or_the_bare_processor(arguments):
+    script = (
+        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
+        "print('loaded:', *sorted(sys.modules))"
+    )
+    done = children.run(
+        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
+    )
+    loaded = done.stdout.rpartition("loaded: ")[2].split()
+    assert "mirotwin.desk.options" in loaded
+    assert not {"serial", "mirotwin.desk.robot_port", "mirotwin.verify.bare"}.intersection(loaded)
+
+
 def test_a_command_of_fw_loads_no_other():
     script = (
         "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
