@@ -2,7 +2,8 @@
 
 A rule is seen in what the robot answers (`ANSWERS`), or in how many frames it has accepted by the end of the trial
 (`COUNTED`). What a PC cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses
-within a frame that are shorter than it can time. A trial that fails although characters came in time is a failure;
+within a frame that are shorter than it can time. Where answers of a robot that breaks the rule may be the same, only a
+failure is a verdict (`ONLY_FAILURES`). A trial that fails although characters came in time is a failure;
 where they did not, it is tried again, and in the end not judged.
 """
 
@@ -45,6 +46,11 @@ _REASONS: dict[str, tuple[str, ...]] = {
 }
 NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids}
 """Why a rule cannot be seen at a port."""
+ONLY_FAILURES = {
+    "P10": "a keyed radio fills pauses with noise, which spoils the frame for every robot",
+    "P34": "answers tell that a service frame is fresh, and not what wheels are told",
+}
+"""Why a robot that does not fail a rule is not judged: one that breaks it may answer the same."""
 LEFT_OUT = {
     "bad stop bits": ("P04", "P13", "P43", "P49"),
     "pauses within a frame of less than 5 ms": ("P04", "P10", "P13", "P49"),
@@ -160,6 +166,8 @@ def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> PortOutcome:
             if not error.remedy or "--" not in error.remedy:
                 raise
             return PortOutcome(rule.id, "not judged", f"{error.what}; {error.remedy}")
+        if not found and rule.id in ONLY_FAILURES:
+            return PortOutcome(rule.id, "not judged", f"it does not fail, but {ONLY_FAILURES[rule.id]}")
         if not found:
             return PortOutcome(rule.id, "passed")
         if unsure <= SURE_TICKS:

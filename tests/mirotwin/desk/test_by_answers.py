@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from mirotwin.verify.conform.by_answers import ANSWERS, COUNTED, NOT_OBSERVABLE
+from mirotwin.verify.conform.by_answers import ANSWERS, COUNTED, NOT_OBSERVABLE, ONLY_FAILURES
 from mirotwin.verify.conform.table import ALL
 from tests.mirotwin.desk.rig import ROBOT
 from tests.mutants.build import build, compiler
@@ -12,7 +12,7 @@ from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
 
 QUICK = "set=camera={kind=%22gaussian%22}"
-SEEN = tuple(rule for rule in (*ANSWERS, *COUNTED) if rule != "P61")
+SEEN = tuple(rule for rule in (*ANSWERS, *COUNTED) if rule not in {"P61", *ONLY_FAILURES})
 
 
 def verdicts(mirotwin, robot, rules, *options):
@@ -34,6 +34,15 @@ def test_every_rule_is_either_seen_or_said_why_not():
 def test_the_shipped_firmware_passes_each_rule_that_answers_show(mirotwin, rule):
     found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])
     assert found[rule] == {"rule": rule, "verdict": "passed", "text": ""}
+
+
+@pytest.mark.parametrize("rule", ONLY_FAILURES)
+def test_a_rule_that_another_robot_may_seem_to_keep_is_not_passed(mirotwin, rule):
+    found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])[rule]
+    assert (found["verdict"], found["text"]) == (
+        "not judged",
+        f"it does not fail, but {ONLY_FAILURES[rule]}",
+    )
 
 
 def test_what_answers_do_not_show_is_never_passed(mirotwin):
@@ -89,3 +98,23 @@ def test_a_mistake_that_answers_do_not_show_passes_nothing_that_it_breaks(mirotw
     rules = {"stops by opening the loops": "P31", "takes bad stop bits": "P09"}
     rule = rules.get(name, "P22")
     assert verdicts(mirotwin, robot_with(name), [rule])[rule]["verdict"] == "not observable"
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("does not look at spacings", "P10"),
+        ("takes gaps of 90 us", "P10"),
+        ("stops for a service frame", "P34"),
+    ],
+)
+def test_a_mistake_that_does_not_show_is_not_passed(mirotwin, name, rule):
+    assert verdicts(mirotwin, robot_with(name), [rule])[rule]["verdict"] == "not judged"
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@pytest.mark.parametrize(("radio", "verdict"), [("squelch=true", "failed"), ("squelch=false", "not judged")])
+def test_noise_in_a_pause_hides_that_a_robot_does_not_look_at_spacings(mirotwin, radio, verdict):
+    robot = f"{robot_with('does not look at spacings')}&set=network.radio.{radio}"
+    assert verdicts(mirotwin, robot, ["P10"])["P10"]["verdict"] == verdict
