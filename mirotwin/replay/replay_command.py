@@ -110,7 +110,7 @@ def replay(options: ReplayOptions) -> int:
     """
     file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
     if is_bare_case(file):
-        _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD))
+        _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
         choose_engine(options.engine)
         return replay_bare_case(file, options.firmware, options.check)
     _refuse(file, "is for a case of a bare processor", options.given("check"))
@@ -123,6 +123,10 @@ def replay(options: ReplayOptions) -> int:
     images = load_images(options.lines_from, job.image)
     checked_sources(options.sources)
     desk = options.desk
+    decides = any(".expect." in f".{one}" for one in settings)
+    if decides and (desk.port or job.origin):
+        what = "is not for a robot at a port, of which only answers are known"
+        raise BadInput(file, "--expect", what, "leave it out: the answers are compared with the twin's")
     if desk.port:
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
@@ -168,7 +172,6 @@ def replay(options: ReplayOptions) -> int:
     differs = _verdict(job, compare, periods, replayed, found, apart)
     if found and not options.quiet and not compare.as_json:
         show(debug_line(file, options.firmware, found[0].tick))
-    decides = any(".expect." in f".{one}" for one in settings)
     code = (faults or failed) if decides else (differs or faults or failed)
     if compare.as_json:
         compared = {

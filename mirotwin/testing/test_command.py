@@ -110,7 +110,7 @@ def test(options: TestOptions) -> int:
 
     With --port the steps go to a real robot: those that a PC can do and see. The others, and what is expected of a
     robot's inside, are not observable on a port: that is told and counted, and never passes. --artifacts leaves the
-    recording.
+    recording. A case is refused.
 
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
     none. Where several apply: 2, then 3, then 1.
@@ -127,6 +127,10 @@ def test(options: TestOptions) -> int:
             what,
             "nothing was tested; a test is a scenario or a case in such a file",
         )
+    case = next((file for file in chosen if file.endswith(CASE_SUFFIX)), None)
+    if desk.port and case is not None:
+        what = "a case is judged by what is inside the twin, which no port shows"
+        raise BadInput(case, "--port", what, "leave it out, or send it with `mirotwin replay`")
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", *chosen)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.mirotwin.desk.rig import ROBOT
+from tests.mirotwin.desk.rig import ROBOT, stream_text
 
 pytest_plugins = ["pytester"]
 HEAD = """
@@ -174,3 +174,25 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
             "*`set_radio` of a robot's world: not observable on a port*",
         ]
     )
+
+
+def test_a_case_is_refused_before_anything_is_sent(mirotwin, at_port, tmp_path):
+    at_port(POLL)
+    body = stream_text(1).partition("\n")[2]
+    (tmp_path / "old.stream").write_text(f"# mirotwin stream 2\n#: expect.no_fault = true\n{body}")
+    code, out, err = mirotwin("test", tmp_path, "--port", ROBOT)
+    assert (code, out) == (2, "")
+    assert err == (
+        f"mirotwin: error: {tmp_path}/old.stream: --port: a case is judged by what is inside the twin,"
+        " which no port shows; leave it out, or send it with `mirotwin replay`\n"
+    )
+    code, out, _ = mirotwin("test", tmp_path, "-k", "scenario", "--port", ROBOT)
+    assert (code, out.splitlines()[-1]) == (0, "1 passed")
+
+
+def test_the_page_of_a_failure_shows_the_robot_beside_its_twin(at_port, tmp_path):
+    wrong = POLL.replace("accepted = 1", "accepted = 3")
+    code, out, _ = at_port(wrong, "--artifacts", tmp_path / "left", "--pages")
+    (page,) = (tmp_path / "left").rglob("report.html")
+    assert (code, f"    left in {page.parent}" in out.splitlines()) == (1, True)
+    assert "Robot 0 and its twin" in page.read_text()

@@ -61,3 +61,24 @@ def test_what_no_port_shows_cannot_be_compared(mirotwin, drive, option):
 def test_answers_are_compared_at_ports_only(mirotwin, finished):
     code, _, err = mirotwin("replay", finished, "--compare", "answers")
     assert (code, "is for robots at a port" in err) == (2, True)
+
+
+def test_what_is_expected_of_a_robot_is_refused_before_anything_is_sent(mirotwin, drive):
+    expected = ("--expect", "frames_accepted_min=99")
+    code, _, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", *expected)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--expect: is not for a robot at a port, of which only answers are known" in err
+    assert not (drive.parent / "runs").exists()
+    mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", "--out", "desk")
+    code, _, err = mirotwin("replay", "desk", *expected)
+    assert (code, "--expect: is not for a robot at a port" in err) == (2, True)
+
+
+def test_a_case_of_a_bare_processor_is_refused(mirotwin, tmp_path):
+    case = tmp_path / "bare.stream"
+    case.write_text("# mirotwin stream 2\n#: [bare]\n#: bit_ticks = 1152\n1000 > 61\n")
+    code, _, err = mirotwin("replay", case, "--port", ROBOT)
+    assert (code, err) == (
+        2,
+        f"mirotwin: error: {case}: --port: is not for a case of a bare processor; leave it out\n",
+    )
