@@ -14,7 +14,6 @@ from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import TICKS_PER_MS
 from miro_robot.image import Image
 from mirotwin.desk.compare import AnswerTolerance, PortComparison, RobotBesideTwin, compare
-from mirotwin.recording.difference import first_per_channel
 from mirotwin.report.page.document import render
 from mirotwin.rerun.job import Job, rerun_job
 from mirotwin.shell.progress import ProgressBar
@@ -22,13 +21,14 @@ from mirotwin.shell.progress import ProgressBar
 FIRST = 200
 """Differences that are listed."""
 _WRAPS = {"position_left": 1 << 16, "position_right": 1 << 16, "accepted": 1 << 8, "rejected": 1 << 8}
-_SHOWN: tuple[tuple[str, str], ...] = (
-    ("left position [counts]", "position_left"),
-    ("right position [counts]", "position_right"),
-    ("flags", "flags"),
-    ("accepted", "accepted"),
-    ("rejected", "rejected"),
+_SHOWN: tuple[tuple[str, str, str], ...] = (
+    ("left position [counts]", "position_left", "left moved"),
+    ("right position [counts]", "position_right", "right moved"),
+    ("flags", "flags", "flags"),
+    ("accepted", "accepted", "accepted"),
+    ("rejected", "rejected", "rejected"),
 )
+"""Heading, field of an answer, and the channel whose differences are marked; those of whole answers are in all."""
 
 
 def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
@@ -39,9 +39,11 @@ def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
     robots = job.scenario.networks[0].robots
     found = compare(job.recorded, again.periods, robots, AnswerTolerance())
     figures = {
-        f"plot-{robot.slot}-{name}": _figure(robot, label, name, seconds(end_tick), found)
+        f"plot-{robot.slot}-{name}": _figure(
+            robot, label, name, seconds(end_tick), _marks(found, robot.slot, channel)
+        )
         for robot in found.robots
-        for label, name in _SHOWN
+        for label, name, channel in _SHOWN
     }
     values = {
         "file": Path(file).name,
@@ -53,7 +55,6 @@ def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
         "answers": sum(1 for robot in found.robots for pair in robot.pairs if pair.port),
         "unsure_ms": max((robot.unsure_ticks for robot in found.robots), default=0) / TICKS_PER_MS,
         "count": len(found.differences),
-        "channels": first_per_channel(found.differences),
         "differences": found.differences[:FIRST],
         "silent": found.silent,
         "not_judged": found.not_judged,
@@ -61,7 +62,13 @@ def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
     return render("port.html", figures, msgspec.json.encode({}), values)
 
 
-def _figure(robot: RobotBesideTwin, label: str, name: str, end_s: float, found: PortComparison) -> Any:
+def _marks(found: PortComparison, slot: int, channel: str) -> list[float]:
+    """When robot and twin part in the channel."""
+    parted = [one for one in found.differences if one.slot == slot and one.channel in ("answer", channel)]
+    return list(dict.fromkeys(seconds(one.tick) for one in parted))[:FIRST]
+
+
+def _figure(robot: RobotBesideTwin, label: str, name: str, end_s: float, marks: list[float]) -> Any:
     from bokeh.models import Range1d
 
     from mirotwin.report.page.axes import add_failures, panel, tagged
@@ -76,8 +83,7 @@ def _figure(robot: RobotBesideTwin, label: str, name: str, end_s: float, found: 
         values = _unwrapped([one.said for one in answers], name)
         line = made.step(times, values, mode="after", line_width=width)
         tagged(line.glyph, line_color=colour)
-    marks = [seconds(one.tick) for one in found.differences if one.slot == robot.slot]
-    add_failures(made, list(dict.fromkeys(marks))[:FIRST])
+    add_failures(made, marks)
     return made
 
 

@@ -4,6 +4,9 @@ import re
 
 import pytest
 
+from mirotwin.desk.compare import PortComparison
+from mirotwin.recording.difference import Difference
+from mirotwin.report.page.port_page import _marks
 from tests.mirotwin.desk.rig import ROBOT
 
 pytest.importorskip("bokeh")
@@ -32,3 +35,12 @@ def test_where_they_part_stands_in_the_table(page):
     text = page(f"{ROBOT}&set=network.radio.lost_frames=0.2")
     assert ">differs<" in text
     assert re.search(r"<td>/net0/robot0/(answer|accepted|left moved)</td>", text)
+
+
+def test_a_difference_is_marked_in_the_plot_of_its_channel_and_in_no_other():
+    left = Difference(24_000_000, 29, 0, 0, "left moved", 408, -414)
+    lost = Difference(48_000_000, 59, 0, 0, "answer", None, "to question 5")
+    found = PortComparison([], [left, left, lost])
+    assert _marks(found, 0, "left moved") == [1.0, 2.0]
+    assert _marks(found, 0, "flags") == [2.0]
+    assert _marks(found, 1, "left moved") == []
