@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import click
 import msgspec
@@ -47,6 +47,9 @@ from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.verify.conform.table import ALL as EVERY_RULE
 from mirotwin.verify.conform.table import LONG, RULES, chapter_of, find
+
+if TYPE_CHECKING:
+    from mirotwin.verify.conform.by_answers import PortOutcome
 
 LINES = 5
 """Firmware faults that are listed."""
@@ -144,17 +147,29 @@ def conform(options: ConformOptions) -> int:
 
 
 def _conform_at_port(rules: Sequence[Rule], options: ConformOptions, url: str) -> int:
-    """Tries rules on the robot at the port; the exit code."""
-    from mirotwin.verify.conform.by_answers import PORT_VERDICTS, PortOutcome, try_at_port  # loads pyserial
+    """Tries rules on the robot at the port; the exit code. Where the robot is lost, what was found is told first."""
+    from mirotwin.verify.conform.by_answers import try_at_port  # loads pyserial
 
     outcomes: list[PortOutcome] = []
     names = {rule.id: rule.name for rule in rules}
-    with ProgressBar("trying rules", len(rules), options.quiet) as bar:
-        for outcome in try_at_port(rules, url, options.desk.limits):
-            outcomes.append(outcome)
-            bar.to(len(outcomes))
-            if options.as_json:
-                click.echo(msgspec.json.encode(outcome))
+    try:
+        with ProgressBar("trying rules", len(rules), options.quiet) as bar:
+            for outcome in try_at_port(rules, url, options.desk.limits):
+                outcomes.append(outcome)
+                bar.to(len(outcomes))
+                if options.as_json:
+                    click.echo(msgspec.json.encode(outcome))
+    finally:
+        if outcomes:
+            _tell_of_port(outcomes, names, options, url)
+    return EXPECTATION_FAILED if any(one.verdict == "failed" for one in outcomes) else DONE
+
+
+def _tell_of_port(
+    outcomes: Sequence[PortOutcome], names: dict[str, str], options: ConformOptions, url: str
+) -> None:
+    from mirotwin.verify.conform.by_answers import PORT_VERDICTS
+
     if options.junit is not None:
         verdicts = {"passed": "passed", "failed": "failure"}
         cases = [
@@ -179,7 +194,6 @@ def _conform_at_port(rules: Sequence[Rule], options: ConformOptions, url: str) -
             show(table)
         counts = [f"{sum(one.verdict == verdict for one in outcomes)} {verdict}" for verdict in PORT_VERDICTS]
         show(f"{len(outcomes)} rules: {', '.join(counts)}")
-    return EXPECTATION_FAILED if any(one.verdict == "failed" for one in outcomes) else DONE
 
 
 def _explain(rule: Rule, firmware: Image, seed: int) -> int:

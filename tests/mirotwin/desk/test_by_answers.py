@@ -118,3 +118,13 @@ def test_a_mistake_that_does_not_show_is_not_passed(mirotwin, name, rule):
 def test_noise_in_a_pause_hides_that_a_robot_does_not_look_at_spacings(mirotwin, radio, verdict):
     robot = f"{robot_with('does not look at spacings')}&set=network.radio.{radio}"
     assert verdicts(mirotwin, robot, ["P10"])["P10"]["verdict"] == verdict
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+def test_what_was_found_before_a_robot_fell_silent_is_told(mirotwin, tmp_path):
+    robot = robot_with("loses sync for good after a bad CRC")
+    rules = ("--rule", "P05", "--rule", "P07", "--rule", "P08")
+    code, out, err = mirotwin("conform", "--port", robot, *rules, "--junit", tmp_path / "j.xml")
+    assert (code, "no robot of a network of 3 answers 12 questions" in err) == (2, True)
+    assert out.splitlines()[-1] == "2 rules: 1 passed, 1 failed, 0 not judged, 0 not observable"
+    assert (tmp_path / "j.xml").read_text().count("<testcase") == 2
