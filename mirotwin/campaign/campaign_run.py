@@ -60,6 +60,7 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
     ] = None
     engine: Engine = None
     force: Annotated[bool, FORCE.saying("Replace results that are there, or parts of them.")] = False
+    yes: Annotated[bool, Option(help=f"More than {running.MANY_RUNS} runs are meant.")] = False
     quiet: Annotated[bool, QUIET] = False
 
 
@@ -81,6 +82,7 @@ def run(options: CampaignOptions) -> int:
     if options.seeds is not None:
         plan = _with_seeds(plan, options.seeds)
     results = options.out or Path("runs") / f"{options.file.stem}.parquet"
+    running.refuse_many(plan, options.yes)
     if not options.force and running.complete(results, running.head_of(plan)):
         if not options.quiet:
             show_line(f"{results} has all {plan.runs} runs already")
@@ -124,7 +126,7 @@ def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) 
         bar.to(tally.done)
 
     try:
-        tally = running.run(plan, results, workers, force=force, on_outcome=show)
+        tally = running.run(plan, results, workers, force=force, many=True, on_outcome=show)
     except BaseException:
         if last is not None:
             where = f"{last.done} of {plan.runs} runs are in {journal_path(results)}"

@@ -17,6 +17,9 @@ from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.outputs import check_file
 
+MANY_RUNS = 100_000
+"""More have to be asked for: they take most of a day."""
+
 
 class Tally(msgspec.Struct):
     """So many runs have an outcome, in all and in this process, and how many of each kind came in this process."""
@@ -31,22 +34,31 @@ def head_of(plan: Plan) -> Head:
     return Head(FORM, plan.hash, plan.versions, plan.runs)
 
 
+def refuse_many(plan: Plan, agreed: bool) -> None:
+    """Raises BadInput for a campaign that nobody can have meant, unless it was `agreed` to."""
+    if plan.runs > MANY_RUNS and not agreed:
+        what = f"has {plan.runs} runs, more than {MANY_RUNS}"
+        raise BadInput(plan.file.path, "", what, "take fewer seeds or levels, or say --yes")
+
+
 def run(
     plan: Plan,
     results: str | Path,
     executor: Executor | Workers | None = None,
     *,
     force: bool = False,
+    many: bool = False,
     on_outcome: Callable[[Tally, RunOutcome], object] = lambda tally, outcome: None,
 ) -> Tally:
     """Makes all runs that `results` lacks, and writes it.
 
     `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Results that are
     there already are those of the same campaign, and are left as they are, or BadInput is raised; with `force` they are
-    made again. Interrupted, it goes on when it is called again.
+    made again. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again.
     """
     path = Path(results)
     tables.require_arrow()
+    refuse_many(plan, many)
     head = head_of(plan)
     path.parent.mkdir(parents=True, exist_ok=True)
     if not force and complete(path, head):

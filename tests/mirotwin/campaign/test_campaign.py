@@ -240,10 +240,14 @@ network.radio.keyup_s = [0.001, 0.005]
     assert (found[3]["digest"], found[3]["rms_x_cm"], found[3]["check.no_fault"]) == ("", None, None)
 
 
-def test_ten_million_runs_are_a_plan_that_numbers_them():
+def test_ten_million_runs_have_to_be_asked_for(tmp_path):
     plan = plan_of(SHORT.replace("3-5", "0-4999999"))
     assert plan.runs == 10_000_000
     assert plan.work(9_999_999).seed == 4_999_999
+    with pytest.raises(BadInput, match=r"short\.toml: has 10000000 runs"):
+        campaign.run(plan, tmp_path / "short.parquet")
+    assert list(tmp_path.iterdir()) == []
+    running.refuse_many(plan, agreed=True)
 
 
 STEPS = """
