@@ -109,6 +109,7 @@ def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
     assert (cured.code, cured.lines[0].partition(":")[0]) == (0, "cured")
 
 
+@pytest.mark.slow
 @needs_sdcc
 def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images, tmp_path):
     """Its finds are given as seeds, so that a second is enough."""

@@ -24,6 +24,7 @@ def words(text):
     return TIME.sub("in N s (N x real time", " ".join(text.split()))
 
 
+@pytest.mark.slow
 def test_the_film_shows_what_its_commands_print_today():
     expected = []
     for command, lines in zip(COMMANDS, recorded(COMMANDS, COLUMNS, ROWS), strict=True):

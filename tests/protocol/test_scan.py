@@ -32,6 +32,7 @@ def form_for(heard, telemetry):
     return table.TELEMETRY if telemetry else table.downlink(heard.n)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=150)
 @given(streams, st.sampled_from([1, 7, decoder.RUN_LIMIT]), st.integers(0, 200))
 def test_the_compiled_scanner_equals_its_source(stream, run_limit, cut):

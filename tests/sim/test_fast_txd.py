@@ -101,6 +101,7 @@ def test_any_cutting_gives_the_same_state(cut_ticks):
     assert whole.networks[0].uplink.now > CONTROL_PERIOD_TICKS  # it has heard something early
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=15)
 @given(
     slow=st.integers(1, 255),

@@ -14,6 +14,7 @@ from tests.sim import digest_of
 from tests.sim.machines import GOLDEN, MACHINES, ROOT, Missing, Refused, check_tools, run
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not os.environ.get("CI"),
     reason="a minute and packages from the net: python -m tests.sim.machines aarch64 --quick",

@@ -21,6 +21,7 @@ def test_the_page_in_the_tree_is_what_the_command_writes(way):
     assert one_frame_page.page(way) == (DOCS / "one-frame.md").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_the_command_draws_the_pictures_that_the_page_shows(way, tmp_path):
     one_frame_pictures.draw(way, tmp_path)
     drawn = sorted(file.name for file in tmp_path.iterdir())

@@ -102,6 +102,7 @@ def test_worlds_with_bytes_changed_are_all_refused():
     assert changed_bytes(300, 1, lambda number: None) == {"refused": 300}
 
 
+@pytest.mark.slow
 def test_worlds_with_values_changed_are_refused_or_run():
     found = changed_values(150, 1, lambda number: None)
     assert set(found) == {"refused", "ran"}

@@ -191,6 +191,7 @@ def test_sightings_in_the_wrong_order_are_no_state():
         restore(tracker(), data)
 
 
+@pytest.mark.slow
 def test_compiled_and_uncompiled_trackers_see_the_same():
     if engine.active() != "compiled":
         pytest.skip("nothing is compiled here")

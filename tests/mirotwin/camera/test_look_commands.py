@@ -68,6 +68,7 @@ def test_a_window_shows_what_the_whole_trace_shows_there(mirotwin, short):
     assert [line for line in window[1:] if "asleep" not in line] == inside
 
 
+@pytest.mark.slow
 def test_both_engines_trace_and_profile_alike(short):
     def shown(*arguments: str) -> str:
         command = [MIROTWIN, "fw", arguments[0], short, "--to", "12ms", *arguments[1:]]

@@ -101,6 +101,7 @@ def test_firmware_and_python_agree_on_long_damaged_streams(seed, n):
     compare(drawn_stream(seed, n, 25), n)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(damaged_streams())
 def test_firmware_and_python_agree_on_any_damage(heard):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -292,6 +293,7 @@ class Session(Bench):
         self.wait(30000)
 
 
+@pytest.mark.slow
 @examples(250)
 @given(OPTIONS, st.integers(0, 5000), st.lists(ACTIONS, max_size=40))
 @example(

@@ -4,6 +4,7 @@ Restoring a state makes the CPU work out its next event again. So one CPU runs, 
 before every instruction, and both must be in the same state in the end.
 """
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -83,6 +84,7 @@ def state_after(code: bytes, levels: list[int], again: bool) -> bytes:
     return snapshot(cpu)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(BODY, BODY, BODY, st.sampled_from([0x34, 0x04, 0x14]), BODY, st.lists(st.integers(0, 1), max_size=12))
 @example(

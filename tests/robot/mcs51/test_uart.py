@@ -362,6 +362,7 @@ def bit_ticks(configuration):
     return 16 * 12 * (256 - configuration["th1"]) * (2 - configuration["smod"])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(CONFIGURATION, ACTIONS, NOISE)
 def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actions, noise):

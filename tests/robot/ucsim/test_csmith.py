@@ -18,6 +18,7 @@ pytestmark = [
 SEEDS = range(1, 13)
 
 
+@pytest.mark.slow
 def test_programs_end_with_the_same_memory_and_characters_on_both():
     found = dict(map(tried, SEEDS))
     assert {what for what in found.values() if what not in (EQUAL, LEFT_OUT)} == set()

@@ -45,6 +45,7 @@ def test_a_window_is_that_part_of_the_picture_and_the_slow_twins(seed):
     assert check_rig(random.Random(seed), windows=40) == 205
 
 
+@pytest.mark.slow
 @RUNS_COMPILED
 def test_both_engines_draw_the_same_bytes():
     command = [sys.executable, "-m", "tests.sim.pitch.picture_digest", "--engine"]

@@ -46,6 +46,7 @@ def announcements(radio, sent, others):
     return sorted(waiting)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(params, seeds, flawed(), neighbours)
 def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(radio, seed, sent, others):

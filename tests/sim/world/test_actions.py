@@ -157,6 +157,7 @@ def scripted():
     return world
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.data())
 def test_when_an_action_is_announced_and_where_the_world_stops_change_no_bit(data):

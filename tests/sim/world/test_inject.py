@@ -48,6 +48,7 @@ def test_injected_bytes_of_a_recording_give_the_digest_of_a_scripted_run():
     assert world.digest == digest
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.data())
 def test_when_input_is_announced_changes_nothing(data):
