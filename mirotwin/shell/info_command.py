@@ -91,11 +91,11 @@ def _dispatch() -> str:
 def _broken_modules(active: str) -> list[str]:
     """Imports every hot module: what cannot be loaded (a stale one, say) shows here and not in a run.
 
-    Uncompiled, a `.pyx` is not used and cannot be imported.
+    Uncompiled, what has no `.py` is not used and cannot be imported.
     """
     found = []
     for name, source in engines.install().sources.items():
-        if active == "python" and source.suffix == ".pyx":
+        if active == "python" and source.suffix != ".py":
             continue
         try:
             importlib.import_module(name)
