@@ -25,7 +25,8 @@ HERE = Path(__file__).parent
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory):
     """Messages that the adapter sent while the client asked for all that it can do."""
-    if shutil.which("node") is None or not (MODULES / "@vscode" / "debugadapter-testsupport").is_dir():
+    there = shutil.which("node") is not None and (MODULES / "@vscode" / "debugadapter-testsupport").is_dir()
+    if not there and not os.environ.get("CI"):
         pytest.skip("node, or the package @vscode/debugadapter-testsupport in build/npm, is not there")
     log = tmp_path_factory.mktemp("dap") / "sent"
     words = ["node", HERE / "dap_client.js", sys.executable, HERE / "dap_server.py", source_folder()]
