@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from mirotwin.camera.view import View
 from mirotwin.shell.outputs import FULL, OutputError, part_name
 
 _OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
@@ -24,7 +26,7 @@ class FrameFolder:
     """`path` for the frames of one run; `option` is the one it was given with.
 
     Checks at once. Raises OutputError for what is no folder, one with content (unless `force`), and a full disk.
-    `open` makes it and removes frames of an earlier run, `add` writes one.
+    `fill` makes it, removes frames of an earlier run, and saves those of views from then on.
     """
 
     def __init__(self, path: Path, option: str, force: bool = False) -> None:
@@ -53,7 +55,18 @@ class FrameFolder:
             raise OutputError(self.path, "the folder cannot be written to", remedy)
         return present
 
-    def open(self) -> None:
+    def fill(self, views: Sequence[View], undisturbed: AbstractContextManager[object]) -> None:
+        """Saves each frame of `views`; a file is written within `undisturbed`. Raises OutputError."""
+        self._open()
+
+        def save(view: View) -> None:
+            name = frame_name(view.network if len(views) > 1 else None, view.frame)
+            self._add(name, view.png(plain=True), undisturbed)
+
+        for view in views:
+            view.shows.append(save)
+
+    def _open(self) -> None:
         """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
@@ -64,7 +77,7 @@ class FrameFolder:
             remedy = f"choose another folder with {self.option}"
             raise OutputError(self.path, _reason(error), remedy) from None
 
-    def add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
+    def _add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
         """Writes a file; `undisturbed` puts off what an exception out of the blue would leave half-written."""
         part = self.path / part_name(name)
         with undisturbed:

@@ -92,7 +92,7 @@ def parse(data: bytes, origin: str, place: str = "") -> Picture:
             image = Image.open(io.BytesIO(data), formats=("PNG", "PPM"))
             if image.size != (WIDTH, HEIGHT):
                 what = f"{image.size[0]} x {image.size[1]} pixels"
-                remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: --plain-frames)"
+                remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: `run --frames`)"
                 raise BadInput(origin, place, what, remedy)
             return Picture(image.convert("RGB").convert("YCbCr").tobytes())
     except UnidentifiedImageError:

@@ -94,7 +94,7 @@ def track(options: TrackOptions) -> None:
     and both may be written by hand:
 
     \b
-        mirotwin run fig6 --frames frames --plain-frames
+        mirotwin run fig6 --frames frames
         mirotwin camera calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
         mirotwin camera track frames --calibration camera.toml --colours colours.toml --numbers 0
     """

@@ -15,7 +15,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mirotwin.campaign.cluster import Cluster as Cluster
     from mirotwin.campaign.plan import Plan as Plan
     from mirotwin.campaign.plan import load_plan as load
     from mirotwin.campaign.plan import parse_plan as parse
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from mirotwin.campaign.workers import Processes as Processes
 
 _PLACES = {
-    "Cluster": "cluster:Cluster",
     "Plan": "plan:Plan",
     "Processes": "workers:Processes",
     "load": "plan:load_plan",
@@ -33,7 +31,7 @@ _PLACES = {
     "run": "running:run",
 }
 
-__all__ = ["Cluster", "Plan", "Processes", "load", "parse", "read", "run"]
+__all__ = ["Plan", "Processes", "load", "parse", "read", "run"]
 
 
 def __getattr__(name: str) -> Any:

@@ -50,14 +50,6 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
     ] = ()
     expected: Expected = ()
     jobs: Annotated[int | None, JOBS] = None
-    cluster: Annotated[
-        str | None,
-        Option(
-            metavar="ADDRESS",
-            help="A Dask scheduler whose workers run it: tcp://host:8786.",
-            apart="jobs",
-        ),
-    ] = None
     engine: Engine = None
     force: Annotated[bool, FORCE.saying("Replace results that are there, or parts of them.")] = False
     yes: Annotated[bool, Option(help=f"More than {running.MANY_RUNS} runs are meant.")] = False
@@ -87,11 +79,7 @@ def run(options: CampaignOptions) -> int:
         if not options.quiet:
             show_line(f"{results} has all {plan.runs} runs already")
         return _judge(plan, results)
-    workers = _workers(options.jobs, options.cluster)
-    try:
-        tally, wall_s = _run(plan, results, workers, options.force, options.quiet)
-    finally:
-        workers.close()
+    tally, wall_s = _run(plan, results, Processes(options.jobs), options.force, options.quiet)
     if not options.quiet:
         rate = f"{tally.new / wall_s:.1f} runs/s" if tally.new else "all there before"
         show_line(f"{tally.runs} runs ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}")
@@ -102,14 +90,6 @@ def _with_seeds(plan: Plan, seeds: range) -> Plan:
     replace = msgspec.structs.replace
     design = replace(plan.design, first_seed=seeds[0], seed_count=len(seeds))
     return replace(plan, file=replace(plan.file, design=design))
-
-
-def _workers(jobs: int | None, cluster: str | None) -> Workers:
-    if cluster is None:
-        return Processes(jobs)
-    from mirotwin.campaign.cluster import Cluster  # loads Dask
-
-    return Cluster(cluster)
 
 
 def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) -> tuple[Tally, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import concurrent.futures as futures
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import closing
 
 import msgspec
@@ -98,10 +98,7 @@ class Drive:
             except BrokenExecutor:
                 lost.append(run)
                 continue
-            except self.workers.ended as error:
-                yield RunOutcome(run, error=f"ended its worker (killed, or out of memory): {error}")
-                continue
-            except self.workers.gone:
+            except CancelledError:
                 raise self._gone() from None
             if outcome.refused:
                 what = f"has {outcome.refused}"

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import os
 import socket
-import sys
-from contextlib import suppress
 from functools import cache
 
 import msgspec
@@ -73,11 +71,7 @@ def work(job: Work) -> RunOutcome:
 
 
 def place() -> str:
-    """How a worker is called: its address in a cluster, or host and process."""
-    cluster = sys.modules.get("distributed")  # loaded in a cluster's worker
-    if cluster is not None:
-        with suppress(ValueError):
-            return str(cluster.get_worker().address)
+    """How a worker is called."""
     return f"{socket.gethostname()} process {os.getpid()}"
 
 

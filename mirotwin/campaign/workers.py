@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 
@@ -74,13 +74,10 @@ class Workers:
     """An executor that is the caller's own, and stays open.
 
     `ahead`: jobs that are handed over at once. `restarts`: whether `start` gives another executor when one is broken.
-    `ended`: errors that say of one job that its workers have ended; `gone`: that all have.
     `option` names the workers in errors.
     """
 
     restarts = False
-    ended: tuple[type[Exception], ...] = ()
-    gone: tuple[type[BaseException], ...] = (CancelledError,)
     option = "executor"
 
     def __init__(self, executor: Executor | None = None) -> None:
@@ -93,9 +90,6 @@ class Workers:
 
     def stop(self, executor: Executor) -> None:
         """Ends what `start` gave. Jobs that can be cancelled are cancelled already."""
-
-    def close(self) -> None:
-        """No executor is wanted any more."""
 
 
 class Processes(Workers):

@@ -18,7 +18,6 @@ from mirotwin.report.summary import LiveFigures
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.rerun.runner import report_faults
 from mirotwin.run.run_files import RunFiles
-from mirotwin.run.run_options import PACE
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
@@ -52,8 +51,9 @@ class ServeOptions(Options, frozen=True, kw_only=True):
     ports: PortOptions = PortOptions()
     pace: Annotated[
         float,
-        PACE.saying(
-            "Virtual seconds in a second of the wall clock.", type=FiniteNumber(0.0, FASTEST, min_open=True)
+        Option(
+            type=FiniteNumber(0.0, FASTEST, min_open=True),
+            help="Virtual seconds in a second of the wall clock.",
         ),
     ] = 1.0
     duration: Annotated[

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,13 +13,13 @@ from mirotwin.firmware.held_signals import held_signals
 from mirotwin.recording.recorder import source_of
 from mirotwin.rerun.runner import report_faults
 from mirotwin.run.run_files import RunFiles, digest_in
-from mirotwin.run.run_options import Address, RunOptions
+from mirotwin.run.run_options import RunOptions
 from mirotwin.run.run_stops import Stops
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import choose_engine, plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
-from mirotwin.shell.program import complain, show_line, tell_notes
+from mirotwin.shell.program import tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
@@ -32,9 +30,7 @@ from mirotwin.verify.steps.reading import steps_of
 from mirotwin.verify.steps.running import everything, keep_saved
 
 if TYPE_CHECKING:
-    from mirotwin.camera.saved_frames import SavedFrames
     from mirotwin.camera.view import View
-    from mirotwin.run.run_live import LiveView
 
 
 @command_of(RunOptions)
@@ -56,9 +52,6 @@ def run(options: RunOptions) -> int:
 
     A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control
     period, and holds the saved world. Its errors and checks cover the time from there.
-
-    With --live, Foxglove shows the run while it goes (Open connection, Foxglove WebSocket, the URL of the first line).
-    Nothing of that changes a bit of the run.
 
     Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
     not.
@@ -92,13 +85,14 @@ def run(options: RunOptions) -> int:
         from mirotwin.camera.view import views_of  # loads the pictures' library
 
         views = views_of(world, text.origin)
-    saved = None if options.frames is None else _saved(options.frames, views, options)
-    with plain_parameters(text.origin), held_signals() as hold, ExitStack() as opened, folder:
-        watched = None
-        if options.live is not None:
-            watched = _live(opened, options.live, options, world, checks)
+    saved = None
+    if options.frames is not None:
+        from mirotwin.camera.frame_folder import FrameFolder
+
+        saved = FrameFolder(options.frames, "--frames", options.force)
+    with plain_parameters(text.origin), held_signals() as hold, folder:
         if saved is not None:
-            saved.begin(hold)
+            saved.fill(views, hold)
         recorded = views if options.record_frames else []
         run_files = RunFiles(
             folder,
@@ -111,7 +105,6 @@ def run(options: RunOptions) -> int:
             recorded,
             player,
             stops=stops,
-            live=watched,
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, options.quiet)
         summary = run_files.fill(bar, None if options.no_figure else text.scenario.title)
@@ -127,21 +120,3 @@ def run(options: RunOptions) -> int:
         return report_faults(world) or report_steps(player, checks)
     failed = report_failures(checks)
     return report_faults(world) or failed
-
-
-def _saved(folder: Path, views: Sequence[View], options: RunOptions) -> SavedFrames:
-    """What saves each frame. Raises OutputError for a folder in which that cannot be done."""
-    from mirotwin.camera.frame_folder import FrameFolder
-    from mirotwin.camera.saved_frames import SavedFrames
-
-    return SavedFrames(FrameFolder(folder, "--frames", options.force), views, options.plain_frames)
-
-
-def _live(opened: ExitStack, at: Address, options: RunOptions, world: World, checks: Checks) -> LiveView:
-    """The server for viewers, which `opened` closes. Raises BadInput where it cannot listen."""
-    from mirotwin.report.foxglove.server import Server
-    from mirotwin.run.run_live import LiveView
-
-    server = opened.enter_context(Server(*at, f"{world.scenario.name}-{world.seed}", complain))
-    show_line(f"live {server.url}")
-    return LiveView(server, world, checks, 1.0 if options.pace is None else options.pace, options.live_wait)

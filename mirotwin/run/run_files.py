@@ -34,7 +34,6 @@ from mirotwin.verify.checks.monitors import Checks
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View
-    from mirotwin.run.run_live import LiveView
     from mirotwin.run.run_stops import Stops
     from mirotwin.verify.steps.player import Player
 
@@ -55,7 +54,7 @@ class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
     The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
-    it runs as fast as it can. `stops`: where it saves the world, and ends. `live` is told what is recorded.
+    it runs as fast as it can. `stops`: where it saves the world, and ends.
     """
 
     folder: OutputFolder
@@ -69,7 +68,6 @@ class RunFiles:
     player: Player | None = None
     session: LiveSession | None = None
     stops: Stops | None = None
-    live: LiveView | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
     _wall_s: float = field(default=0.0, init=False)
     _flushed_s: float = field(default=-FLUSH_S, init=False)
@@ -82,8 +80,6 @@ class RunFiles:
         try:
             self._record(bar)
             self.checks.finish()
-            if self.live is not None:
-                self.live.finish()
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
             if self.tracks.count and title is not None:
@@ -111,21 +107,15 @@ class RunFiles:
     def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
         def keep(period: Period) -> None:
             self.tracks.add(period)
-            theories = list(self.tracks.theories())
-            recorder.write_theories(theories)
+            recorder.write_theories(self.tracks.theories())
             now_s = time.monotonic()
             if now_s - self._flushed_s >= FLUSH_S:
                 recorder.flush()
                 self._flushed_s = now_s
             bar.to(self.tracks.count)
-            if self.live is not None:
-                self.live.period(period, theories)
 
         def keep_frame(view: View) -> None:
-            png = view.png(plain=True)
-            recorder.write_image(view.network, view.tick, png)
-            if self.live is not None:
-                self.live.frame(view.network, view.tick, png)
+            recorder.write_image(view.network, view.tick, view.png(plain=True))
 
         for view in self.views:
             view.shows.append(keep_frame)

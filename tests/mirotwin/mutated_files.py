@@ -174,7 +174,7 @@ class Seeds:
 
     def _add_pictures(self) -> None:
         """What `calibrate` and `track` read. Two pictures are enough: one is searched, in one a robot is followed."""
-        brief = ["--set", "duration_s=0.04", "--no-figure", "-q", "--frames", "frames", "--plain-frames"]
+        brief = ["--set", "duration_s=0.04", "--no-figure", "-q", "--frames", "frames"]
         self._run("run", "short.toml", "--out", "seen", *brief, "--record-frames")
         files = ["--points-out", "points.csv", "--colours-out", "colours.toml"]
         self._run("camera", "calibrate", "--scenario", "short.toml", "--out", "camera.toml", *files)

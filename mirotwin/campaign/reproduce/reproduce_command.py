@@ -5,17 +5,13 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import click
 import msgspec
 
-from miro_exact.bad_input import BadInput
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import Plan
-from mirotwin.campaign.reproduce.crate import METADATA, metadata, write_rows
 from mirotwin.campaign.reproduce.page import page
 from mirotwin.campaign.reproduce.pictures import draw, track_of
 from mirotwin.campaign.reproduce.plan import (
@@ -31,13 +27,12 @@ from mirotwin.campaign.reproduce.plan import (
     recorded,
 )
 from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
-from mirotwin.campaign.results import require_arrow
 from mirotwin.campaign.seed_range import SEEDS
 from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.firmware.held_signals import Hold, held_signals
-from mirotwin.shell.command import Option, Options, command_of
-from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, Engine, choose_engine
+from mirotwin.shell.command import Options, command_of
+from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -45,31 +40,11 @@ from mirotwin.shell.progress import ProgressBar
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
 ROWS = "rows.csv"
-TABLE = "rows.parquet"
 
 
 class ReproduceOptions(Options, frozen=True, kw_only=True):
     COMMAND = "reproduce"
     out: Annotated[Path | None, OUT.saying(f"Folder for {PAGE} and {FOLDER}/. Default: here.")] = None
-    deposit: Annotated[
-        Path | None,
-        Option(
-            metavar="DIR",
-            type=PATH,
-            help="Instead of --out: a folder for an archive, with all runs as Parquet and a description as RO-Crate"
-            " 1.1.",
-            apart="out",
-        ),
-    ] = None
-    date: Annotated[
-        datetime | None,
-        Option(
-            metavar="YYYY-MM-DD",
-            type=click.DateTime(["%Y-%m-%d"]),
-            help="Date of publication in that description. Default: today.",
-            needs="deposit",
-        ),
-    ] = None
     seeds: Annotated[range, SEEDS] = range(50)
     jobs: Annotated[int | None, JOBS] = None
     engine: Engine = None
@@ -84,21 +59,11 @@ def reproduce(options: ReproduceOptions) -> int:
     Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
     for each run, and of each controller and start the recording of the run with the median error. Running it again
     gives the same bytes.
-
-    --deposit writes all of it into one new folder, for an archive: with the rows as Parquet, and size and SHA-256 of
-    each file in ro-crate-metadata.json. The same bytes again, for the same --date.
     """
     choose_engine(options.engine)
-    deposit, seeds, force, quiet = options.deposit, options.seeds, options.force, options.quiet
-    if deposit is not None:
-        require_arrow()
-        _check_deposit(deposit, force)
-    out = deposit or options.out or Path(".")
-    day = (options.date or datetime.now()).date().isoformat()
+    seeds, force, quiet, out = options.seeds, options.force, options.quiet, options.out or Path(".")
     began_s = time.monotonic()
-    names = [*_pictures(), ROWS, *(group.recording for group in GROUPS), *([TABLE] if deposit else [])]
-    if deposit is not None:
-        deposit.mkdir(parents=True, exist_ok=True)
+    names = [*_pictures(), ROWS, *(group.recording for group in GROUPS)]
     folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
@@ -117,29 +82,9 @@ def reproduce(options: ReproduceOptions) -> int:
             _draw(start, folder, shown)
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
         page_path.write_text(text, encoding="utf-8")
-        if deposit is not None:
-            write_rows(found, folder.part(TABLE))
-    if deposit is not None:
-        _describe(deposit, names, f"{seeds[0]} to {seeds[-1]}", day)
     if not quiet:
         show_line(f"{len(found)} runs in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
     return _failures(found)
-
-
-def _check_deposit(path: Path, force: bool) -> None:
-    """Raises BadInput for what is no folder, and for a folder that is not empty unless `force`."""
-    if path.exists() and not path.is_dir():
-        raise BadInput(path, "--deposit", "exists and is not a folder", "choose another folder")
-    if path.is_dir() and not force and (present := sorted(entry.name for entry in path.iterdir())):
-        what = f"the folder is not empty ({', '.join(present[:3])}{', ..' if present[3:] else ''})"
-        raise BadInput(path, "--deposit", what, "choose another one, or replace a deposit in it with --force")
-
-
-def _describe(deposit: Path, names: Sequence[str], seeds: str, day: str) -> None:
-    """The description of what this command has written, and of nothing else that is there."""
-    paths = [deposit / PAGE, *(path for name in names if (path := deposit / FOLDER / name).exists())]
-    with whole_file(deposit / METADATA, "--deposit") as place:
-        place.write_text(metadata(deposit, paths, seeds, day), encoding="utf-8")
 
 
 def _pictures() -> list[str]:

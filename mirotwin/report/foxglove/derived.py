@@ -1,7 +1,6 @@
-"""From a run to Foxglove's messages: what control periods, frames, faults and checks become.
+"""From a run to Foxglove's messages: what control periods, frames and faults become.
 
-Pure: of the same periods the same messages come out, whether the run is under way or was recorded. What stands still is
-said again each second, for viewers that come late or jump.
+What stands still is said again each second, for viewers that jump.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is worth a line in a log: faults of the firmware, frames and robots that were lost, resets, failed checks.
+"""What is worth a line in a log: faults of the firmware, frames and robots that were lost, resets.
 
 A line is written when something begins and when it is over, not once a control period.
 """
@@ -6,7 +6,6 @@ A line is written when something begins and when it is over, not once a control 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 from miro_protocol.actions import Action, RadioState, Reset
 from miro_sim.periods import RobotPeriod
@@ -15,17 +14,6 @@ from mirotwin.report.foxglove.messages import ERROR, INFO, WARNING, Log, time_of
 
 COUNTER = 1 << 16
 """The firmware's counters start over here."""
-
-
-class Failed(Protocol):
-    """What is told of a check (`verify.checks.interface.Failure`)."""
-
-    @property
-    def network(self) -> int: ...
-    @property
-    def slot(self) -> int: ...
-    @property
-    def tick(self) -> int: ...
 
 
 class RobotNotes:
@@ -74,11 +62,6 @@ def _more(before: int | None, now: int | None) -> int:
 def of_fault(network: int, slot: int, tick: int, text: str) -> Log:
     """What the firmware did that it must not do."""
     return Log(time_of(tick), ERROR, f"firmware fault: {text}", robot_frame(network, slot))
-
-
-def of_failure(failure: Failed) -> Log:
-    """What a check did not find as it was expected."""
-    return Log(time_of(failure.tick), ERROR, f"{failure}", robot_frame(failure.network, failure.slot))
 
 
 def of_action(action: Action) -> Log:

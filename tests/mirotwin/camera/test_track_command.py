@@ -34,7 +34,7 @@ def seen(mirotwin, short, tmp_path_factory):
     """A run whose measurements arrive at once, its plain frames in a folder and in the recording; and the files."""
     folder = tmp_path_factory.mktemp("seen")
     camera = [word for key in CAMERA for word in ("--set", key)]
-    frames = ("--frames", folder / "frames", "--plain-frames", "--record-frames")
+    frames = ("--frames", folder / "frames", "--record-frames")
     code, _, err = mirotwin("run", short, "--out", folder / "run", "-q", "--no-figure", *camera, *frames)
     assert (code, err) == (0, "")
     (folder / "camera.toml").write_text(calibration_kinds.exact(CameraParameters()).text())

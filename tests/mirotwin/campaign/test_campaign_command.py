@@ -114,7 +114,6 @@ def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(her
         (["short.toml", "--seeds", "0-9999999"], "has 20000000 runs, more than 100000"),
         (["nothing.toml"], "nothing.toml: there is no such file"),
         (["short.toml", "--out", "short.csv"], "results are a .parquet file"),
-        (["short.toml", "--jobs", "2", "--cluster", "tcp://x:1"], "--cluster does not go with --jobs"),
         (["show", "nothing.parquet"], "nothing.parquet: there is no such file"),
         (["show", "short.toml"], "short.toml: is no Parquet file"),
     ],

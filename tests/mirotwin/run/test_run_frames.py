@@ -17,19 +17,18 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-@pytest.mark.parametrize("plain", [(), ("--plain-frames",)])
-def test_every_frame_is_saved_and_the_run_is_the_same(mirotwin, short, finished, tmp_path, plain):
+def test_every_frame_is_saved_and_the_run_is_the_same(mirotwin, short, finished, tmp_path):
     arguments = ("run", short, "--seed", 5, "-q", "--out", tmp_path / "out")
-    assert mirotwin(*arguments, "--frames", tmp_path / "frames", *plain) == (0, "", "")
+    assert mirotwin(*arguments, "--frames", tmp_path / "frames") == (0, "", "")
     assert names(tmp_path / "frames") == FRAMES
     assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
     for name in FRAMES:
         with Image.open(tmp_path / "frames" / name) as image:
             image.load()
-            assert image.size == ((320, 240) if plain else (960, 744))
+            assert image.size == (320, 240)
     out = tmp_path / "look.png"
     at = ("--at", "0.167s", "--seed", 5, "--out", out)
-    assert mirotwin("camera", "look", short, *at, *(["--plain"] if plain else []))[0] == 0
+    assert mirotwin("camera", "look", short, *at, "--plain")[0] == 0
     assert out.read_bytes() == (tmp_path / "frames" / FRAMES[5]).read_bytes()
 
 
@@ -76,10 +75,9 @@ def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(mirotwi
             ("--frames", "frames", "--set", "camera.kind=gaussian"),
             "{short}: camera.kind: this camera renders no pixels; choose kind =",
         ),
-        (("--plain-frames",), "--plain-frames needs --frames."),
         (
-            ("--frames", "--plain-frames"),
-            "Invalid value for '--frames': the path is missing before --plain-frames; a file of this name is ./--plain",
+            ("--frames", "--record-frames"),
+            "Invalid value for '--frames': the path is missing before --record-frames; a file of this name is ./--rec",
         ),
         (("--frames", ""), "Invalid value for '--frames': the path is empty."),
     ],

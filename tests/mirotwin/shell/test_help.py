@@ -7,7 +7,7 @@ import click
 import pytest
 
 from mirotwin.commands import main
-from mirotwin.run.run_options import DEFAULT, RunOptions
+from mirotwin.run.run_options import RunOptions
 from mirotwin.shell.command import DeclaredOption, RecordCommand
 from mirotwin.testing.test_command import TestOptions
 from mirotwin.verify.cases.artifacts import report_line
@@ -94,7 +94,7 @@ def test_every_record_knows_the_words_of_its_command():
         replay_line("-a b.stream", "late.ihx", "mine.py:never"),
         report_line("-folder").removeprefix("page: "),
         TestOptions(paths=("a", "b"), seed=3, settings=("x=1",), expected=("no_fault",)).command_line(),
-        RunOptions(scenario="fig6", settings=("duration_s=1",), live=DEFAULT, pace=0.0).command_line(),
+        RunOptions(scenario="fig6", settings=("duration_s=1",), no_figure=True).command_line(),
     ],
 )
 def test_a_line_that_is_printed_is_one_that_the_program_takes(line):
