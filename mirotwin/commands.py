@@ -5,7 +5,90 @@ A command's module is loaded when the command is used, after `--engine` was read
 
 import click
 
-from mirotwin.shell.program import Lazy, MainGroup, print_version
+from mirotwin.shell.program import Lazy, LazyGroup, MainGroup, print_version
+
+CAMERA = {
+    "look": Lazy(
+        "mirotwin.camera.look_command", "Draws what the camera sees and what the tracker makes of it."
+    ),
+    "calibrate": Lazy(
+        "mirotwin.camera.calibrate_command", "Finds a camera's parameters from control points."
+    ),
+    "track": Lazy(
+        "mirotwin.camera.track_command", "Finds robots in pictures of your own, or in recorded ones."
+    ),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    sections={"Commands": CAMERA},
+    short_help="Camera: look, calibrate, track robots in pictures.",
+)
+def camera() -> None:
+    """Camera: look through it, calibrate it, and track robots in pictures."""
+
+
+FIRMWARE = {
+    "run": Lazy("mirotwin.firmware.fw_run", "Runs IMAGE.ihx on a bare AT89C52."),
+    "disasm": Lazy("mirotwin.firmware.fw_disasm", "Lists an image's instructions."),
+    "trace": Lazy("mirotwin.firmware.fw_trace", "Writes each instruction with the registers it changed."),
+    "profile": Lazy("mirotwin.firmware.fw_profile", "Shows where the processor spends its time."),
+    "coverage": Lazy("mirotwin.firmware.fw_coverage", "Shows which lines of the firmware ran."),
+    "vcd": Lazy("mirotwin.firmware.fw_vcd", "Writes the wires as a VCD file."),
+    "header": Lazy("mirotwin.firmware.fw_header", "Writes protocol.h: the numbers of the wire for C."),
+    "vectors": Lazy("mirotwin.firmware.vectors_command", "Writes single-step test vectors of the processor."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    sections={"Commands": FIRMWARE},
+    short_help="Firmware: run on the bare processor, disassemble, trace, profile.",
+)
+def fw() -> None:
+    """Firmware: run on the bare processor, disassemble, trace, profile.
+
+    SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
+    in a recording (run.mcap) or on a stream file.
+    """
+
+
+CAMPAIGN = {
+    "run": Lazy(
+        "mirotwin.campaign.campaign_run", "Makes the runs of FILE.toml; `campaign FILE.toml` is short for it."
+    ),
+    "show": Lazy(
+        "mirotwin.campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."
+    ),
+    "page": Lazy("mirotwin.campaign.campaign_page", "Makes one page of RESULTS.parquet."),
+    "reproduce": Lazy(
+        "mirotwin.campaign.reproduce.reproduce_command",
+        "Runs the paper's figures again and writes one page about them.",
+    ),
+}
+
+
+class CampaignGroup(LazyGroup):
+    """What is no command's name is the file of `run`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in (*CAMPAIGN, *ctx.help_option_names):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(
+    cls=CampaignGroup,
+    sections={"Commands": CAMPAIGN},
+    short_help="Runs a scenario many times, varied, and compares.",
+)
+def campaign() -> None:
+    """Runs a scenario over seeds and values of its keys, and shows the results.
+
+    FILE.toml says which runs; `mirotwin examples campaign` writes one.
+    """
+
 
 SECTIONS = {
     "Simulate": {
@@ -13,9 +96,7 @@ SECTIONS = {
         "serve": Lazy(
             "mirotwin.ports.serve_command", "Offers the robot's radio as PTY, TCP and RFC 2217 ports."
         ),
-        "campaign": Lazy(
-            "mirotwin.campaign.campaign_command", "Runs a scenario many times, varied, and compares."
-        ),
+        "campaign": campaign,
         "scenarios": Lazy("mirotwin.run.scenarios_command", "Lists the built-in scenarios, or shows one."),
     },
     "Test firmware": {
@@ -44,24 +125,12 @@ SECTIONS = {
             "mirotwin.report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."
         ),
     },
-    "Camera and firmware": {
-        "camera": Lazy(
-            "mirotwin.camera.camera_command", "Camera: look, calibrate, track robots in pictures."
-        ),
-        "fw": Lazy(
-            "mirotwin.firmware.fw_command",
-            "Firmware: run on the bare processor, disassemble, trace, profile.",
-        ),
-    },
-    "Paper and installation": {
-        "reproduce": Lazy(
-            "mirotwin.campaign.reproduce.reproduce_command",
-            "Runs the paper's figures again and writes one page about them.",
-        ),
+    "Camera, firmware, installation": {
+        "camera": camera,
+        "fw": fw,
         "info": Lazy("mirotwin.shell.info_command", "Shows versions, engine and firmware."),
     },
 }
-COMMANDS = {name: lazy for section in SECTIONS.values() for name, lazy in section.items()}
 
 
 @click.group(

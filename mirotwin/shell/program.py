@@ -126,30 +126,31 @@ class Lazy(NamedTuple):
     about: str
 
 
-Sections = Mapping[str, Mapping[str, Lazy]]
+Sections = Mapping[str, Mapping[str, "Lazy | click.Group"]]
 
 
 class LazyGroup(click.Group):
     """Commands whose modules are loaded when they are used.
 
-    `sections`: heading -> name of a command -> its module and what `--help` says of it. The command is the function of
-    that name in the module. `settle_engine` runs before, so such modules import at their heads whatever they need.
+    `sections`: heading -> name of a command -> its module and what `--help` says of it, or a group. The command is the
+    function of that name in the module. `settle_engine` runs before: such modules import at their heads what they need.
     """
 
     def __init__(self, *args: Any, sections: Sections | None = None, **named: Any) -> None:
         super().__init__(*args, **named)
         self.sections = sections or {}
-        self.lazy = {name: lazy for section in self.sections.values() for name, lazy in section.items()}
+        self.listed = {name: one for section in self.sections.values() for name, one in section.items()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*self.lazy, *super().list_commands(ctx)]
+        return [*self.listed, *super().list_commands(ctx)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in self.lazy:
-            return super().get_command(ctx, cmd_name)
-        command = getattr(import_module(self.lazy[cmd_name].module), cmd_name)
+        found = self.listed.get(cmd_name)
+        if not isinstance(found, Lazy):
+            return found or super().get_command(ctx, cmd_name)
+        command = getattr(import_module(found.module), cmd_name)
         assert isinstance(command, click.Command)
-        command.short_help = self.lazy[cmd_name].about
+        command.short_help = found.about
         return command
 
     def resolve_command(
@@ -165,12 +166,16 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         if not self.sections:
             super().format_commands(ctx, formatter)
-        width = max(map(len, self.lazy), default=0)
+        width = max(map(len, self.listed), default=0)
         formatter.write_paragraph()
         for heading, section in self.sections.items():  # without blank lines between: one screen
             formatter.write_heading(heading)
             with formatter.indentation():
-                formatter.write_dl([(name.ljust(width), lazy.about) for name, lazy in section.items()])
+                formatter.write_dl([(name.ljust(width), _about(one)) for name, one in section.items()])
+
+
+def _about(command: Lazy | click.Group) -> str:
+    return command.about if isinstance(command, Lazy) else f"{command.short_help}"
 
 
 def settle_engine(arguments: Sequence[str]) -> None:

@@ -21,7 +21,11 @@ def limited():
     ("command", "named", "left"),
     [
         (["fuzz", "--time", "1s", "-q"], "out", []),
-        (["reproduce", "--seeds", "0-0", "--jobs", "1", "-q"], "out/reproduction", ["rows.part.csv"]),
+        (
+            ["campaign", "reproduce", "--seeds", "0-0", "--jobs", "1", "-q"],
+            "out/reproduction",
+            ["rows.part.csv"],
+        ),
     ],
 )
 def test_a_full_disk_is_named_and_nothing_half_written_stays(command, named, left, tmp_path):

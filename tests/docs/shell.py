@@ -23,12 +23,12 @@ from typing import IO, NamedTuple
 
 import click
 
-from mirotwin.commands import COMMANDS, main
+from mirotwin.commands import main
 from tests import children
 
 MAY_TAKE_S = 60
 SLOW_MAY_TAKE_S = 600
-FRESH = ("campaign", "fuzz", "reproduce")
+FRESH = ("campaign", "fuzz")
 """Commands that start processes of their own, which begin with the program's file."""
 OPTIONAL = ("tshark", "afl-showmap")
 """Programs without which a command is passed over, except in CI (CONTRIBUTING, "Set-up")."""
@@ -142,7 +142,7 @@ class Literal(Shell):
 def load_modules() -> None:
     """Loads what the forks would load, each for itself."""
     context = click.Context(main)
-    for name in COMMANDS:
+    for name in main.list_commands(context):
         main.get_command(context, name)
     import_module("mirotwin.report.figure")
 

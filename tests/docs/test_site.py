@@ -14,9 +14,7 @@ from pathlib import Path
 import pytest
 
 import mirotwin
-from mirotwin.campaign.campaign_command import COMMANDS as CAMPAIGN
-from mirotwin.commands import COMMANDS
-from mirotwin.firmware.fw_command import COMMANDS as FW
+from mirotwin.commands import CAMERA, CAMPAIGN, FIRMWARE, SECTIONS
 from tests import children
 from tests.docs import sandbox
 from tests.mirotwin.report.page import browser
@@ -54,8 +52,9 @@ def pages(site: Path) -> Iterator[tuple[str, str]]:
 def test_every_command_has_its_heading(site):
     text = (site / "reference/cli.html").read_text("utf-8")
     headings = set(re.findall(r'<h\d id="([\w-]+)"', text))
-    wanted = {f"mirotwin-{name}" for name in COMMANDS}
-    wanted |= {f"mirotwin-campaign-{name}" for name in CAMPAIGN} | {f"mirotwin-fw-{name}" for name in FW}
+    wanted = {f"mirotwin-{name}" for section in SECTIONS.values() for name in section}
+    for group, names in (("campaign", CAMPAIGN), ("camera", CAMERA), ("fw", FIRMWARE)):
+        wanted |= {f"mirotwin-{group}-{name}" for name in names}
     assert not wanted - headings
     assert "--save-at" in text
 
