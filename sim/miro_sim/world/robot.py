@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from miro_exact.clock import CYCLE_TICKS, seconds
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
@@ -21,6 +21,7 @@ from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
 from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
+from miro_sim.pitch.contact import GRID_TICKS
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import dead_s, drive_for, pilot_for, reference_for
@@ -43,6 +44,7 @@ class Robot:
         "log",
         "marks",
         "asked",
+        *("grid_tick", "noted"),  # where it was in the piece that runs
     )
 
     def __init__(
@@ -76,10 +78,25 @@ class Robot:
         self.board.load(image)
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []
+        self.note_from(NEVER_TICK)
         self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
+
+    def note_from(self, tick: int) -> None:
+        """Notes where the robot is at ticks of the contact grid, from `tick` on."""
+        self.grid_tick = tick
+        self.noted: list[tuple[float, float, float]] = []
 
     def run(self, tick: int) -> int:
         """Runs the board to `tick`, watching out for what a wait asked for; not 0 when a firmware fault stopped it."""
+        while self.grid_tick <= tick:
+            stopped = self._run(self.grid_tick)
+            if stopped:
+                return stopped
+            self.noted.append(self.drive.pose_at(self.grid_tick))
+            self.grid_tick += GRID_TICKS
+        return self._run(tick)
+
+    def _run(self, tick: int) -> int:
         if self.asked:
             return self._run_asking(tick)
         if self.marks:

@@ -2,7 +2,7 @@
 
 Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
 compute, the station composes its frame. Then everything runs piece by piece from rendezvous to rendezvous: the end of
-the control period, where the caller wants to stop, the contact grid. In a piece the transmitters put on the air what
+the control period, where the caller wants to stop, an action. In a piece the transmitters put on the air what
 may come up before its end, the air of all networks is settled a little beyond it, each robot runs alone to it (networks
 by index, slot order), and the PC's receivers hear what came back. At the end of the period the state is hashed.
 How a run is cut into pieces does not change a bit of it.
@@ -288,7 +288,7 @@ class World:
         action_tick = NEVER_TICK
         for network in self.networks:
             action_tick = min(action_tick, network.actions.next_after(self.tick))
-        return min(tick, self.period_end, self.bodies.next_tick(self.tick), action_tick)
+        return min(tick, self.period_end, action_tick)
 
     def run_piece(self, tick: int) -> None:
         """Everything on to `tick`, which is no later than the end of the period."""
@@ -298,13 +298,14 @@ class World:
             network.send_due(tick)
         for network in self.networks:
             network.settle(tick)
+        self.bodies.begin(self.tick, tick)
         self.tick = tick
         for network in self.networks:
             self.stopped = network.run(tick) or self.stopped
         for network in self.networks:
             network.hear(tick)
-        for one, other in self.bodies.look(tick):
-            self.networks[one.network].note_touch(tick, one, other)
+        for touch_tick, one, other in self.bodies.look():
+            self.networks[one.network].note_touch(touch_tick, one, other)
 
     def end_period(self) -> None:
         """The records of the period that is over, and its link in the digest chain."""
