@@ -52,7 +52,7 @@ HOTTEST = re.compile(
     r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.(lens|regions)"
     r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|chip|encoder|pid|trajectory))"
     r"|miro_robot\.mcs51\.(core|cpu|execute|interrupts|line|peripherals|timers|uart)"
-    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|circuit|drive|encoder)"
+    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|drive)"
     r"|miro_sim\.radio\.(band|listener|sender)"
 )
 """What takes half a percent of a run or more. The others are compiled with -O1, which takes two thirds of the time."""

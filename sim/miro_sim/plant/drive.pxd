@@ -1,14 +1,49 @@
 # C layout of miro_sim.plant.drive.
 cimport cython
+from miro_exact cimport dmath
 from miro_robot.lm629.chip cimport Lm629
 from miro_robot.plant cimport Plant
 from miro_sim.plant.chassis cimport Body
-from miro_sim.plant.circuit cimport Winding
-from miro_sim.plant.encoder cimport Quadrature
 from miro_sim.plant.rough cimport RoughBody
 
 cdef long long LONGEST_STEP
 cdef double TICK_S
+
+@cython.final
+cdef class Winding:
+    cdef public double current_a
+    cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
+    cdef readonly double drive_v, diode_v, drive_ohm, diode_ohm, drive_tau, diode_tau, up_v, down_v
+    cdef double drive_decay[2049]
+    cdef double diode_decay[2049]
+
+    @cython.locals(longest=int)
+    cpdef int after_load(self) except -1
+    @cython.locals(wanted=int)
+    cpdef void set_bridge(self, int enable, int forward) noexcept
+    cdef void _switch(self, int drive) noexcept
+    @cython.locals(wait=int, charge=double)
+    cpdef double step(self, int ticks, double emf_v) except? -7.5
+    @cython.locals(start=double, positive=cython.bint, voltage=double, ohm=double, tau=double, decay=double,
+                   final=double, end=double, crossing=double)
+    cdef inline double _flow(self, int ticks, double emf_v) except? -7.5
+    @cython.locals(voltage=double, driven=cython.bint, ohm=double, tau=double, final=double)
+    cdef double _onward(self, double ticks, double emf_v) except? -7.5
+
+@cython.final
+cdef class Quadrature:
+    cdef readonly double counts_per_radian
+    cdef readonly long long counts_per_turn
+    cdef readonly double position
+    cdef readonly long long count
+
+    @cython.locals(moved=double, start=double, last=cython.longlong, count=cython.longlong, ticks_per_count=double,
+                   forward=cython.bint, boundary=cython.longlong, exact=double, after=cython.longlong)
+    cpdef void turn(self, double radians, long long start_tick, int ticks, Lm629 chip) noexcept
+    cpdef int after_load(self) except -1
+    cpdef inline int a(self) noexcept
+    cpdef inline int b(self) noexcept
+    cpdef int index(self) noexcept
 
 cdef class DifferentialDrive(Plant):
     cdef readonly object params

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
-from miro_sim.plant.circuit import Winding
+from miro_sim.plant.drive import Winding
 from miro_sim.plant.params import Bridge, DriveParams
 from tests.naive.plant import NaiveBridge, winding_run
 

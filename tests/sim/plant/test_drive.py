@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
-from miro_sim.plant.circuit import Winding
-from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.drive import DifferentialDrive, Winding
 from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor, OpticalEncoder
 from tests import children
 from tests.naive.plant import NaiveDrive

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from miro_exact.state import restore, snapshot
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
-from miro_sim.plant.encoder import Quadrature
+from miro_sim.plant.drive import Quadrature
 from tests.naive.plant import quadrature_edges
 
 MOVES = st.floats(-40.0, 40.0)
