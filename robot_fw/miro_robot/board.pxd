@@ -30,6 +30,7 @@ cdef class Board(Bus):
     cdef readonly EventLog log
     cdef public bint stop_on_fault
     cdef public long long fault_count
+    cdef long long horizon
     cdef long long busy_writes
     cdef int contention
     cdef readonly int held
@@ -76,6 +77,9 @@ cdef class Board(Bus):
     @cython.final
     @cython.locals(changed=cython.int)
     cdef int _set_pins(self, int port, int levels, long long tick) except -1
+    @cython.final
+    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, broken=cython.int, too=cython.int)
+    cdef inline bint _only_levels(self, long long tick) except -1
     @cython.locals(start=cython.longlong, page=cython.int, heard=bint, index=cython.int, value=cython.int)
     cpdef int movx_read(self, int address, long long tick) except -1
     @cython.locals(start=cython.longlong, page=cython.int, changed=bint, index=cython.int)

@@ -77,6 +77,7 @@ class Board(Bus):
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log",
+        "horizon",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -106,6 +107,7 @@ class Board(Bus):
         self.symbols: Symbols | None = None
         self.fault_count = 0
         self.probe: Probe | None = None
+        self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
         self.busy_writes = 0
         self.contention = self.held = 0
         self.forced = 0  # pins change by RST or the supply
@@ -183,8 +185,10 @@ class Board(Bus):
         cpu.begin_run()
         while not stopped and cpu.cycles * CYCLE_TICKS < until_tick:
             horizon = min(until_tick, self._next_interrupt(self.left), self._next_interrupt(self.right))
+            self.horizon = horizon
             stopped = cpu.go_on((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
             self.sync(min(horizon, cpu.cycles * CYCLE_TICKS) if stopped else horizon)
+        self.horizon = -1
         cpu.end_run()
         return stopped
 
@@ -211,6 +215,9 @@ class Board(Bus):
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
         while True:
+            if self.probe is None and self.plant.run_pulses(tick):
+                self.bridge_enable[0] = self.left.pwm
+                self.bridge_enable[1] = self.right.pwm
             now = min(self.left.next_tick, self.right.next_tick, self.plant.next_tick)
             if now > tick:
                 break
@@ -311,9 +318,44 @@ class Board(Bus):
     def _set_pins(self, port: int, levels: int, tick: int) -> None:
         changed = self.bank[port] ^ levels
         self.bank[port] = levels
-        if changed & self.watched[port]:
+        if changed & self.watched[port] and not self._only_levels(tick):
             self.sync(tick)
             self._drive_chips(tick)
+
+    def _only_levels(self, tick: int) -> bool:
+        """Puts PS and data on the chips' pins and returns True, if that is all that changes.
+
+        So it is without a strobe, before and now, and while no chip has something to tell. Nothing has to be brought
+        up to `tick` for that, unless the run ends before.
+        """
+        if (
+            tick > self.horizon
+            or tick >= self._next_interrupt(self.left)
+            or tick >= self._next_interrupt(self.right)
+            or not self.powered
+            or self.probe is not None
+        ):
+            return False
+        pins = self._pins()
+        left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
+        if (
+            self._strobes(left) | self.left.port.writing | self.left.port.reading
+            or self._strobes(right) | self.right.port.writing | self.right.port.reading
+            or left >> 4 != self.left.reset_level
+            or right >> 4 != self.right.reset_level
+        ):
+            return False
+        left, right = left >> 3 & 1, right >> 3 & 1
+        data = self.bank[self.data_bank]
+        self.left.port.ps, self.left.port.data = left, data
+        self.right.port.ps, self.right.port.data = right, data
+        broken = self.left_timing.left_alone(tick, left, data)
+        too = self.right_timing.left_alone(tick, right, data)
+        if broken:
+            self._timing_fault(broken, self.left_timing.ticks, tick)
+        elif too:
+            self._timing_fault(too, self.right_timing.ticks, tick)
+        return True
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
         """A bus cycle on P0, P2 and /WR; stores into every output latch that decodes the address."""

@@ -9,4 +9,5 @@ cdef class Plant:
     # A plant may be written in Python: `object` lets it raise, and costs less than asking for an exception.
     cpdef attach(self, Lm629 left, Lm629 right)
     cpdef advance(self, long long tick)
+    cpdef int run_pulses(self, long long tick) except -1
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)

@@ -39,6 +39,13 @@ class Plant:
     def advance(self, tick: int) -> None:
         """Integrates to `tick` and reports every encoder edge up to and including it."""
 
+    def run_pulses(self, tick: int) -> int:
+        """May do what the board would do up to and including `tick`: advance, edges of PWM at both chips, bridge.
+
+        It ends before a tick at which a chip has more to do. Returns 1 if it has done something, 0 if nothing.
+        """
+        return 0
+
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
 

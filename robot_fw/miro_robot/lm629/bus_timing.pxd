@@ -15,7 +15,7 @@ cdef class BusTiming:
     @cython.locals(writing=cython.int, reading=cython.int, broken=cython.int, moved=cython.int, within=cython.int)
     cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data) noexcept
     @cython.locals(broken=cython.int)
-    cdef int _left_alone(self, long long tick, int ps, int data) noexcept
+    cdef int left_alone(self, long long tick, int ps, int data) noexcept
     cpdef int sampled(self, long long tick) noexcept
     @cython.locals(broken=cython.int)
     cdef int _ends(self, long long tick) noexcept

@@ -87,7 +87,7 @@ class BusTiming:
         writing = 1 if cs == 0 and wr == 0 else 0
         reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
         if not (writing or reading or self.writing or self.reading):
-            return self._left_alone(tick, ps, data)
+            return self.left_alone(tick, ps, data)
         broken = _NONE
         moved = writing != self.writing or reading != self.reading
         if moved and (self.writing or self.reading):
@@ -109,8 +109,8 @@ class BusTiming:
         self.data = data
         return broken
 
-    def _left_alone(self, tick: int, ps: int, data: int) -> int:
-        """The same where no strobe is on its way and none begins."""
+    def left_alone(self, tick: int, ps: int, data: int) -> int:
+        """As `pins`, where no strobe is on its way and none begins."""
         broken = _NONE
         if ps != self.ps:
             broken = self._short(_PS_HOLD, tick - self.end_tick)

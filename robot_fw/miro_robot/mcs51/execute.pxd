@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.core cimport Core
 
-cdef int _BREAKPOINT
+cdef int _BREAKPOINT, _REACHED
 cdef int _UNDEFINED_OPCODE
 cdef int _STACK_OVERFLOW
 cdef int _STACK_UNDERFLOW

@@ -24,6 +24,7 @@ _MOV_DATA = 0x75
 _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 
 REACHED, STOPPED, BREAKPOINT, WIRE_FULL = range(4)  # why a run ended
+_REACHED = 0
 
 
 class Executor(Core):
@@ -43,7 +44,7 @@ class Executor(Core):
     def go_on(self, until_cycle: int) -> int:
         """A piece of a run, between `begin_run` and `end_run`: what runs in many pieces looks at its lines once."""
         self.until = until_cycle
-        self.stop = REACHED
+        self.stop = _REACHED
         self.limit = 0
         iram = self.iram
         rom = self.rom

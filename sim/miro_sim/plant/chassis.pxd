@@ -11,11 +11,12 @@ cdef class Body:
     cdef public double left_rad_s, right_rad_s, x_m, y_m, theta_rad
     cdef readonly double turned_left_rad, turned_right_rad
 
-    @cython.locals(half_s=double, old_left=double, old_right=double)
+    @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
+                   left_rub=double, right_rub=double, new_left=double, new_right=double)
     cpdef push(self, double left_nms, double right_nms, int ticks)
     @cython.final
-    @cython.locals(left=double, right=double, left_rub=double, right_rub=double, new_left=double, new_right=double)
-    cdef void _rub(self, double most) noexcept
+    @cython.locals(left_rub=double, right_rub=double, new_left=double, new_right=double)
+    cdef void _rub(self, double left, double right, double most) noexcept
     @cython.final
     @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
-    cdef int _roll(self) except -1
+    cdef inline int _roll(self) except -1

@@ -78,23 +78,9 @@ class Body:
             self.turned_left_rad = 0.0
             self.turned_right_rad = 0.0
             return
-        self.left_rad_s = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
-        self.right_rad_s = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
-        self._rub(2.0 * half_s * self.friction_nm)
-        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
-        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
-        if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
-            self._roll()
-
-    def _rub(self, most: float) -> None:
-        """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
-
-        They minimise the kinetic energy within the box |impulse| <= most (maximum dissipation): a shaft that
-        can be held is held at exactly zero. The two easy cases are solved directly, the rest by projected
-        Gauss-Seidel sweeps; each of these lowers the energy: friction never drives, however many there are.
-        """
-        left = self.left_rad_s
-        right = self.right_rad_s
+        left = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
+        right = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
+        most = 2.0 * half_s * self.friction_nm
         left_rub = most if left < 0.0 else -most
         right_rub = most if right < 0.0 else -most
         new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
@@ -102,7 +88,21 @@ class Body:
         if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
             self.left_rad_s = new_left
             self.right_rad_s = new_right
-            return
+        else:
+            self._rub(left, right, most)
+        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
+        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
+        if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
+            self._roll()
+
+    def _rub(self, left: float, right: float, most: float) -> None:
+        """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
+
+        They minimise the kinetic energy within the box |impulse| <= most (maximum dissipation): a shaft that
+        can be held is held at exactly zero. The two easy cases are solved directly (that of two sliding shafts in
+        `push`), the rest by projected Gauss-Seidel sweeps; each of these lowers the energy: friction never drives,
+        however many there are.
+        """
         left_rub = -(self.mass_ll * left + self.mass_lr * right)
         right_rub = -(self.mass_lr * left + self.mass_rr * right)
         if -most <= left_rub <= most and -most <= right_rub <= most:  # both stick

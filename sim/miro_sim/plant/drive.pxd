@@ -21,14 +21,14 @@ cdef class Winding:
     cpdef int after_load(self) except -1
     @cython.locals(wanted=int)
     cpdef void set_bridge(self, int enable, int forward) noexcept
-    cdef void _switch(self, int drive) noexcept
-    @cython.locals(wait=int, charge=double)
+    cdef inline void _switch(self, int drive) noexcept
+    @cython.locals(wait=int, left=int, part=int, flow=double, charge=double)
     cpdef double step(self, int ticks, double emf_v) except? -7.5
     @cython.locals(start=double, positive=cython.bint, voltage=double, ohm=double, tau=double, decay=double,
                    final=double, end=double, crossing=double)
     cdef inline double _flow(self, int ticks, double emf_v) except? -7.5
     @cython.locals(voltage=double, driven=cython.bint, ohm=double, tau=double, final=double)
-    cdef double _onward(self, double ticks, double emf_v) except? -7.5
+    cdef inline double _onward(self, double ticks, double emf_v) except? -7.5
 
 @cython.final
 cdef class Quadrature:
@@ -45,6 +45,10 @@ cdef class Quadrature:
     cpdef inline int b(self) noexcept
     cpdef int index(self) noexcept
 
+@cython.locals(pulsing=cython.bint)
+cdef inline bint _is_edge(Lm629 chip) noexcept
+cdef inline void _pass_edge(Lm629 chip, Winding winding) noexcept
+
 cdef class DifferentialDrive(Plant):
     cdef readonly object params
     cdef readonly double torque_constant_nm_a
@@ -58,8 +62,11 @@ cdef class DifferentialDrive(Plant):
     cpdef int after_load(self) except -1
     cpdef advance(self, long long tick)
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
+    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong,
+                   left_tick=cython.longlong, right_tick=cython.longlong)
+    cpdef int run_pulses(self, long long tick) except -1
     @cython.final
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
-    cdef inline int _step(self, int ticks) except -1
+    cdef inline int _step(self, int ticks, Lm629 left, Lm629 right) except -1
     @cython.final
     cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick) noexcept

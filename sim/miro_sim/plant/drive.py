@@ -111,18 +111,20 @@ class Winding:
         """Advances by 1..2048 ticks with the back-EMF held; returns the charge that passed, in A * ticks."""
         if ticks < 1 or ticks > LONGEST_STEP:
             raise ValueError(f"an interval lasts 1..2048 ticks, got {ticks}")
-        wait = self.wait_ticks
-        if wait == 0:
-            return self._flow(ticks, emf_v)
-        if wait > ticks:
-            self.wait_ticks = wait - ticks
-            return self._flow(ticks, emf_v)
-        charge = self._flow(wait, emf_v)
-        self.wait_ticks = 0
-        self._switch(self.wanted)
-        if wait < ticks:
-            charge = charge + self._flow(ticks - wait, emf_v)
-        return charge
+        charge = 0.0
+        left = ticks
+        while True:
+            wait = self.wait_ticks
+            part = wait if 0 < wait < left else left
+            flow = self._flow(part, emf_v)
+            charge = flow if left == ticks else charge + flow
+            left -= part
+            if wait != 0:
+                self.wait_ticks = wait - part
+                if wait == part:
+                    self._switch(self.wanted)
+            if left == 0:
+                return charge
 
     def _flow(self, ticks: int, emf_v: float) -> float:
         """The charge of an interval in which the bridge does not switch."""
@@ -222,10 +224,14 @@ class Quadrature:
             after = min(max(after, 1), ticks)
             count += 1 if forward else -1
             self.count = count
-            if chip is not None:
+            if chip is None:
+                continue
+            if chip.encoder_edges is None:
+                chip.encoder.set_phases(start_tick + after, ((count + 1) >> 1) & 1, (count >> 1) & 1)
+            else:
                 chip.set_encoder(start_tick + after, ((count + 1) >> 1) & 1, (count >> 1) & 1)
-                if self.counts_per_turn:
-                    chip.set_index(start_tick + after, self.index())
+            if self.counts_per_turn:
+                chip.set_index(start_tick + after, self.index())
 
     def a(self) -> int:
         """Level of channel A."""
@@ -246,6 +252,24 @@ class Quadrature:
 
     def __repr__(self) -> str:
         return f"Quadrature(position={self.position!r} A={self.a()} B={self.b()})"
+
+
+def _is_edge(chip: Lm629) -> bool:
+    """Whether the chip has nothing more to do at its next tick than to begin or end a pulse of PWM."""
+    pulsing = chip.pwm_magnitude != 0 and chip.pulses != 0 and not chip.pulse_late
+    return pulsing and chip.next_tick < chip.sample_tick
+
+
+def _pass_edge(chip: Lm629, winding: Winding) -> None:
+    """What `MotorAxis.advance` does at an edge, and the bridge's input after it."""
+    if chip.pwm:
+        chip.pwm = 0
+        chip.next_tick = chip.period_tick + LONGEST_STEP
+    else:
+        chip.pwm = 1
+        chip.period_tick = chip.next_tick
+        chip.next_tick += 16 * chip.pwm_magnitude
+    winding.set_bridge(chip.pwm, 1 - chip.sign)
 
 
 class DifferentialDrive(Plant):
@@ -297,10 +321,35 @@ class DifferentialDrive(Plant):
     def advance(self, tick: int) -> None:
         """Integrates to `tick` (a tick that is past already: nothing)."""
         while self.tick < tick:
-            self._step(min(tick - self.tick, LONGEST_STEP))
+            self._step(min(tick - self.tick, LONGEST_STEP), self.left, self.right)
         self.next_tick = self.tick + LONGEST_STEP
 
-    def _step(self, ticks: int) -> None:
+    def run_pulses(self, tick: int) -> int:
+        """Steps and PWM edges one after the other, as the board does them by `advance`, the chips' and `set_bridge`."""
+        left = self.left
+        right = self.right
+        if left is None or right is None:
+            return 0
+        begin = self.next_tick
+        while True:
+            left_tick = left.next_tick
+            right_tick = right.next_tick
+            now = min(self.next_tick, left_tick, right_tick)
+            if (
+                now > tick
+                or (left_tick == now and not _is_edge(left))
+                or (right_tick == now and not _is_edge(right))
+            ):
+                return self.next_tick != begin
+            if self.tick < now:
+                self._step(now - self.tick, left, right)
+            self.next_tick = now + LONGEST_STEP
+            if left_tick == now:
+                _pass_edge(left, self.left_winding)
+            if right_tick == now:
+                _pass_edge(right, self.right_winding)
+
+    def _step(self, ticks: int, left: Lm629 | None, right: Lm629 | None) -> None:
         constant = self.torque_constant_nm_a
         start_tick = self.tick
         if self.rough is not None:
@@ -309,8 +358,8 @@ class DifferentialDrive(Plant):
         right_charge = self.right_winding.step(ticks, constant * self.body.right_rad_s)
         self.body.push(constant * TICK_S * left_charge, constant * TICK_S * right_charge, ticks)
         self.tick = start_tick + ticks
-        self.left_encoder.turn(self.body.turned_left_rad, start_tick, ticks, self.left)
-        self.right_encoder.turn(self.body.turned_right_rad, start_tick, ticks, self.right)
+        self.left_encoder.turn(self.body.turned_left_rad, start_tick, ticks, left)
+        self.right_encoder.turn(self.body.turned_right_rad, start_tick, ticks, right)
 
     def _show_index(self, chip: Lm629, encoder: Quadrature, tick: int) -> None:
         """The index channel changes with A and B."""

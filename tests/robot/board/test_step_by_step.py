@@ -1,0 +1,70 @@
+"""A board alone takes short cuts; one with a probe does each step by itself, and ends with the same bits."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miro_exact.state import snapshot
+from miro_robot.lm629.options import Lm629Options
+from miro_robot.probe import Probe
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Bridge, Chassis, DriveParams, OpticalEncoder
+from tests.robot.board.rig import board_with
+from tests.robot.firmware.rig import MS, Rig
+
+DRIVES = st.builds(
+    lambda on_us, off_us, index, stiction: DriveParams(
+        bridge=Bridge(on_delay_s=on_us * 1e-6, off_delay_s=off_us * 1e-6),
+        encoder=OpticalEncoder(index_pulse=index),
+        chassis=Chassis(stiction_ratio=stiction),  # above 1 the body is a rough one
+    ),
+    st.sampled_from((0.0, 2.0, 10.0)),
+    st.sampled_from((0.0, 3.0, 20.0)),
+    st.booleans(),
+    st.sampled_from((1.0, 1.5)),
+)
+OPTIONS = st.builds(
+    Lm629Options,
+    pulse_at=st.sampled_from(("start", "end")),
+    filter_clocks=st.sampled_from((0, 1, 3)),
+    sign_of_negative=st.sampled_from((0, 1)),
+)
+VELOCITIES = st.integers(-16633, 16633)
+ORDERS = st.lists(st.tuples(VELOCITIES, VELOCITIES, st.integers(1, 40 * MS)), min_size=1, max_size=4)
+
+
+@settings(deadline=None, max_examples=25)
+@given(DRIVES, OPTIONS, ORDERS)
+def test_a_robot_drives_alike_with_and_without_a_probe(params, options, orders):
+    rigs = [Rig(plant=DifferentialDrive(params), options=options) for _ in range(2)]
+    rigs[1].board.probe = Probe()
+    for number, (left, right, ticks) in enumerate(orders):
+        for rig in rigs:
+            rig.team(number, left, right)
+            rig.run_to(rig.now + ticks)
+        assert snapshot(rigs[0].board) == snapshot(rigs[1].board)
+    assert rigs[0].board.left.real_position == rigs[1].board.left.real_position
+
+
+LEVELS = st.integers(0, 0xFF)
+MOVES = st.one_of(
+    st.builds("MOV P0,#{}".format, LEVELS),
+    st.builds("MOV P2,#{}".format, LEVELS),
+    st.builds("MOV P2,#{}".format, st.integers(0, 0x1F).map(lambda pins: 0xE0 | pins)),
+    st.builds("{} P2.{}".format, st.sampled_from(("SETB", "CLR", "CPL")), st.integers(0, 5)),
+    st.builds("MOV R7,#{}\nDJNZ R7,$".format, st.integers(1, 0xFF)),
+    st.sampled_from(("NOP", "MOV A,P0", "MOV 30h,P0", "JB P3.2,$+3", "JB P3.3,$+3")),
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(MOVES, min_size=1, max_size=60), st.lists(st.integers(1, 3000), max_size=20))
+def test_pins_that_move_at_random_do_the_same_with_and_without_a_probe(moves, cuts):
+    boards = [board_with("\n".join(["loop:", *moves, "LJMP loop"]), stop_on_fault=False) for _ in range(2)]
+    boards[1].probe = Probe()
+    tick = 0
+    for cut in [*cuts, 24_000]:
+        tick += cut
+        for board in boards:
+            board.run(tick)
+        assert snapshot(boards[0]) == snapshot(boards[1])
+    assert boards[0].faults == boards[1].faults
