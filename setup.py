@@ -201,7 +201,7 @@ class BuildHot(build_ext):
         return hot
 
 
-CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples": "mirotwin/testing/starter/examples"}
+CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples": "mirotwin/testing/examples"}
 """Folders outside of the packages that a wheel carries, and where: `mirotwin init` and `examples` write them."""
 LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache"}
 

@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from mirotwin import replay as replay
     from mirotwin import testing as testing
     from mirotwin.recording import reader as _reader
+    from mirotwin.verify.cases.case import Trace as Trace
     from mirotwin.verify.cases.case import case_of_checks as case_of_checks
     from mirotwin.verify.cases.case import write_case as write_case
-    from mirotwin.verify.cases.trace import Trace as Trace
     from mirotwin.verify.checks.monitors import Checks as Checks
     from mirotwin.verify.checks.monitors import ExpectationFailed as ExpectationFailed
 
@@ -62,7 +62,7 @@ _MODULES = {
     "TeamFrame": "miro_protocol.frames:TeamFrame",
     "Telemetry": "miro_protocol.frames:TelemetryFrame",
     "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
-    "Trace": "mirotwin.verify.cases.trace:Trace",
+    "Trace": "mirotwin.verify.cases.case:Trace",
     "Transmission": "miro_protocol.transmission:Transmission",
     "WaitExpired": "miro_sim.world.waits:WaitExpired",
     "World": "miro_sim.world.world:World",

@@ -31,13 +31,13 @@ def camera() -> None:
 
 FIRMWARE = {
     "run": Lazy("mirotwin.firmware.fw_run", "Runs IMAGE.ihx on a bare AT89C52."),
-    "disasm": Lazy("mirotwin.firmware.fw_disasm", "Lists an image's instructions."),
+    "disasm": Lazy("mirotwin.firmware.fw_image", "Lists an image's instructions."),
     "trace": Lazy("mirotwin.firmware.fw_trace", "Writes each instruction with the registers it changed."),
     "profile": Lazy("mirotwin.firmware.fw_profile", "Shows where the processor spends its time."),
-    "coverage": Lazy("mirotwin.firmware.fw_coverage", "Shows which lines of the firmware ran."),
-    "vcd": Lazy("mirotwin.firmware.fw_vcd", "Writes the wires as a VCD file."),
-    "header": Lazy("mirotwin.firmware.fw_header", "Writes protocol.h: the numbers of the wire for C."),
-    "vectors": Lazy("mirotwin.firmware.vectors_command", "Writes single-step test vectors of the processor."),
+    "coverage": Lazy("mirotwin.firmware.fw_profile", "Shows which lines of the firmware ran."),
+    "vcd": Lazy("mirotwin.firmware.fw_trace", "Writes the wires as a VCD file."),
+    "header": Lazy("mirotwin.firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
+    "vectors": Lazy("mirotwin.firmware.fw_image", "Writes single-step test vectors of the processor."),
 }
 
 
@@ -61,7 +61,7 @@ CAMPAIGN = {
     "show": Lazy(
         "mirotwin.campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."
     ),
-    "page": Lazy("mirotwin.campaign.campaign_page", "Makes one page of RESULTS.parquet."),
+    "page": Lazy("mirotwin.campaign.page", "Makes one page of RESULTS.parquet."),
     "reproduce": Lazy(
         "mirotwin.campaign.reproduce.reproduce_command",
         "Runs the paper's figures again and writes one page about them.",
@@ -101,12 +101,10 @@ SECTIONS = {
     },
     "Test firmware": {
         "init": Lazy(
-            "mirotwin.testing.init_command",
+            "mirotwin.testing.starter",
             "Begins a project: firmware, tests, scenarios, a workflow for CI.",
         ),
-        "examples": Lazy(
-            "mirotwin.testing.examples_command", "Lists the examples, or writes one into a folder."
-        ),
+        "examples": Lazy("mirotwin.testing.starter", "Lists the examples, or writes one into a folder."),
         "test": Lazy(
             "mirotwin.testing.test_command", "Runs scenario files and cases as tests, a verdict each."
         ),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -11,12 +12,14 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
+from miro_exact.rng import Stream
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
-from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.colours import classes_of
-from miro_host.eye.fit import ControlPoint, fit, parse_points, read_points
+from miro_host.eye.fit import COLUMNS, ControlPoint, fit, parse_points, read_points
+from miro_host.eye.lens import Lens
 from miro_host.eye.sample_file import read_samples
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
@@ -188,9 +191,8 @@ def _of_scenario(name: str, initial: CameraParameters | None, options: Calibrate
     if colours and not isinstance(camera, PixelCamera):
         remedy = 'choose kind = "pixels" in [camera], or leave out --colours-out'
         raise BadInput(text.origin, "camera.kind", "this camera renders no pixels, so no colours", remedy)
-    from mirotwin.camera import marks
 
-    points_text = marks.text(camera.lens, options.noise_px, options.seed)
+    points_text = marks_text(camera.lens, options.noise_px, options.seed)
     points = parse_points(points_text, text.origin)
     calibration = fit(points, initial or kinds.none(camera.lens).camera, text.origin)
     worst_m = kinds.worst_error_m(camera.lens, calibration)
@@ -230,3 +232,34 @@ def _by_residual(points: Sequence[ControlPoint], off_px: Sequence[float]) -> Tab
     if len(order) > SHOWN:
         table.add_row("..", *[""] * 5, f"<= {off_px[order[SHOWN]]:.3f}")
     return table
+
+
+FLOOR_CM = (range(-10, 121, 26), range(-10, 81, 18), 0.0)
+"""Columns, rows and height of the marks on the floor: from edge to edge of the pitch."""
+TOPS_CM = (range(-5, 116, 24), range(-5, 76, 16), 7.5)
+"""Of those on robots' tops: as near to the edge as a robot can stand."""
+
+
+def marks_text(camera: CameraParameters, noise_px: float, seed: int) -> str:
+    """The marks that the camera sees, as CSV; `noise_px`: standard deviation of u and of v, normal."""
+    stream = Stream(seed, "calibrate/marks")
+    lens = Lens(camera)
+    rows = [",".join(COLUMNS)]
+    for number, (x_cm, y_cm, height_cm) in enumerate(_marks()):
+        u, v = lens.pixel(x_cm / 100.0, y_cm / 100.0, height_cm / 100.0)
+        if 0.0 <= u <= WIDTH and 0.0 <= v <= HEIGHT:
+            u = _rounded(u + noise_px * stream.gauss(2 * number))
+            v = _rounded(v + noise_px * stream.gauss(2 * number + 1))
+            rows.append(f"{x_cm},{y_cm},{height_cm:g},{u:.4f},{v:.4f}")
+    return "\n".join(rows) + "\n"
+
+
+def _marks() -> Iterator[tuple[int, int, float]]:
+    for columns, rows, height_cm in (FLOOR_CM, TOPS_CM):
+        for y_cm in rows:
+            for x_cm in columns:
+                yield x_cm, y_cm, height_cm
+
+
+def _rounded(px: float) -> float:
+    return math.floor(10_000.0 * px + 0.5) / 10_000.0

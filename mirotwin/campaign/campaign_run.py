@@ -13,9 +13,9 @@ from mirotwin.campaign import running
 from mirotwin.campaign.file import MOST_RUNS
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.plan import Plan, load_plan
+from mirotwin.campaign.ranges import SEEDS, SeedRange
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
-from mirotwin.campaign.seed_range import SEEDS, SeedRange
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Argument, Option, Options, command_of

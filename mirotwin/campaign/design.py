@@ -7,13 +7,31 @@ A run is computed from its number, so a plan of millions takes no memory.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from typing import Any
 
 import msgspec
+import tomli_w
 
 from miro_exact import dmath
 from miro_exact.rng import Stream
-from mirotwin.campaign.inline import inline
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def inline(value: Any) -> str:
+    """The value as TOML on one line; a table as `{key = value}`."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {inline(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(inline(inner) for inner in value) + "]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else inline(key)
+
 
 Value = float | int | bool | str
 """What a column of the results can hold."""

@@ -43,10 +43,8 @@ from miro_exact.seed import MAX_SEED
 from miro_protocol.toml_text import TEXT_KIB, long_key_line, not_finite
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign import builtin
-from mirotwin.campaign.design import Design, Draw, Factor, Level, Value
-from mirotwin.campaign.inline import inline
-from mirotwin.campaign.ranges import draw_of, is_range
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
+from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
 
 MOST_RUNS = 1_000_000_000
 """More is a mistake in the file."""

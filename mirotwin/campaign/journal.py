@@ -21,8 +21,8 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.versions import Versions
-from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import RunOutcome
+from mirotwin.campaign.workers import now_s
 
 FORM = 1
 SYNC_S = 1.0

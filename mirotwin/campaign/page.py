@@ -2,21 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.again import arm_line, drawn_words
+from miro_sim.scenario.settings import EXPECT
 from mirotwin.campaign.comparison import GATED, MetricDifference, difference
-from mirotwin.campaign.design import Value
+from mirotwin.campaign.design import Value, inline
+from mirotwin.campaign.results import ResultsInfo
 from mirotwin.campaign.rows import VERDICTS, ResultRows, paired_levels
 from mirotwin.campaign.statistics import Figures, figures
 from mirotwin.report.page.bokeh_page import require_bokeh
-from mirotwin.report.page.document import render
+from mirotwin.report.page.document import check_size, place_of_page, render, write_page
+from mirotwin.run.run_options import RunOptions
+from mirotwin.shell.command import Argument, Options, command_of
+from mirotwin.shell.options import FORCE, NAME, OUT, QUIET
+
+
+def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
+    """`mirotwin run ..` with all that the levels of the factors set; "" for a file that does not say it."""
+    if not about.scenario:
+        return ""
+    scenario, firmware, settings = about.scenario, about.firmware, list(about.settings)
+    for name, known in zip(about.factors, about.levels, strict=True):
+        level = next((one for one in known if one.value == levels[name]), None)
+        if level is None:
+            return ""
+        scenario, firmware = level.scenario or scenario, level.firmware or firmware
+        settings += level.settings
+    expected = [one for one in settings if one.startswith(EXPECT)]
+    return RunOptions(
+        scenario=scenario,
+        firmware=firmware or None,
+        settings=tuple(one for one in settings if one not in expected),
+        expected=tuple(one.removeprefix(EXPECT) for one in expected),
+    ).command_line()
+
+
+def drawn_words(about: ResultsInfo, row: Mapping[str, Any]) -> str:
+    """What was drawn for a row, as words of that command."""
+    words = [word for name in about.drawn for word in ("--set", f"{name}={inline(row[name])}")]
+    return shlex.join(words)
+
 
 METRICS = ("rms_position_cm", "rms_theta_deg", "settling_s")
 MOST_ARMS = 24
@@ -212,3 +244,28 @@ def _data(rows: ResultRows) -> bytes:
 
 def _drawn(rows: ResultRows, drawn: dict[str, list[Any]], row: int) -> str:
     return drawn_words(rows.about, {name: column[row] for name, column in drawn.items()})
+
+
+FEWER = "give the results of a campaign with fewer runs"
+
+
+class PageOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "campaign page"
+    results: Annotated[str, Argument("RESULTS", NAME)]
+    out: Annotated[
+        Path | None,
+        OUT.saying("The page to write. Default: report.html, which replaces an earlier page."),
+    ] = None
+    force: Annotated[bool, FORCE] = False
+    quiet: Annotated[bool, QUIET.saying("No last line.")] = False
+
+
+@command_of(PageOptions)
+def page(options: PageOptions) -> int:
+    """Writes one HTML file that needs no network: the spread of each arm, paired differences, what failed, and the
+    command that makes any run again.
+    """
+    place = place_of_page(options.out, options.force, options.results)
+    made = campaign_page(Path(options.results))
+    check_size(made, options.results, FEWER)
+    return write_page(place, made, options.quiet)

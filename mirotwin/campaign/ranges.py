@@ -11,7 +11,11 @@ from __future__ import annotations
 import math
 from typing import Any, NoReturn, Protocol
 
+import click
+
+from miro_exact.seed import MAX_SEED
 from mirotwin.campaign.design import Draw, Value
+from mirotwin.shell.command import Option
 
 KEYS = ("from", "to", "scale", "whole")
 CHOOSE = "choose"
@@ -70,3 +74,45 @@ def _number(value: dict[str, Any], name: str, refuse: Refuse) -> float:
         return float(number)
     except OverflowError:
         refuse(f"{name}: is beyond every float", "give a smaller one")
+
+
+MOST_SEEDS = 1000
+_LONGEST = 40
+
+
+def seeds_of(text: str, most: int = MOST_SEEDS) -> range:
+    """First and last seed, both included, `most` at most. ValueError with what is wrong."""
+    first, _, last = text.partition("-")
+    last = last or first
+    if not (len(text) <= _LONGEST and first.isdecimal() and last.isdecimal()):
+        raise ValueError(f"{text[:_LONGEST]!r} is no range of seeds; write it like 0-49")
+    if int(last) > MAX_SEED:
+        raise ValueError(f"{text!r}: the largest seed is {MAX_SEED}")
+    first_seed, last_seed = int(first), int(last)
+    count = last_seed - first_seed + 1
+    if not 1 <= count <= most:
+        raise ValueError(f"{text!r} has {max(count, 0)} seeds; give 1 to {most}")
+    return range(first_seed, last_seed + 1)
+
+
+class SeedRange(click.ParamType[range]):
+    """Seeds from a first one to a last one: 0-49, or one alone; at most `most` of them."""
+
+    name = "seeds"
+
+    def __init__(self, most: int = MOST_SEEDS) -> None:
+        self.most = most
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        if isinstance(value, range):
+            return value
+        try:
+            return seeds_of(str(value), self.most)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+    def written(self, value: range) -> str:
+        return f"{value[0]}-{value[-1]}"
+
+
+SEEDS = Option("--seeds", type=SeedRange(), help="First and last seed.")

@@ -14,8 +14,7 @@ import numpy as np
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK, FIGURES
-from mirotwin.campaign.design import Value
-from mirotwin.campaign.inline import inline
+from mirotwin.campaign.design import Value, inline
 from mirotwin.campaign.results import ResultsInfo, read
 from mirotwin.campaign.statistics import Numbers, Seeds
 

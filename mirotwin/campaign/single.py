@@ -17,14 +17,14 @@ from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
-from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import RunOutcome, Work
+from mirotwin.campaign.workers import now_s
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.tracebacks import show_traceback
+from mirotwin.shell.program import show_traceback
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.checks.monitors import Checks

@@ -7,14 +7,32 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 
 from miro_exact import engine
-from mirotwin.campaign.wall import end_with_parent
-from mirotwin.shell.children import safe_path
+from mirotwin.shell.program import safe_path
+
+
+def now_s() -> float:
+    """Seconds since some moment; only differences mean anything."""
+    return time.perf_counter()
+
+
+def end_with_parent() -> None:
+    """Ends this process when its parent does: it would wait for jobs for ever if that was killed."""
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def processes(count: int) -> ProcessPoolExecutor:

@@ -15,10 +15,9 @@ from miro_exact.inputs import read_input
 from miro_robot.firmware import source_folder
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.firmware.coverage_files import with_debug_files
-from mirotwin.firmware.sources_option import SourceFolders, checked_sources
+from mirotwin.firmware.coverage_files import SourceFolders, checked_sources, with_debug_files
 from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run
-from mirotwin.replay.replay_firmware import LinesFrom, load_images
+from mirotwin.replay.firmwares import LinesFrom, load_images
 from mirotwin.rerun.inspected_run import BareRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument

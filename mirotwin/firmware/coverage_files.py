@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 from rich.table import Table
 
-from miro_exact.bad_input import one_line
+from miro_exact.bad_input import BadInput, one_line
 from miro_exact.inputs import read_input
 from miro_robot.firmware import source_folder
 from miro_robot.image import Image
@@ -26,7 +27,9 @@ from miro_robot.inspect.coverage import (
     missed,
 )
 from miro_robot.inspect.lcov import Tracefile, decode, encode
+from mirotwin.shell.command import Option
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import IMAGE, NAME
 from mirotwin.shell.outputs import whole_file
 
 
@@ -115,3 +118,27 @@ def table(tracefile: Tracefile) -> Table:
         result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
     result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
     return result
+
+
+SOURCES = Option(
+    "--sources",
+    metavar="FOLDER",
+    type=NAME,
+    help="Folder of the C files; may be repeated. Default: the image's folder.",
+    heading=IMAGE,
+)
+SourceFolders = Annotated[tuple[str, ...], SOURCES]
+
+
+def sources_of(image: Image, given: Sequence[str]) -> Sources:
+    """The folders to look in: those given, the image's own, and the robot's firmware's."""
+
+    return source_folders(image, checked_sources(given))
+
+
+def checked_sources(given: Sequence[str]) -> Sequence[str]:
+    """The folders of --sources. Raises BadInput for what is not one."""
+    for folder in given:
+        if not Path(folder).is_dir():
+            raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
+    return given

@@ -21,7 +21,6 @@ from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.fuzz.harness_target import HarnessTarget, described
-from mirotwin.fuzz.protocols import protocol_named
 from mirotwin.fuzz.target import TargetFailure
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, Exchange, NamedCheck, check_named
@@ -29,6 +28,45 @@ from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_t
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.spec import TargetSpec
+
+import tomllib
+
+import msgspec
+
+from miro_host.plugins import PluginError, Registry
+from miro_host.raised import raised
+
+OPTION = "--protocol"
+PROTOCOLS: Registry[Protocol] = Registry(
+    "mirotwin.protocols",
+    word="protocol",
+    key="protocol",
+    base="miro_protocol.protocol:Protocol",
+    own={"miro": "miro_protocol.miro_wire:Miro"},
+)
+
+
+def protocol_named(text: str) -> Protocol:
+    """The protocol that `NAME` or `NAME:KEY=VALUE,KEY=VALUE` means; values as in TOML. Raises BadInput."""
+    name, _, parameters = text.partition(":")
+    try:
+        found = PROTOCOLS.find(name)
+    except PluginError as error:
+        raise BadInput("", OPTION, error.what, error.remedy) from error
+    try:
+        given = tomllib.loads(f"given = {{{parameters}}}")["given"]
+    except tomllib.TOMLDecodeError:
+        form = "write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"
+        raise BadInput("", OPTION, f"{parameters!r} are no parameters", form) from None
+    try:
+        return msgspec.convert(given, found)
+    except msgspec.ValidationError as error:
+        keys = ", ".join(field.name for field in msgspec.structs.fields(found)) or "no parameters"
+        raise BadInput("", OPTION, f"{text}: {error}", f"{name} has {keys}") from None
+    except (Exception, SystemExit) as error:  # from the protocol's own check of its parameters
+        what = f"{text}: cannot check its parameters: {raised(error)}"
+        raise BadInput("", OPTION, what, "repair the protocol") from error
+
 
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32

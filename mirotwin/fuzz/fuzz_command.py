@@ -15,7 +15,7 @@ from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
-from mirotwin.firmware.sources_option import sources_of
+from mirotwin.firmware.coverage_files import sources_of
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for

@@ -9,7 +9,7 @@ import click
 
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
-from mirotwin.firmware.sources_option import SourceFolders
+from mirotwin.firmware.coverage_files import SourceFolders
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.triage import MINIMISE_S
 from mirotwin.recording.decode_command import ROBOTS

@@ -19,7 +19,7 @@ from types import TracebackType
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import EngineProgress
 from mirotwin.fuzz.hypothesis_process import KINDS, told
-from mirotwin.shell.children import python_module
+from mirotwin.shell.program import python_module
 
 _PROCESS = "mirotwin.fuzz.hypothesis_process"
 _LOG = "log"

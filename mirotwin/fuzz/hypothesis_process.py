@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.parents import end_with_parent
+from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.hypothesis_search import Explorer, explore
 from mirotwin.fuzz.spec import spec_of
 

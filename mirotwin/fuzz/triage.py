@@ -19,10 +19,9 @@ from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.coverage import Counts
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import collect, write
-from mirotwin.fuzz.budget import Budget
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.minimise import minimise
+from mirotwin.fuzz.minimise import Budget, minimise
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
 from mirotwin.fuzz.target import TargetFailure
 from mirotwin.verify.checks.interface import Failure

@@ -36,8 +36,7 @@ from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
-from mirotwin.verify.cases.case import case_of_checks, case_text
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import Expected, as_settings, report_failures

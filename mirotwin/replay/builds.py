@@ -16,7 +16,7 @@ from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation
 from mirotwin.replay.lockstep import WorldPair
-from mirotwin.replay.variables import extents
+from mirotwin.replay.state_fields import extents
 
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu

@@ -11,16 +11,21 @@ from rich.table import Table
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.scenario.file import parse as parse_scenario
-from mirotwin.firmware.sources_option import SourceFolders, checked_sources
+from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.recording.compare import differences
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
-from mirotwin.replay.exact_difference import ExactDifference, locate
-from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, load_images
-from mirotwin.replay.sources import Made, SourceDifference, source_differences
+from mirotwin.replay.exact_difference import (
+    ExactDifference,
+    Made,
+    SourceDifference,
+    locate,
+    source_differences,
+)
+from mirotwin.replay.firmwares import LinesFrom, annotated_of, load_images
 from mirotwin.rerun.recorded import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import show

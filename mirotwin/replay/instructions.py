@@ -21,8 +21,7 @@ from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
 from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
 from mirotwin.replay.lockstep import LOOK_TICKS, WorldPair
-from mirotwin.replay.state_fields import FieldDifference, item_differences
-from mirotwin.replay.variables import STACK, name_of_byte
+from mirotwin.replay.state_fields import STACK, FieldDifference, item_differences, name_of_byte
 
 if TYPE_CHECKING:
     from miro_robot.image import Image

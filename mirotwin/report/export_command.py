@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated
 
@@ -17,13 +18,38 @@ from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.decode_command import FORMAT
-from mirotwin.report.export_foxglove import export_foxglove
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 from mirotwin.shell.progress import ProgressBar
+
+
+def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
+    """Writes what `given` holds with Foxglove's topics to `out`; returns the exit code. Raises BadInput."""
+    if format != "recording":
+        what = f"{NAMES[format]}, which holds no postures"
+        raise BadInput(given.label, "", what, "give a run.mcap that `mirotwin run` wrote")
+    from mirotwin.report.foxglove.convert import convert  # loads most of the package
+
+    pieces = []
+    while piece := given.read_some():
+        pieces.append(piece)
+    made = BytesIO()
+    result = convert(b"".join(pieces), given.label, made)
+    if out == STDIN:
+        sys.stdout.buffer.write(made.getbuffer())
+    else:
+        with whole_file(Path(out), "--out") as staging:
+            staging.write_bytes(made.getbuffer())
+    for note in result.notes:
+        complain(note)
+    if not quiet and out != STDIN:
+        frames = f" and {result.images} camera frames" if result.images else ""
+        show(f"{out}: {result.periods} control periods{frames} for Foxglove")
+    return DONE
+
 
 DEFAULTS = {".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
 TARGETS = ("pcapng", "stream", "foxglove")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput
-from mirotwin.firmware.sources_option import SourceFolders, checked_sources
+from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.run_page import run_page
 from mirotwin.report.report_subject import PageSubject, is_campaign, material_of, page_of_port

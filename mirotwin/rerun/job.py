@@ -34,7 +34,7 @@ from mirotwin.rerun.script import (
     script_of,
     script_of_stream,
 )
-from mirotwin.shell.command_line import command_line, operand
+from mirotwin.shell.command import command_line, operand
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import choose_engine, plain_parameters
 from mirotwin.shell.outputs import RECORDING

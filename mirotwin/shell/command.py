@@ -16,16 +16,27 @@ be repeated one that is ().
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator
 from copy import copy
 from functools import cache
 from inspect import cleandoc
+from os import PathLike
 from typing import Any, ClassVar, NamedTuple, TypeVar, get_args
 
 import click
 import msgspec
 
-from mirotwin.shell.command_line import command_line, operand
+
+def operand(path: str | PathLike[str]) -> str:
+    """The path as a word of a command: one that begins with a hyphen would be an option."""
+    word = f"{path}"
+    return f"./{word}" if word.startswith("-") else word
+
+
+def command_line(*words: str) -> str:
+    """`mirotwin` with these words, quoted for a shell."""
+    return shlex.join(["mirotwin", *words])
 
 
 class Argument(NamedTuple):

@@ -3,6 +3,8 @@ error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the
 comes before it.
 """
 
+from __future__ import annotations
+
 import os
 import signal
 import sys
@@ -20,6 +22,13 @@ import click
 
 from miro_exact.bad_input import BadInput, did_you_mean, one_line, shortened
 from miro_exact.engine import EngineError, select
+
+
+def show_traceback(error: BaseException) -> None:
+    """Writes it to stderr, if it is wanted. For plug-ins: an error that nothing caused has no more to say."""
+    if error.__cause__ is not None and os.environ.get("MIROTWIN_TRACEBACK"):
+        sys.stderr.write("".join(traceback.format_exception(error)))
+
 
 DONE = 0
 EXPECTATION_FAILED = 1
@@ -235,8 +244,6 @@ class MainGroup(LazyGroup):
             complain(f"error: {error.format_message()}")
             return BAD_INPUT
         except BadInput as error:
-            from mirotwin.shell.tracebacks import show_traceback  # only an error needs it
-
             show_traceback(error)
             complain(f"error: {error}")
             return BAD_INPUT
@@ -261,3 +268,25 @@ class MainGroup(LazyGroup):
             _report(error)
             return INTERNAL_ERROR
         return code if isinstance(code, int) else DONE
+
+
+_SAFE_PATH = "PYTHONSAFEPATH"
+
+
+def python_module(name: str, *arguments: str) -> list[str]:
+    """The command that runs a module of ours in a new process."""
+    return [sys.executable, "-P", "-m", name, *arguments]
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Processes that begin meanwhile do not import from the current folder, whatever starts them."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before

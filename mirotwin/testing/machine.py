@@ -11,22 +11,75 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from hypothesis import strategies as st
+from hypothesis.control import current_build_context
+from hypothesis.internal.conjecture import engine
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
+from miro_exact.seed import MAX_SEED
+from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.frames import ServiceFrame, TeamFrame, asking_step, encode
 from miro_protocol.hypothesis_frames import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
+from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_sim.radio.params import Radio
-from mirotwin.testing import shrinking
-from mirotwin.testing.bench import MS, Bench, LinkFailure
-from mirotwin.testing.bench_case import case_of_bench
-from mirotwin.testing.profiles import link_profiles, seeds
+from miro_sim.radio.params import Bursts, Dropouts, Radio
+from mirotwin.testing.bench import LOOKING_TICKS, MS, Bench, LinkFailure
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.cases.replay_line import foreign_path, replay_line
+from mirotwin.verify.cases.rerun import rerun_robot
+
+BIT_ERROR_RATES = (0.0, 1e-4, 1e-3, 1e-2)
+
+
+def link_profiles() -> st.SearchStrategy[Radio]:
+    """Radios from an ideal wire (what shrinking ends at) to a keyed carrier with noise, one wrong bit in 100, bursts,
+    drop-outs, false start bits and lost characters; without what leaves the grid of bits (see `Bench`).
+    """
+    wires = st.just(Radio.ideal())
+    radios = st.builds(
+        Radio,
+        latency_s=st.sampled_from([0.0, 1 / 24e6, 1 / 9600, 0.005]),
+        bit_error_rate=st.sampled_from(BIT_ERROR_RATES),
+        carrier=st.sampled_from(["on", "keyed"]),
+        keyup_s=st.sampled_from([0.001, 0.002]),
+        squelch=st.booleans(),
+        bursts=st.none() | st.just(Bursts(good_to_bad=1e-3, bad_to_good=1e-2)),
+        dropouts=st.none() | st.just(Dropouts(every_s=0.3, length_s=0.02)),
+        false_starts_hz=st.sampled_from([0.0, 19.2]),
+        lost_character_rate=st.sampled_from([0.0, 0.01]),
+    )
+    return st.one_of(wires, radios)
+
+
+def seeds() -> st.SearchStrategy[int]:
+    """Of all noise on the air."""
+    return st.integers(0, MAX_SEED)
+
+
+_RESET_TICKS = 48
+"""How long the pin is held: two machine cycles are enough (AT89C52 data sheet), these are four."""
+
+
+def case_of_bench(bench: Bench) -> str | None:
+    """The case of what the robot has heard on `bench` since power-on; None where no check fails by it."""
+    heard = [entry.what for entry in bench.heard_stream()]
+    script: list[ScriptItem] = [sent for sent in heard if isinstance(sent, Transmission)]
+    for tick in bench.resets:
+        script += [Reset(tick, 0, bench.slot, 1), Reset(tick + _RESET_TICKS, 0, bench.slot, 0)]
+    until_tick = bench.now + LOOKING_TICKS
+    again = rerun_robot(bench.image, bench.n, bench.slot, script, _expected(bench), until_tick)
+    return again.case() if again.failures else None
+
+
+def _expected(bench: Bench) -> dict[str, Any]:
+    expect: dict[str, Any] = {"accepts_only_sent": True, "moves_only_when_fresh": True}
+    if bench.freshness.accepted:
+        expect["frames_accepted_min"] = bench.freshness.accepted
+    return expect
+
 
 STEPS = st.sampled_from([1, 1, 1, 2, 8, 9, 0, 63])
 """How far the sequence number moves: mostly as a host's does, but also as one that is stuck or restarted."""
@@ -131,7 +184,7 @@ class LinkMachine(RuleBasedStateMachine):
         try:
             action()
         except LinkFailure as failure:
-            shrinking.no_limit() if shrinking.is_last_run() else shrinking.limit(self.shrink_seconds)
+            no_limit() if is_last_run() else limit(self.shrink_seconds)
             if self.stream_file is not None:
                 failure.add_note(self._leave(self.stream_file, failure))
             raise
@@ -139,9 +192,27 @@ class LinkMachine(RuleBasedStateMachine):
     def _leave(self, file: Path, failure: LinkFailure) -> str:
         """Writes what the robot heard; in the end, where a check can judge it, as a case. Returns how to use it."""
         case = None
-        if shrinking.is_last_run() and hasattr(self, "bench"):
+        if is_last_run() and hasattr(self, "bench"):
             case = case_of_bench(self.bench)
         write_case(file, failure.stream if case is None else case)
         image = None if self.image is None else foreign_path(self.image)
         what = "see it with" if case is None else "it fails again by"
         return f"written to {file}; {what}: {replay_line(file, image)}"
+
+
+_DEFAULT = engine.MAX_SHRINKING_SECONDS
+
+
+def limit(seconds: float) -> None:
+    """From now on, shrinking lasts at most so long."""
+    engine.MAX_SHRINKING_SECONDS = seconds  # type: ignore[assignment]
+
+
+def no_limit() -> None:
+    """Hypothesis' own limit again."""
+    engine.MAX_SHRINKING_SECONDS = _DEFAULT
+
+
+def is_last_run() -> bool:
+    """Whether Hypothesis runs the example that it will show."""
+    return bool(current_build_context().is_final)

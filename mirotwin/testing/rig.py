@@ -12,7 +12,7 @@ from mirotwin.testing.link import Link
 from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
 from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.case import Trace
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.rig_options import RigOptions

@@ -31,8 +31,7 @@ from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import CHECK, Expected, as_settings
-from mirotwin.verify.steps.collecting import KINDS, collect
-from mirotwin.verify.steps.running import Outcome, Verdict, run_test, stem_of
+from mirotwin.verify.steps.running import KINDS, Outcome, Verdict, collect, run_test, stem_of
 
 WORDS = {
     "passed": "passed",

@@ -9,7 +9,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
-from mirotwin.campaign import journal, wall
+from mirotwin.campaign import journal, workers
 from mirotwin.campaign.journal import journal_path
 from tests.attacks import times
 from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
@@ -106,7 +106,7 @@ def test_a_journal_that_is_a_named_pipe_is_refused(tmp_path):
 def test_a_wall_clock_that_jumps_changes_no_byte(whole, tmp_path, monkeypatch, jump_s):
     began_s = time.monotonic()
     calls = iter(range(1 << 30))
-    for module in (wall, journal, campaign.drive):
+    for module in (workers, journal, campaign.drive):
         if hasattr(module, "now_s"):
             monkeypatch.setattr(module, "now_s", lambda: began_s + next(calls) % 3 * jump_s)
     path = tmp_path / "short.parquet"

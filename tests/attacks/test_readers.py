@@ -13,7 +13,7 @@ from miro_protocol import stream
 from miro_robot.image.symbol_files import parse_cdb, parse_listing, parse_map
 from mirotwin import campaign
 from mirotwin.camera import picture
-from mirotwin.campaign.again import arm_line
+from mirotwin.campaign.page import arm_line
 from mirotwin.campaign.rows import ResultRows
 from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of

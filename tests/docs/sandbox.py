@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from miro_robot.firmware import image_path, source_folder
-from mirotwin.testing.starter import examples, writing
+from mirotwin.testing import starter
 from tests import children
 from tests.host.distribution import install
 from tests.mutants import build
@@ -61,8 +61,8 @@ def copy_image(image: Path, target: Path) -> None:
 
 
 def copy_examples(folder: Path) -> None:
-    for name in examples.EXAMPLES:
-        writing.write(folder, examples.files(name), "", force=True)
+    for name in starter.EXAMPLES:
+        starter.write(folder, starter.example_files(name), "", force=True)
 
 
 def put_parts(hidden: Path) -> None:

@@ -145,7 +145,7 @@ def test_a_wheel_carries_the_examples_without_what_tools_leave_behind(tree):
         (tree / "examples" / name).write_text("")
     built = python(tree, "setup.py", "-q", "build_py", "--build-lib", "built")
     assert built.returncode == 0, built.stderr
-    examples = tree / "built/mirotwin/testing/starter/examples"
+    examples = tree / "built/mirotwin/testing/examples"
     assert (examples / "firmware/late.ihx").is_file()
     assert (examples / "hil/.github/workflows/firmware.yml").is_file()
     assert {path.name for path in (examples / "laws").iterdir()} == {

@@ -12,6 +12,7 @@ import msgspec
 
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.ranges import SEEDS
 from mirotwin.campaign.reproduce.page import page
 from mirotwin.campaign.reproduce.pictures import draw, track_of
 from mirotwin.campaign.reproduce.plan import (
@@ -27,7 +28,6 @@ from mirotwin.campaign.reproduce.plan import (
     recorded,
 )
 from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
-from mirotwin.campaign.seed_range import SEEDS
 from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.firmware.held_signals import Hold, held_signals

@@ -11,7 +11,7 @@ from pathlib import Path
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.counts import Fed, read_counts
 from mirotwin.fuzz.afl.ending import why_ended
-from mirotwin.fuzz.afl.parents import end_with_parent
+from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.afl.statistics import Statistics, read_plot, read_statistics
 
 PATIENCE_S = 10.0

@@ -15,14 +15,86 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.cores import cores_for, shared_cores
-from mirotwin.fuzz.afl.edges import EdgeUnion
 from mirotwin.fuzz.afl.job import AflJob
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
 from mirotwin.fuzz.engine import EngineProgress
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mirotwin.fuzz.target import Target
+
+
+_ONE_IF_ANY = bytes([0]) + bytes([1]) * 255
+
+
+class EdgeUnion:
+    """Edges of all inputs that were `add`ed. `count` is how many these are.
+
+    The target counts into this object's map from then on: give it another by `use_map` to use it elsewhere.
+    """
+
+    def __init__(self, target: Target) -> None:
+        self._target = target
+        self._edges = bytearray(target.map_size)
+        self._none = bytes(target.map_size)
+        self._seen = 0
+
+    @property
+    def count(self) -> int:
+        """Edges seen."""
+        return self._seen.bit_count()
+
+    def add(self, data: bytes) -> int:
+        """Runs an input; how many edges no input before has executed. Those of a run with a failure do not count."""
+        self._edges[:] = self._none
+        self._target.use_map(self._edges)
+        if self._target.run(data):
+            return 0
+        before = self.count
+        self._seen |= int.from_bytes(self._edges.translate(_ONE_IF_ANY), "little")
+        return self.count - before
+
+
+def cores_for(jobs: int, proc: Path = Path("/proc")) -> list[int]:
+    """A core for each job, those first to which the fewest other processes are bound. Empty where none can be told."""
+    if not hasattr(os, "sched_getaffinity"):
+        return []
+    mine = sorted(os.sched_getaffinity(0))
+    taken = bound(proc)
+    mine.sort(key=lambda core: taken[core])  # a stable sort: equal ones stay in the order of their numbers
+    return [mine[job % len(mine)] for job in range(jobs)]
+
+
+def shared_cores(jobs: int) -> str | None:
+    """What there is to say about more jobs than cores, None where there are enough."""
+    if not hasattr(os, "sched_getaffinity"):
+        return None
+    cores = len(os.sched_getaffinity(0))
+    if jobs <= cores:
+        return None
+    what = f"--jobs {jobs}: this process may use {cores} core{'s' if cores > 1 else ''}, so jobs share them"
+    return f"{what}; --jobs {cores} makes as many executions"
+
+
+def bound(proc: Path) -> Counter[int]:
+    """How many processes are bound to each single core. Kernel threads, which have no memory, are left out."""
+    found: Counter[int] = Counter()
+    for status in proc.glob("[0-9]*/status"):
+        try:
+            lines = status.read_text(encoding="utf-8", errors="replace").splitlines()
+        except OSError:  # the process has ended
+            continue
+        values = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
+        cores = values.get("Cpus_allowed_list", "")
+        if "VmSize" in values and cores.isdecimal():
+            found[int(cores)] += 1
+    return found
+
 
 MAP_BYTES = 8192
 RATE_S = 1.0

@@ -29,12 +29,45 @@ from typing import TYPE_CHECKING, Protocol
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.counts import Counts
-from mirotwin.fuzz.afl.parents import end_with_parent
-from mirotwin.fuzz.afl.shared_memory import attach
+from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.spec import spec_of
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
+
+import ctypes
+
+_FAILED = ctypes.c_void_p(-1).value
+
+
+class _Description(ctypes.Structure):
+    """Head of Linux's `struct shmid_ds` on 64-bit machines: `struct ipc_perm`, then the size (`man 2 shmctl`)."""
+
+    _fields_ = (("permissions", ctypes.c_byte * 48), ("size", ctypes.c_size_t), ("rest", ctypes.c_byte * 128))
+
+
+_IPC_STAT = 2
+
+
+def attach(number: int) -> memoryview:
+    """The segment as writable bytes. Raises OSError when there is none of this number."""
+    library = ctypes.CDLL(None, use_errno=True)
+    library.shmat.restype = ctypes.c_void_p
+    library.shmat.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_int)
+    library.shmctl.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p)
+    found = _Description()
+    if library.shmctl(number, _IPC_STAT, ctypes.byref(found)):
+        raise _last_error(number)
+    address = library.shmat(number, None, 0)
+    if address == _FAILED:
+        raise _last_error(number)
+    return memoryview((ctypes.c_ubyte * found.size).from_address(address)).cast("B")
+
+
+def _last_error(number: int) -> OSError:
+    code = ctypes.get_errno()
+    return OSError(code, f"shared memory {number}: {os.strerror(code)}")
+
 
 CONTROL_FD, STATUS_FD = 198, 199
 MAP_VARIABLE, CASES_VARIABLE = "__AFL_SHM_ID", "__AFL_SHM_FUZZ_ID"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.shell.children import python_module
+from mirotwin.shell.program import python_module
 
 PROGRAM = "afl-fuzz"
 LONGEST_BYTES = 1024
@@ -99,3 +100,14 @@ def missing(programs: Sequence[str] = (PROGRAM,)) -> str | None:
     if not absent:
         return None
     return f"{', '.join(absent)} is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
+
+
+_SET_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG, `man 2 prctl`
+
+_library = ctypes.CDLL(None) if sys.platform == "linux" else None
+
+
+def end_with_parent(signal: int) -> None:
+    """Has this process get `signal` when its parent ends. Without effect where there is no such thing."""
+    if _library is not None:
+        _library.prctl(_SET_PARENT_DEATH_SIGNAL, signal, 0, 0, 0)

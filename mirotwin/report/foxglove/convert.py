@@ -25,7 +25,7 @@ from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.topics import IMAGE, PERIOD, Topic, image_topic, topic_of
 from mirotwin.recording.writer import McapWriter, Writable
-from mirotwin.report.foxglove import derived, notes, topics
+from mirotwin.report.foxglove import derived, notes
 from mirotwin.report.foxglove.derived import Derived, Said
 from mirotwin.report.foxglove.published import schema_of
 
@@ -104,7 +104,7 @@ class _Conversion:
             self.writer.add_metadata(record.name, record.metadata)
 
     def _take_channel(self, record: Channel) -> None:
-        if record.topic.startswith(topics.PREFIX):
+        if record.topic.startswith(derived.PREFIX):
             what = f"holds Foxglove's topics already ({record.topic})"
             raise BadInput(
                 self.path, "", what, "open it in Foxglove, or give the run.mcap that it was made of"

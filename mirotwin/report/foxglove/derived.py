@@ -14,7 +14,7 @@ from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
-from mirotwin.report.foxglove import camera, frames, notes, paths, pitch, robots, topics
+from mirotwin.report.foxglove import frames, notes, paths, pitch, robots
 from mirotwin.report.foxglove.messages import (
     CompressedImage,
     FrameTransforms,
@@ -75,18 +75,18 @@ class Derived:
         tick, at = period.tick, time_of(period.tick)
         still = self._count % AGAIN == 0
         self._count += 1
-        yield Said(topics.TRANSFORMS, tick, self._transforms(period, at))
+        yield Said(TRANSFORMS, tick, self._transforms(period, at))
         if still:
             yield from self._standing(period, at)
         trails = [entity for robot in period.robots for entity in self._trail(robot, period.index, at)]
-        yield Said(topics.TRAILS, tick, SceneUpdate((), tuple(trails)))
+        yield Said(TRAILS, tick, SceneUpdate((), tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
-            yield Said(topics.error_topic(*place), tick, _error(robot, tick))
+            yield Said(error_topic(*place), tick, _error(robot, tick))
             for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
-                yield Said(topics.LOG, tick, line)
+                yield Said(LOG, tick, line)
         for action in period.actions:
-            yield Said(topics.LOG, action.tick, notes.of_action(action))
+            yield Said(LOG, action.tick, notes.of_action(action))
 
     def _trail(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
         place = robot.network, robot.slot
@@ -95,15 +95,15 @@ class Derived:
     def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
         found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
         if self._lens is not None:
-            found += [camera.transform(network, self._lens.lens, at) for network in _networks(period)]
+            found += [frames.transform(network, self._lens.lens, at) for network in _networks(period)]
         return FrameTransforms(tuple(found))
 
     def _standing(self, period: Period, at: Timestamp) -> Iterator[Said]:
-        yield Said(topics.SCENE, period.tick, SceneUpdate((), tuple(self._scene(period, at))))
+        yield Said(SCENE, period.tick, SceneUpdate((), tuple(self._scene(period, at))))
         if self._lens is not None:
             for network in _networks(period):
-                message = camera.calibration(network, self._lens.lens, at)
-                yield Said(topics.calibration_topic(network), period.tick, message)
+                message = frames.calibration(network, self._lens.lens, at)
+                yield Said(calibration_topic(network), period.tick, message)
 
     def _scene(self, period: Period, at: Timestamp) -> Iterator[SceneEntity]:
         yield pitch.pitch(at)
@@ -120,12 +120,12 @@ class Derived:
 def image(network: int, tick: int, png: bytes) -> Said:
     """The frame of a network's camera that was exposed at `tick`."""
     message = CompressedImage(time_of(tick), frames.camera_frame(network), png, "png")
-    return Said(topics.image_topic(network), tick, message)
+    return Said(image_topic(network), tick, message)
 
 
 def log(tick: int, line: Log) -> Said:
     """A line of the log."""
-    return Said(topics.LOG, tick, line)
+    return Said(LOG, tick, line)
 
 
 def _networks(period: Period) -> list[int]:
@@ -135,3 +135,22 @@ def _networks(period: Period) -> list[int]:
 def _error(robot: RobotPeriod, tick: int) -> ErrorMessage:
     found = error_of(robot, tick)
     return ErrorMessage(tick, found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch)
+
+
+PREFIX = "/foxglove/"
+TRANSFORMS = PREFIX + "transforms"
+SCENE = PREFIX + "scene"
+TRAILS = PREFIX + "trails"
+LOG = PREFIX + "log"
+
+
+def image_topic(network: int) -> str:
+    return f"{PREFIX}net{network}/image"
+
+
+def calibration_topic(network: int) -> str:
+    return f"{PREFIX}net{network}/calibration"
+
+
+def error_topic(network: int, slot: int) -> str:
+    return f"{PREFIX}net{network}/robot{slot}/error"

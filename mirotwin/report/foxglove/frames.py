@@ -11,9 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from miro_exact.dmath import sincos
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
-from mirotwin.report.foxglove.messages import FrameTransform, Timestamp, Vector3
+from mirotwin.report.foxglove.messages import (
+    CameraCalibration,
+    FrameTransform,
+    Quaternion,
+    Timestamp,
+    Vector3,
+)
 from mirotwin.report.foxglove.shapes import heading
 
 PITCH = "pitch"
@@ -47,3 +55,48 @@ def of_robot(robot: RobotPeriod, at: Timestamp) -> Iterator[FrameTransform]:
 def _on_floor(frame: str, posture: Posture, at: Timestamp) -> FrameTransform:
     place = Vector3(posture.x_m, posture.y_m, 0.0)
     return FrameTransform(at, PITCH, frame, place, heading(posture.theta_rad))
+
+
+UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
+"""From right, up, backwards to right, down, ahead: half a turn about the first."""
+
+
+def transform(network: int, lens: CameraParameters, at: Timestamp) -> FrameTransform:
+    """Where the camera hangs and where it looks: turned, tilted, and upside down."""
+    turned = _about(lens.turn_rad, (0.0, 0.0, 1.0))
+    tilted = _product(_about(lens.tilt_x_rad, (1.0, 0.0, 0.0)), _about(lens.tilt_y_rad, (0.0, 1.0, 0.0)))
+    place = Vector3(lens.x_m, lens.y_m, lens.height_m)
+    rotation = _product(_product(tilted, turned), UPSIDE_DOWN)
+    return FrameTransform(at, PITCH, camera_frame(network), place, rotation)
+
+
+def calibration(network: int, lens: CameraParameters, at: Timestamp) -> CameraCalibration:
+    """The true optics."""
+    along, down = lens.focal_px, lens.focal_px * lens.pixel_aspect
+    u, v = lens.centre_u_px - 0.5, lens.centre_v_px - 0.5
+    return CameraCalibration(
+        timestamp=at,
+        frame_id=camera_frame(network),
+        width=WIDTH,
+        height=HEIGHT,
+        distortion_model="plumb_bob",
+        distortion=(lens.k1, 0.0, 0.0, 0.0, 0.0),
+        intrinsic=(along, 0.0, u, 0.0, down, v, 0.0, 0.0, 1.0),
+        rectification=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        projection=(along, 0.0, u, 0.0, 0.0, down, v, 0.0, 0.0, 0.0, 1.0, 0.0),
+    )
+
+
+def _about(angle_rad: float, axis: tuple[float, float, float]) -> Quaternion:
+    sin, cos = sincos(0.5 * angle_rad)
+    return Quaternion(axis[0] * sin, axis[1] * sin, axis[2] * sin, cos)
+
+
+def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The turn `b`, then the turn `a`."""
+    return Quaternion(
+        a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+        a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+        a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
+        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
+    )

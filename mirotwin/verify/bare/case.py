@@ -42,7 +42,7 @@ from mirotwin.verify.bare.exchange import (
 )
 from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.bare.run import BarePlayback
-from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
+from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
 
 

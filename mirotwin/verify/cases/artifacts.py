@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from miro_robot.image import Image
-from mirotwin.shell.command_line import command_line, operand
+from mirotwin.shell.command import command_line, operand
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 

@@ -13,8 +13,8 @@ from miro_protocol.actions import ScriptItem
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.verify.cases.case import case_of_checks, case_text
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.shell.program import DIVERGENCE, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT
+from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks, Expected
 from mirotwin.verify.rig_options import silent_scenario
@@ -110,3 +110,35 @@ def case_of_expect(world: World, trace: Trace, expect: Mapping[str, Any]) -> str
         return None
     failure = next((one for one in again.failures if one.check in expect), None)
     return None if failure is None else case_text(world, trace, expect, str(failure))
+
+
+class CaseVerdict(msgspec.Struct, frozen=True):
+    """`code`: the exit code; `lines`: for people; `failure`: the check that failed, as recorded or otherwise."""
+
+    code: int
+    lines: tuple[str, ...]
+    failure: Failure | None = None
+
+
+def verdict_of(recorded: str, failures: Sequence[Failure], changed: bool, judged: bool = True) -> CaseVerdict:
+    """From the line that was recorded ("" for none). `changed`: other firmware or settings ran than those of the case;
+    `judged`: its check had an occasion.
+    """
+    name = recorded.partition(":")[0]
+    if failures:
+        same = [one for one in failures if str(one) == recorded]
+        first = (same or failures)[0]
+        lines = [f"fails as recorded: {first}" if same else f"still fails, but not as recorded: {first}"]
+        if not recorded:
+            lines = [f"fails: {first}"]
+        elif not same:
+            lines.append(f"recorded: {recorded}")
+        return CaseVerdict(FIRMWARE_FAULT if first.fault else EXPECTATION_FAILED, tuple(lines), first)
+    if not recorded:
+        return CaseVerdict(DONE, ("passes",))
+    if not judged:
+        said = f"expectation not judged: the run had no occasion for it; recorded: {recorded}"
+        return CaseVerdict(EXPECTATION_FAILED, (said,))
+    if changed:
+        return CaseVerdict(DONE, (f"cured: {name} passes; recorded: {recorded}",))
+    return CaseVerdict(DIVERGENCE, (f"not reproduced: {name} passes; recorded: {recorded}",))

@@ -22,8 +22,7 @@ from miro_host.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
-from mirotwin.verify.checks.interface import Check
-from mirotwin.verify.checks.plugin_problems import problem_of_class
+from mirotwin.verify.checks.interface import Check, problem_of_class
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
 
 EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}

@@ -14,7 +14,7 @@ Nothing here changes a bit of the run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import Any, TypeVar
@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.plugins import PluginError
 from miro_host.raised import raised
+from miro_protocol.events import Received
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period, RobotId
 from miro_sim.world.events import Cursor, Event
@@ -29,9 +30,31 @@ from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.hearing import receptions
-from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Monitor, Subject
-from mirotwin.verify.checks.plugin_problems import checked_monitor
+from mirotwin.verify.checks.interface import (
+    Check,
+    Expectation,
+    Failure,
+    FirstFailure,
+    Monitor,
+    Subject,
+    checked_monitor,
+)
+
+
+def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
+    """The `frame` and `damaged` events that a `received` one completes, at its tick."""
+    for found, fresh in receiver.character(received.value, received.good_stop, received.tick):
+        frame = found if isinstance(found, Received) else None
+        yield Event(
+            tick=received.tick,
+            what="damaged" if frame is None else "frame",
+            network=received.network,
+            slot=received.slot,
+            value=int(bool(fresh)),
+            data=found.data,
+            frame=frame,
+        )
+
 
 T = TypeVar("T")
 Expected = Mapping[RobotId, Sequence[Check]]

@@ -17,7 +17,7 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.orders import Orders
 from mirotwin.verify.conform.hints import between, in_words, number
-from mirotwin.verify.conform.listening import Listener, listen
+from mirotwin.verify.conform.probe import Listener, listen
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.trial import Trial, trial_of
 

@@ -9,13 +9,62 @@ from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import TICKS_PER_MS
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME
+from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
+from miro_sim.world.world import World
+from mirotwin.verify.checks.interface import Check, Monitor, Subject
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.hints import characters
-from mirotwin.verify.conform.listening import Listener, listen
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import BOTH, Rule, Topology
 from mirotwin.verify.conform.sealing import MISTAKES
-from mirotwin.verify.conform.trial import make_trial, trial_of
+from mirotwin.verify.conform.trial import Trial, make_trial, run_trial, trial_of
 from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
+
+
+class Listening(Check, frozen=True, kw_only=True, tag="listening"):
+    """Expects nothing."""
+
+    KIND = "safety"
+
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return Listener(self, subject)
+
+
+class Listener(Monitor[Listening]):
+    """`events`: all of one robot and its host, in the order of time; `observed` has what rules ask about."""
+
+    EVENTS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
+
+    def __init__(self, check: Listening, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.events: list[Event] = []
+        self.observed = Observed(subject.robots, subject.slot)
+
+    def event(self, event: Event) -> None:
+        self.events.append(event)
+        if event.what in ("command", "heard", "answer"):
+            self.observed.take(event)
+
+    def restarted(self, tick: int) -> None:
+        self.observed.restarted(tick)
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        self.observed.take_period(tick, record, self.subject.robot.board)
+
+    def end(self, tick: int) -> None:
+        self.observed.end_tick = tick
+
+
+def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
+    """A listener for each robot of the trial, which is run to its end."""
+    world = World(trial.scenario, seed, image, trial.script)
+    places = [(network.index, robot.slot) for network in world.networks for robot in network.robots]
+    checks = Checks(world, {place: [Listening()] for place in places})
+    run_trial(world)
+    checks.finish()
+    return [monitor for monitor in checks.monitors if isinstance(monitor, Listener)]
+
 
 _SETTLING_MS = 200.0
 _STT = BY_NAME["STT"].opcode

@@ -15,8 +15,7 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
-from mirotwin.verify.cases.case import SUFFIX, case_text
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks

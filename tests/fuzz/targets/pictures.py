@@ -193,9 +193,9 @@ def _calibration_seeds() -> list[bytes]:
 
 def _points_seeds() -> list[bytes]:
     from miro_host.eye.camera_parameters import CameraParameters
-    from mirotwin.camera import marks
+    from mirotwin.camera import calibrate_command
 
-    lines = marks.text(CameraParameters(), 0.1, 3).splitlines()
+    lines = calibrate_command.marks_text(CameraParameters(), 0.1, 3).splitlines()
     some = [lines[0], *lines[1 :: max(1, len(lines) // 24)]]
     return ["\n".join(some).encode(), ("\n".join([lines[0], *lines[1:9]]) + "\n").encode()]
 

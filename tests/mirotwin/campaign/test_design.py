@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
 from mirotwin.campaign.columns import FIGURES
-from mirotwin.campaign.design import Design, Draw, Factor, Level
+from mirotwin.campaign.design import Design, Draw, Factor, Level, inline
 from mirotwin.campaign.file import parse
-from mirotwin.campaign.inline import inline
 from mirotwin.campaign.plan import plan_of as joined
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.ranges import seeds_of
 from tests.mirotwin.campaign.plans import SHORT, plan_of
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"

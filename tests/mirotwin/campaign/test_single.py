@@ -19,7 +19,7 @@ from miro_sim.world.world import World
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.ranges import seeds_of
 from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers, processes

@@ -5,8 +5,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirotwin.fuzz.budget import Budget
-from mirotwin.fuzz.minimise import minimise
+from mirotwin.fuzz.minimise import Budget, minimise
 
 
 def small(data, still, tries=100_000):

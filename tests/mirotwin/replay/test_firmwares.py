@@ -11,7 +11,7 @@ from mirotwin.recording.sequences import characters
 from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.moved import moved
-from mirotwin.replay.variables import extents, name_of_byte
+from mirotwin.replay.state_fields import extents, name_of_byte
 from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 from tests.mutants.draw import SOURCE

@@ -19,9 +19,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.radio.params import Radio
 from mirotwin.testing.bench import Bench, LinkFailure
-from mirotwin.testing.bench_case import case_of_bench
-from mirotwin.testing.machine import LinkMachine
-from mirotwin.testing.profiles import link_profiles, seeds
+from mirotwin.testing.machine import LinkMachine, case_of_bench, link_profiles, seeds
 from tests.mirotwin.conftest import mirotwin
 
 __all__ = ["mirotwin"]

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mirotwin.verify.steps.collecting import collect
+from mirotwin.verify.steps.running import collect
 from tests.mirotwin.conftest import Result
 
 ROOT = Path(__file__).parents[3]

@@ -10,8 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mirotwin.fuzz.afl.serve import CASES_VARIABLE, CONTROL_FD, MAP_VARIABLE, STATUS_FD
-from mirotwin.fuzz.afl.shared_memory import attach
+from mirotwin.fuzz.afl.serve import CASES_VARIABLE, CONTROL_FD, MAP_VARIABLE, STATUS_FD, attach
 from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 

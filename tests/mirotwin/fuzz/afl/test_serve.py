@@ -10,8 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mirotwin.fuzz.afl.counts import Fed, read_counts
-from mirotwin.fuzz.afl.serve import CASES_VARIABLE, MAP_VARIABLE, RUNS_A_COUNT, kind_of_signal, wait_status
-from mirotwin.fuzz.afl.shared_memory import attach
+from mirotwin.fuzz.afl.serve import (
+    CASES_VARIABLE,
+    MAP_VARIABLE,
+    RUNS_A_COUNT,
+    attach,
+    kind_of_signal,
+    wait_status,
+)
 from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 from tests.mirotwin.fuzz.afl.double import MAP_SIZE, WORD, Double, spec

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl import cores, missing
+from mirotwin.fuzz.afl import missing, run
 from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
@@ -102,15 +102,15 @@ def test_the_core_to_which_the_fewest_are_bound_comes_first(tmp_path):
     process(tmp_path, 20, f"{free[0]}-{free[-1]}" if len(free) > 1 else "0-63")
     process(tmp_path, 30, str(free[-1]), kernel=True)
     (tmp_path / "40").mkdir()
-    assert cores.bound(tmp_path) == {free[0]: 3}
-    assert cores.cores_for(1, tmp_path) == [free[1 % len(free)]]
-    assert sorted(cores.cores_for(2 * len(free), tmp_path)) == sorted(2 * free)
+    assert run.bound(tmp_path) == {free[0]: 3}
+    assert run.cores_for(1, tmp_path) == [free[1 % len(free)]]
+    assert sorted(run.cores_for(2 * len(free), tmp_path)) == sorted(2 * free)
 
 
 def test_more_jobs_than_cores_are_told():
     count = len(os.sched_getaffinity(0))
-    assert cores.shared_cores(count) is None
-    assert f"; --jobs {count} makes as many executions" in (cores.shared_cores(count + 1) or "")
+    assert run.shared_cores(count) is None
+    assert f"; --jobs {count} makes as many executions" in (run.shared_cores(count + 1) or "")
 
 
 # ---- errors ------------------------------------------------------------------------------------------------

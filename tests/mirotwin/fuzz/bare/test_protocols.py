@@ -6,7 +6,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
-from mirotwin.fuzz.protocols import protocol_named
+from mirotwin.fuzz.bare import protocol_named
 from tests.host import distribution
 
 THEIRS = """

@@ -6,7 +6,7 @@ import pytest
 
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
-from mirotwin.report.foxglove import camera
+from mirotwin.report.foxglove import frames
 from mirotwin.report.foxglove.messages import CameraCalibration, FrameTransform, time_of
 
 LENSES = (
@@ -54,7 +54,7 @@ def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, flo
 @pytest.mark.parametrize("lens", LENSES)
 def test_a_point_is_drawn_half_a_pixel_from_where_our_lens_draws_it(lens, point):
     at = time_of(0)
-    u, v = drawn(camera.calibration(0, lens, at), camera.transform(0, lens, at), point)
+    u, v = drawn(frames.calibration(0, lens, at), frames.transform(0, lens, at), point)
     ours = Lens(lens).pixel(*point)  # counts from the edge of the first pixel, OpenCV from its middle
     assert (u + 0.5, v + 0.5) == pytest.approx(ours, abs=1e-9)
 

@@ -13,8 +13,7 @@ from miro_sim.scenario.file import load, of_table
 from miro_sim.scenario.keys import without_expectations
 from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
-from mirotwin.verify.cases.case import case_of_checks, case_text, tables_of, write_case
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.case import Trace, case_of_checks, case_text, tables_of, write_case
 from mirotwin.verify.checks.happens import expect_of
 from tests import children
 from tests.mirotwin.conftest import mirotwin

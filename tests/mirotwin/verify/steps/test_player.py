@@ -14,7 +14,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.world import World
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.case import Trace
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import steps_of
 from tests.mirotwin.verify.steps.rig import MS, own_image, play, scenario_of, without_steps

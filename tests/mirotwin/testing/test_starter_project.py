@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from miro_robot.firmware import image_path
-from mirotwin.testing.starter import project
+from mirotwin.testing import starter
 from tests import children
 from tests.mirotwin.conftest import mirotwin
 
@@ -23,7 +23,7 @@ def tree(folder: Path) -> set[str]:
 def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_path):
     code, out, err = mirotwin("init", tmp_path / "mine")
     assert (code, err) == (0, "")
-    assert tree(tmp_path / "mine") == {name for name, _ in project.files()}
+    assert tree(tmp_path / "mine") == {name for name, _ in starter.project_files()}
     assert {"Makefile", "firmware/main.c", "tests/test_robot.py", ".github/workflows/firmware.yml"} <= tree(
         tmp_path / "mine"
     )
@@ -53,7 +53,7 @@ def test_a_file_is_no_folder(mirotwin, tmp_path):
 
 
 def test_an_installation_without_the_files_says_so(mirotwin, tmp_path, monkeypatch):
-    monkeypatch.setattr(project, "source_folder", lambda: None)
+    monkeypatch.setattr(starter, "source_folder", lambda: None)
     code, _, err = mirotwin("init", tmp_path / "a")
     assert code == 2
     assert "not part of this installation" in err
@@ -64,7 +64,7 @@ def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(miro
     assert (code, err) == (0, "")
     assert tree(tmp_path / "mine") == {
         name
-        for name, _ in project.files()
+        for name, _ in starter.project_files()
         if not name.startswith("firmware/") and name != "tests/test_firmware.py"
     }
     assert "SDCC" not in out
@@ -94,7 +94,7 @@ def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(mirotw
 
 
 def test_what_a_project_requires_is_this_version_with_what_its_pages_need():
-    (requirements,) = (path for name, path in project.files() if name == "requirements.txt")
+    (requirements,) = (path for name, path in starter.project_files() if name == "requirements.txt")
     minor = ".".join(metadata.version("mirotwin").split(".")[:2])
     assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()
 

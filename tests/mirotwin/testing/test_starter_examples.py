@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from miro_robot.firmware import image_path
-from mirotwin.testing.starter import examples
+from mirotwin.testing import starter
 from tests.mirotwin.conftest import mirotwin
 from tests.mutants import build
 from tests.mutants.planted import PLANTED
@@ -18,21 +18,21 @@ LATE = PLANTED["stops 15 ms late"]
 def test_without_a_name_each_example_has_a_line(mirotwin):
     code, out, err = mirotwin("examples")
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()[:-1]] == list(examples.EXAMPLES)
+    assert [line.split()[0] for line in out.splitlines()[:-1]] == list(starter.EXAMPLES)
     assert max(map(len, out.splitlines())) <= 80
 
 
 def test_all_that_lies_in_the_folder_can_be_written():
-    there = {path.stem for path in examples.folder().iterdir()}
-    assert there == {*examples.EXAMPLES, examples.PROJECT}
+    there = {path.stem for path in starter.folder().iterdir()}
+    assert there == {*starter.EXAMPLES, starter.PROJECT}
 
 
-@pytest.mark.parametrize("name", examples.EXAMPLES)
+@pytest.mark.parametrize("name", starter.EXAMPLES)
 def test_an_example_is_written_file_by_file(mirotwin, tmp_path, name):
     code, out, err = mirotwin("examples", name, tmp_path / "here")
     assert (code, err) == (0, "")
     assert [Path(line) for line in out.splitlines()] == [
-        tmp_path / "here" / one for one, _ in examples.files(name)
+        tmp_path / "here" / one for one, _ in starter.example_files(name)
     ]
     assert all(path.is_file() for path in map(Path, out.splitlines()))
 
@@ -78,5 +78,5 @@ def test_the_late_image_is_the_shipped_firmware_with_one_mistake():
         pytest.skip("needs make and SDCC 4.2.0")
     source = (build.SOURCE / LATE.file).read_text("utf-8")
     built = build.build({LATE.file: LATE.applied(source)})
-    late = examples.folder() / "firmware" / "late.ihx"
+    late = starter.folder() / "firmware" / "late.ihx"
     assert late.read_bytes() == built.image.read_bytes(), f"cp {built.image} {late}"

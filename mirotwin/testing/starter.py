@@ -1,0 +1,201 @@
+"""What a user begins with: `mirotwin examples` and `mirotwin init` write the files of the pages, and a project."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import click
+
+from miro_exact.bad_input import BadInput, did_you_mean, shortened
+from miro_robot.firmware import image_path, source_folder
+from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.options import FORCE, PATH
+
+_IN_WHEEL = Path(__file__).parent / "examples"
+_IN_TREE = Path(__file__).parents[2] / "examples"
+EXAMPLES = {
+    "firmware": "mine.ihx; late.ihx stops 15 ms late when the host falls silent.",
+    "hil-steps": "Scenario files with steps: send, wait, expect, reset.",
+    "campaign": "A campaign of 240 runs: radio, latency, two controllers.",
+    "two_teams": "A scenario with six robots, to look at pictures.",
+    "laws": "Two laws in a distribution of their own, to install.",
+    "checks": "A check in a distribution of its own, to install.",
+    "fuzz-slip": "An 8051 firmware that is no robot, its wire format, its check.",
+    "foxglove": "A layout for Foxglove.",
+    "vscode": "The extension for VS Code: debugging firmware, backwards too.",
+}
+"""Name, and what `mirotwin examples` says of it."""
+PROJECT = "hil"
+"""The folder that `mirotwin init` writes."""
+_DEBUG_FILES = {"mine": (".map", ".cdb", ".rst"), "late": (".map", ".cdb")}
+"""The two images differ in one byte, a constant, so names and lines are the same; .rst holds the bytes, too."""
+
+
+def folder() -> Path:
+    """Where the examples are. Raises BadInput in an installation without them."""
+    for place in (_IN_WHEEL, _IN_TREE):
+        if place.is_dir():
+            return place
+    what = "the examples are not part of this installation"
+    raise BadInput("", "mirotwin", what, "install mirotwin from a wheel or a checkout")
+
+
+def example_files(name: str) -> Iterator[tuple[str, Path]]:
+    """(name to write, file) of an example. Raises BadInput for a name that is not one."""
+    if name not in EXAMPLES:
+        hint = did_you_mean(name, EXAMPLES) or f"there are {', '.join(EXAMPLES)}"
+        raise BadInput("", "", f"no such example {shortened(repr(name))}", hint)
+    if name == "firmware":
+        yield from _images()
+        return
+    found = folder() / name
+    if found.is_dir():
+        yield from ((f"{name}/{path.relative_to(found).as_posix()}", path) for path in all_files(found))
+    else:
+        (path,) = folder().glob(f"{name}.*")
+        yield path.name, path
+
+
+def _images() -> Iterator[tuple[str, Path]]:
+    own = image_path()
+    yield "mine.ihx", own
+    yield "late.ihx", folder() / "firmware" / "late.ihx"
+    for name, suffixes in _DEBUG_FILES.items():
+        yield from ((f"{name}{suffix}", own.with_suffix(suffix)) for suffix in suffixes)
+
+
+FIRMWARE = "firmware"
+OF_FIRMWARE = "tests/test_firmware.py"
+"""What only this firmware passes, because it names a function of it."""
+
+
+def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
+    """(name in the project, file) of all, in the order of names; with the C sources if `firmware`."""
+    of_project = folder() / PROJECT
+    sources = source_folder()
+    if sources is None:
+        what = "the sample project is not part of this installation"
+        raise BadInput("", "mirotwin init", what, "install mirotwin from a wheel or a checkout")
+    found = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
+    if not firmware:
+        yield from (one for one in found if one[0] != OF_FIRMWARE)
+        return
+    found += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
+    yield from sorted(found)
+
+
+def begin(target: Path, firmware: bool = True) -> list[str]:
+    """Writes the project into `target`, which is made, and returns the names. Raises BadInput if one is there."""
+    return write(target, project_files(firmware), "name a folder that is new or empty")
+
+
+_LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv"}
+
+
+def all_files(folder: Path) -> Iterator[Path]:
+    """Regular files, but for what tools leave behind."""
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        left_behind = any(part in _LEFT_BEHIND or part.endswith(".egg-info") for part in parts)
+        if path.is_file() and not left_behind:
+            yield path
+
+
+def write(target: Path, wanted: Iterable[tuple[str, Path]], remedy: str, force: bool = False) -> list[str]:
+    """Writes (name, file) into `target`, which is made, and returns the names.
+
+    Raises BadInput with `remedy`, before anything is written, if a file of that name has other content: not if
+    `force`, unless it is no regular file. A file with the same content stays.
+    """
+    files = [(name, path.read_bytes()) for name, path in wanted]
+    if target.exists() and not target.is_dir():
+        raise BadInput(target, "", "is no folder", "name one that is new or empty")
+    present = [name for name, content in files if _is_in_the_way(target / name, content, force)]
+    if present:
+        some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
+        raise BadInput(target, "", f"holds {some} already", remedy)
+    for name, content in files:
+        path = target / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return [name for name, _ in files]
+
+
+def _is_in_the_way(path: Path, content: bytes, force: bool) -> bool:
+    if not path.exists() and not path.is_symlink():
+        return False
+    if path.is_symlink() or not path.is_file():
+        return True
+    return not force and path.read_bytes() != content
+
+
+class ExamplesOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "examples"
+    name: Annotated[str | None, Argument("[NAME]")] = None
+    folder: Annotated[Path, Argument("[FOLDER]", PATH)] = Path()
+    force: Annotated[bool, FORCE.saying("Replace files of these names.")] = False
+
+
+@command_of(ExamplesOptions)
+def examples(options: ExamplesOptions) -> None:
+    """Lists the examples, or writes the one called NAME into FOLDER (here, if none is named).
+
+    The pages of the documentation use these files. One that is there already with other content is replaced only
+    with --force. `firmware` writes its files into FOLDER itself. Its late.ihx is late only when the host falls silent:
+    `replay` of a run of fig6 shows no difference, hil-steps/failsafe.scenario.toml does.
+
+    A whole project, with sources, tests and CI, is begun by `mirotwin init`.
+    """
+    name, folder = options.name, options.folder
+    if name is None:
+        width = max(map(len, EXAMPLES))
+        for one, about in EXAMPLES.items():
+            click.echo(f"{one:{width}}  {about}")
+        click.echo("write one here: mirotwin examples NAME")
+        return
+    try:
+        names = write(
+            folder, example_files(name), "name another folder, or replace with --force", options.force
+        )
+    except OSError as error:
+        what = error.strerror or type(error).__name__
+        raise BadInput(error.filename or folder, "", what, "choose another folder") from None
+    for one in names:
+        click.echo(folder / one)
+    if folder == Path():
+        click.echo(f"files written into this folder: {len(names)}")
+
+
+class InitOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "init"
+    folder: Annotated[Path, Argument("FOLDER", PATH)]
+    without_firmware: Annotated[
+        bool,
+        Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours."),
+    ] = False
+
+
+@command_of(InitOptions)
+def init(options: InitOptions) -> None:
+    """Writes a sample project into FOLDER, which is new or has no files of these names.
+
+    It holds a working firmware in C with a Makefile, a scenario with expectations, a pytest test, and a workflow that
+    runs them with `mirotwin conform` at each push. With --without-firmware the project tests a controller or
+    a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
+    """
+    folder = options.folder
+    try:
+        names = begin(folder, not options.without_firmware)
+    except OSError as error:
+        what = error.strerror or type(error).__name__
+        raise BadInput(error.filename or folder, "", what, "choose another folder") from None
+    for name in names:
+        if not name.startswith("firmware/"):
+            click.echo(folder / name)
+    if options.without_firmware:
+        click.echo(f"next: cd {folder} && make test   (needs make and pytest)")
+        return
+    click.echo(f"{folder}/firmware: {len([name for name in names if name.startswith('firmware/')])} files")
+    click.echo(f"next: cd {folder} && make test   (needs SDCC, make and pytest)")
