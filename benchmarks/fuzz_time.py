@@ -1,6 +1,6 @@
-"""How long fuzzing takes to find each planted mistake: AFL++ beside Hypothesis alone, and the link machine.
+"""How long fuzzing takes to find each planted mistake: AFL++ beside Hypothesis alone.
 
-    python -m benchmarks.fuzz_time [--limit 60] [--seeds 3] [--engines afl hypothesis link] [--only NAME ..]
+    python -m benchmarks.fuzz_time [--limit 60] [--seeds 3] [--engines afl hypothesis] [--only NAME ..]
     python -m benchmarks.fuzz_time --planted [--limit 20]     # the other table: mistakes of tests.mutants.planted
     python -m benchmarks.fuzz_time --write                    # the tables of docs/fuzzing.md, from what was measured
 
@@ -93,7 +93,7 @@ def _measure(asked: argparse.Namespace) -> None:
     if unknown := sorted(set(asked.only) - set(names)):
         raise SystemExit(f"there is no mistake {unknown[0]!r}; use one of: {'; '.join(names)}")
     chosen = {name: one for name, one in names.items() if not asked.only or name in asked.only}
-    engines = asked.engines or (["afl", "hypothesis"] if asked.planted else list(ENGINES))
+    engines = asked.engines or list(ENGINES)
     limit_s = asked.limit or (PLANTED_LIMIT_S if asked.planted else LIMIT_S)
     for one in wanted(chosen, engines, asked.seeds or 3, limit_s, table):
         found = results()

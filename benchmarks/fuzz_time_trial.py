@@ -7,8 +7,6 @@ is confirmed when checks fail for it in a world with the mistaken firmware that 
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -32,7 +30,7 @@ from mirotwin.fuzz.target import Target
 from tests.mutants.build import CACHE, IMAGE
 from tests.mutants.heard import Input, verdicts
 
-ENGINES = ("afl", "hypothesis", "link")
+ENGINES = ("afl", "hypothesis")
 LOOK_S = 0.2
 WALL_FACTOR = 3.0
 ROBOTS, SLOT = 3, 0
@@ -93,7 +91,7 @@ class Trial(msgspec.Struct, frozen=True):
 def measured(wanted: Wanted) -> Trial:
     """Runs the trial."""
     with tempfile.TemporaryDirectory(prefix="fuzz-time-") as name:
-        return _of_link(wanted) if wanted.engine == "link" else _of_engine(wanted, Path(name))
+        return _of_engine(wanted, Path(name))
 
 
 def confirmed(image: Image, heard: Input) -> tuple[str, ...]:
@@ -159,20 +157,3 @@ class _Looked:
                 self.checks = confirmed(self.target.image, self.target.script(data))
                 self.unconfirmed += not self.checks
         return bool(self.checks)
-
-
-def _of_link(wanted: Wanted) -> Trial:
-    """The link machine compares counters and answers instead of judging by checks."""
-    line = [sys.executable, "-m", "benchmarks.fuzz_time_link", wanted.path, str(wanted.seed)]
-    begun_s, spent_s = time.monotonic(), 0.0
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        while process.poll() is None and _goes_on(wanted, begun_s, spent_s):
-            time.sleep(LOOK_S)
-            spent_s = of_descendants() or spent_s
-        process.kill()
-        assert process.stdout is not None
-        last = process.stdout.read().strip().splitlines()[-1:]
-    wall_s = time.monotonic() - begun_s
-    if not last:
-        return Trial(wanted, None, wall_s)
-    return Trial(wanted, spent_s, wall_s, ("the link machine",), executions=int(last[0]))

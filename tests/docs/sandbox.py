@@ -182,9 +182,5 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         f"{_CAMPAIGN} runs/campaign.parquet || true",
         "cp runs/campaign.parquet baseline.parquet",
     ),
-    "mirotwin/testing/README.md": (
-        f"{_SHORT} first",
-        "mirotwin export first/run.mcap --out link-failure.stream",
-    ),
 }
 """Run before anything else, by document."""

@@ -11,6 +11,7 @@ from miro_sim.radio.params import SlicerParams
 from miro_sim.radio.probability import fsk_threshold, margin_table
 from miro_sim.radio.slicer import Slicer
 from tests.naive import radio as naive
+from tests.sim.radio.noise import listen
 from tests.sim.radio.radios import clean
 from tests.sim.radio.strategies import signals_db, slicers
 
@@ -95,3 +96,11 @@ def test_a_state_can_be_put_back():
     other = Slicer(TYPICAL, EB_N0_DB)
     restore(other, snapshot(slicer))
     assert repr(other) == repr(slicer)
+
+
+@pytest.mark.parametrize("robots", [3, 5])
+def test_noise_alone_is_never_taken_for_a_frame_by_the_firmware(robots):
+    """`python -m tests.sim.radio.noise` listens for minutes."""
+    heard, counted = listen(10, robots)
+    assert heard > 7000
+    assert counted == (0, 0, 0)
