@@ -8,8 +8,7 @@ gain sets, the same starts (Figs. 6 to 10), the same loop and the same seeds, an
 2. Refine, once for the line (Figs. 6, 7 and 9) and once for the curve (Figs. 8 and 10): `Budget.generations` times
    `Budget.children` sets near the best four so far.
 3. Check: the best four drive with `CHECK` seeds, and the best of them is kept.
-4. Hold out: that set drives with `HELD_OUT` seeds, which chose nothing. They are those of `mirotwin campaign
-   reproduce`.
+4. Hold out: that set drives with `HELD_OUT` seeds, which chose nothing. They are the seeds of `mirotwin reproduce`.
 
 A run settles if it ends within 3 cm and 0.15 rad. A set settles from a start if 80 % of its runs do; in steps 1 to 3 it
 leaves a start as soon as that is out of reach. A run ends, and does not settle, where the robot is more than `LOST_M`

@@ -62,10 +62,6 @@ CAMPAIGN = {
         "mirotwin.campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."
     ),
     "page": Lazy("mirotwin.campaign.page", "Makes one page of RESULTS.parquet."),
-    "reproduce": Lazy(
-        "mirotwin.campaign.reproduce.reproduce_command",
-        "Runs the paper's figures again and writes one page about them.",
-    ),
 }
 
 
@@ -121,6 +117,12 @@ SECTIONS = {
         "decode": Lazy("mirotwin.recording.decode_command", "Decodes captured bytes to frames and damage."),
         "export": Lazy(
             "mirotwin.report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."
+        ),
+    },
+    "Paper": {
+        "reproduce": Lazy(
+            "mirotwin.campaign.reproduce.reproduce_command",
+            "Runs the paper's figures again and writes one page about them.",
         ),
     },
     "Camera, firmware, installation": {

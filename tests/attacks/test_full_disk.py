@@ -21,11 +21,7 @@ def limited():
     ("command", "named", "left"),
     [
         (["fuzz", "--time", "1s", "-q"], "out", []),
-        (
-            ["campaign", "reproduce", "--seeds", "0-0", "--jobs", "1", "-q"],
-            "out/reproduction",
-            ["rows.part.csv"],
-        ),
+        (["reproduce", "--seeds", "0-0", "--jobs", "1", "-q"], "out/reproduction", ["rows.part.csv"]),
     ],
 )
 def test_a_full_disk_is_named_and_nothing_half_written_stays(command, named, left, tmp_path):

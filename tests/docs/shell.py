@@ -28,7 +28,7 @@ from tests import children
 
 MAY_TAKE_S = 60
 SLOW_MAY_TAKE_S = 600
-FRESH = ("campaign", "fuzz")
+FRESH = ("campaign", "fuzz", "reproduce")
 """Commands that start processes of their own, which begin with the program's file."""
 OPTIONAL = ("tshark", "afl-showmap")
 """Programs without which a command is passed over, except in CI (CONTRIBUTING, "Set-up")."""

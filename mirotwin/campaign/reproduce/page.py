@@ -30,8 +30,8 @@ HEAD = """\
 # The paper's section V, run again
 
 J.-M. Yang, J.-H. Kim, "Sliding Mode Control for Trajectory Tracking of Nonholonomic Wheeled Mobile Robots", IEEE
-Trans. Robotics and Automation 15(3), 1999. `mirotwin campaign reproduce` makes this page, its pictures and its
-recordings; it gives the same figures on every computer and the same bytes of pictures. In every run are
+Trans. Robotics and Automation 15(3), 1999. `mirotwin reproduce` makes this page, its pictures and its recordings; it
+gives the same figures on every computer and the same bytes of pictures. In every run are
 firmware, LM629, motors, radio and camera of the robot: {runs} runs, seeds {seeds}, 6 s each. An error is the root mean
 square over the last second. Pictures show, of each controller, the run with the median error.
 

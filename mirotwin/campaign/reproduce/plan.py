@@ -150,7 +150,7 @@ def plan_of(seeds: range) -> Plan:
     for group in GROUPS:
         scenario, settings = group.scenario()
         levels.append(Level(group.label, settings, scenario))
-    return plan_of_levels("mirotwin campaign reproduce", levels, seeds)
+    return plan_of_levels("mirotwin reproduce", levels, seeds)
 
 
 def recorded(plan: Plan, seeds: Mapping[str, int], place: Callable[[str], str]) -> list[Work]:

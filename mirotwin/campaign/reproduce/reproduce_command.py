@@ -1,4 +1,4 @@
-"""`mirotwin campaign reproduce`: the paper's figures and claims, run again, as a page with pictures and recordings."""
+"""`mirotwin reproduce`: the paper's figures and claims, run again, as a page with pictures and recordings."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ROWS = "rows.csv"
 
 
 class ReproduceOptions(Options, frozen=True, kw_only=True):
-    COMMAND = "campaign reproduce"
+    COMMAND = "reproduce"
     out: Annotated[Path | None, OUT.saying(f"Folder for {PAGE} and {FOLDER}/. Default: here.")] = None
     seeds: Annotated[range, SEEDS] = range(50)
     jobs: Annotated[int | None, JOBS] = None

@@ -64,7 +64,7 @@ def table(**changes):
 
 
 def called(*arguments):
-    return CliRunner().invoke(main, ["campaign", "reproduce", *map(str, arguments)])
+    return CliRunner().invoke(main, ["reproduce", *map(str, arguments)])
 
 
 def verdict(words, **changes):
