@@ -14,7 +14,7 @@ cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
 cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE, PORTS
 cdef long long CYCLE_TICKS, FAR
-cdef int _FAULT, _REACHED, _RECEIVED, _SENT
+cdef int _FAULT, _REACHED, _RECEIVED, _SENT, _REPLAN
 cdef long long RESET_PULSE_TICKS, _NEVER
 
 

@@ -26,7 +26,7 @@ from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
+from miro_robot.mcs51.cpu import BREAKPOINT, REPLAN, Cpu
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
@@ -47,6 +47,7 @@ _CS, _BOTH_STROBES, _RST = 0x01, 0x06, 0x10
 _CHIP_PINS, _ALL_PINS, _BOTH_RST, _NEVER = 5, 0x1F, 0x210, NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE, _FAULT, _REACHED, _RECEIVED, _SENT = RESET_PULSE, FAULT, REACHED, RECEIVED, SENT
+_REPLAN = REPLAN
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
@@ -188,6 +189,8 @@ class Board(Bus):
             self.horizon = horizon
             stopped = cpu.go_on((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
             self.sync(min(horizon, cpu.cycles * CYCLE_TICKS) if stopped else horizon)
+            if stopped == _REPLAN:
+                stopped = 0
         self.horizon = -1
         cpu.end_run()
         return stopped
@@ -435,6 +438,8 @@ class Board(Bus):
             self.left.set_reset(tick, left >> 4)
         if right >> 4 != self.right.reset_level:
             self.right.set_reset(tick, right >> 4)
+        if self._next_interrupt(self.left) < self.horizon or self._next_interrupt(self.right) < self.horizon:
+            self.cpu.replan()  # a reset has begun to end
         if at_left or self.left.next_tick <= tick:
             self.left.set_bus(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
         else:

@@ -7,7 +7,7 @@ from miro_robot.mcs51.peripherals cimport Peripherals
 cdef long long _NEVER
 cdef int _OUTSIDE
 cdef int _MARK
-cdef int _STOP_REQUESTED
+cdef int _STOP_REQUESTED, _REPLAN
 cdef int _WIRE_FULL
 cdef int _P0, _SP, _PCON, _IE, _IP, _PSW
 cdef int _SMOD, _PD, _IDL
@@ -54,6 +54,7 @@ cdef class Cpu(Executor):
     @cython.locals(address=int)
     cpdef int run_until_any(self, tuple addresses, long long until_cycle) except -1
     cpdef request_stop(self)
+    cdef void replan(self) noexcept
     cpdef int set_external(self, int port, int levels, long long tick) except -1
     cpdef asleep(self)
     cpdef int peek_iram(self, int address) noexcept

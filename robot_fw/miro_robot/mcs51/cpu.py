@@ -43,7 +43,10 @@ __all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
 
 ASLEEP = 4  # why a run ended, beside those of `execute.py`: with `stop_asleep`, nothing known wakes it
 
+REPLAN = 5  # `replan` was called
+
 _NEVER = NEVER_TICK
+_REPLAN = REPLAN
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
 _STOP_REQUESTED = 1
@@ -225,6 +228,12 @@ class Cpu(Executor):
     def request_stop(self) -> None:
         """Ends the run after the instruction in progress; for callbacks of the bus."""
         self.stop = _STOP_REQUESTED
+        self.limit = 0
+
+    def replan(self) -> None:
+        """Ends a piece of a run after the instruction in progress, for the caller of `go_on` to make another one."""
+        if self.stop == 0:
+            self.stop = _REPLAN
         self.limit = 0
 
     def set_external(self, port: int, levels: int, tick: int) -> None:

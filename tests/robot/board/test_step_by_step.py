@@ -1,15 +1,19 @@
-"""A board alone takes short cuts; one with a probe does each step by itself, and ends with the same bits."""
+"""A board takes short cuts; one with a probe does each step by itself, and ends with the same bits."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import snapshot
+from miro_robot.board import Board
 from miro_robot.lm629.options import Lm629Options
+from miro_robot.plant import Plant
 from miro_robot.probe import Probe
+from miro_robot.wiring import load_wiring
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Bridge, Chassis, DriveParams, OpticalEncoder
 from tests.robot.board.rig import board_with
-from tests.robot.firmware.rig import MS, Rig
+from tests.robot.firmware.rig import IMAGE, MS, Rig
 
 DRIVES = st.builds(
     lambda on_us, off_us, index, stiction: DriveParams(
@@ -68,3 +72,24 @@ def test_pins_that_move_at_random_do_the_same_with_and_without_a_probe(moves, cu
             board.run(tick)
         assert snapshot(boards[0]) == snapshot(boards[1])
     assert boards[0].faults == boards[1].faults
+
+
+def powered_up():
+    board = Board(load_wiring(), Plant())
+    board.load(IMAGE)
+    board.cpu.rxd.settled_tick = NEVER_TICK
+    return board
+
+
+RESETS = st.integers(35_000, 36_000)
+"""About where the firmware ends the first reset of both chips."""
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.one_of(RESETS, st.integers(1, 120_000)), min_size=2, max_size=12))
+def test_a_run_that_is_cut_from_power_up_on_ends_as_in_one_piece(cuts):
+    whole, pieces = powered_up(), powered_up()
+    for cut in sorted(cuts):
+        pieces.run(cut)
+    whole.run(max(cuts))
+    assert snapshot(pieces) == snapshot(whole)
