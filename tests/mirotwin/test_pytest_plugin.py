@@ -1,14 +1,8 @@
 """The pytest plugin: firmware coverage of other people's test sessions."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-from tests import children
+from tests.mirotwin.testing.sessions import session
 
 TESTS = """
 from miro_robot.bare.machine import BareMachine
@@ -31,30 +25,39 @@ def test_other_firmware_does_not_count():
 """
 
 
-def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    (folder / "test_mine.py").write_text(TESTS)
-    (folder / "pytest.ini").write_text("[pytest]\n")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
-    return children.run(command, cwd=folder, capture_output=True, text=True)
+COUNTS = """
+from mirotwin.firmware import coverage_files as firmware_coverage
+
+collect = firmware_coverage.collect
+
+def counted(*arguments):
+    with open("collected", "a") as file:
+        file.write("once\\n")
+    return collect(*arguments)
+
+firmware_coverage.collect = counted
+"""
 
 
-def counted(folder: Path, *arguments: str) -> str:
-    done = session(folder, "--firmware-coverage=fw.info", *arguments)
+def counted(folder, *arguments, child=False):
+    done = session(folder, "--firmware-coverage=fw.info", *arguments, tests=TESTS, child=child)
     assert done.returncode == 0, done.stdout
     assert "coverage of miro.ihx, written to fw.info" in done.stdout
     return (folder / "fw.info").read_text()
 
 
-def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes(tmp_path):
+def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes_and_writes_once(tmp_path):
     alone = counted(tmp_path)
     assert "FNDA:2,_main" in alone
-    assert alone == counted(tmp_path, "-n", "2")
     assert alone != counted(tmp_path, "-k", "reset")
+    (tmp_path / "conftest.py").write_text(COUNTS)
+    assert alone == counted(tmp_path, "-n", "2", child=True)
+    assert (tmp_path / "collected").read_text() == "once\n"
 
 
 def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path):
     wanted = ("--firmware-coverage=fw.info", "--firmware-coverage-fail-under")
-    assert session(tmp_path, *wanted, "5").returncode == 0
+    assert session(tmp_path, *wanted, "5", tests=TESTS).returncode == 0
     failed = session(tmp_path, *wanted, "99")
     assert failed.returncode == 1
     assert "3 passed" in failed.stdout
@@ -72,18 +75,6 @@ def pytest_runtestloop(session):
     if os.environ.get("BREAK") == "down":
         raise RuntimeError("a plugin's own")
 """
-COUNTS = """
-from mirotwin.firmware import coverage_files as firmware_coverage
-
-collect = firmware_coverage.collect
-
-def counted(*arguments):
-    with open("collected", "a") as file:
-        file.write("once\\n")
-    return collect(*arguments)
-
-firmware_coverage.collect = counted
-"""
 
 
 @pytest.mark.parametrize(
@@ -99,14 +90,10 @@ def test_too_few_lines_do_not_hide_what_else_went_wrong(tmp_path, monkeypatch, a
     """pytest: 2 interrupted, 3 an internal error, 4 a usage error, 5 no tests."""
     (tmp_path / "conftest.py").write_text(BREAKS)
     monkeypatch.setenv("BREAK", how)
-    done = session(tmp_path, "--firmware-coverage=fw.info", "--firmware-coverage-fail-under=99", *arguments)
+    done = session(
+        tmp_path, "--firmware-coverage=fw.info", "--firmware-coverage-fail-under=99", *arguments, tests=TESTS
+    )
     assert done.returncode == code, done.stdout + done.stderr
-
-
-def test_the_report_is_built_and_written_once_however_many_processes_there_are(tmp_path):
-    (tmp_path / "conftest.py").write_text(COUNTS)
-    counted(tmp_path, "--firmware-coverage-fail-under=5", "-n", "1")
-    assert (tmp_path / "collected").read_text() == "once\n"
 
 
 @pytest.mark.parametrize(
@@ -121,19 +108,19 @@ def test_the_report_is_built_and_written_once_however_many_processes_there_are(t
     ],
 )
 def test_bad_input_is_a_usage_error(tmp_path, option, said):
-    done = session(tmp_path, "--firmware-coverage=fw.info", option)
+    done = session(tmp_path, "--firmware-coverage=fw.info", option, tests=TESTS)
     assert done.returncode == 4
     assert said in done.stderr
     assert "Traceback" not in done.stderr
 
 
 def test_a_share_without_a_tracefile_is_a_usage_error(tmp_path):
-    done = session(tmp_path, "--firmware-coverage-fail-under=90")
+    done = session(tmp_path, "--firmware-coverage-fail-under=90", tests=TESTS)
     assert done.returncode == 4
     assert "goes with --firmware-coverage=FILE.info" in done.stderr
 
 
 def test_collecting_tests_writes_nothing(tmp_path):
-    done = session(tmp_path, "--firmware-coverage=fw.info", "--collect-only")
+    done = session(tmp_path, "--firmware-coverage=fw.info", "--collect-only", tests=TESTS)
     assert done.returncode == 0
     assert not (tmp_path / "fw.info").exists()

@@ -22,6 +22,10 @@ from mirotwin import ServiceFrame, TeamFrame, Telemetry, conditions, ms, us
 """
 
 
+PLAIN = ["-p", "no:hypothesispytest"]
+"""Options of each session: Hypothesis' plug-in takes as long to load as all else, and no session draws."""
+
+
 class Done(NamedTuple):
     """What came of a command."""
 
@@ -39,7 +43,7 @@ def session(folder: Path, *arguments: object, tests: str = "", child: bool = Fal
         (folder / "test_mine.py").write_text(HEAD + tests)
     if not (folder / "pytest.ini").exists():
         (folder / "pytest.ini").write_text("[pytest]\naddopts = -p no:cacheprovider\n")
-    words = [*map(str, arguments)]
+    words = [*PLAIN, *map(str, arguments)]
     if not child:
         return _in_this_process(folder, words)
     done = children.run([sys.executable, "-m", "pytest", *words], cwd=folder, capture_output=True, text=True)

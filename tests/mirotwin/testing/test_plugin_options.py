@@ -1,7 +1,5 @@
 """The options of the pytest plugin: seeds, repetition, firmware, ini files, coverage beside them."""
 
-from __future__ import annotations
-
 import re
 import shutil
 
@@ -44,7 +42,7 @@ def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path):
         assert (tmp_path / path).read_bytes() == content
 
 
-def digests(out: str) -> list[str]:
+def digests(out):
     return sorted(re.findall(r"^DIGEST .*$", out, re.MULTILINE))
 
 
@@ -145,17 +143,6 @@ def test_the_same_by_a_check(link, world):
     assert again.returncode == 1
     assert "motion_stop was not reached within 111 ms" in again.stdout
     assert session(tmp_path).returncode == 0
-
-
-def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path):
-    tests = "@pytest.mark.parametrize('n', range(3))\ndef test_one(link, n):\n    link.poll(0)\n"
-    counts = []
-    for spread in ([], ["-n", "2"]):
-        done = session(tmp_path, "--firmware-coverage=fw.info", *spread, tests=tests, child=bool(spread))
-        assert done.returncode == 0, done.stdout
-        counts.append((tmp_path / "fw.info").read_text())
-    assert counts[0] == counts[1]
-    assert "FNDA:3,_main" in counts[0]
 
 
 def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path):
