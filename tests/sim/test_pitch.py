@@ -1,6 +1,7 @@
 """The pitch: starts and references that are not on it are refused with place and limits."""
 
 import math
+import re
 
 import pytest
 from hypothesis import example, given
@@ -166,11 +167,14 @@ class Path:
 @pytest.mark.parametrize(
     ("how", "expected"),
     [
-        ("leaves", "leaves the pitch after 2.00 s of 3 s: a square of 7.5 cm there takes x = 196.25 to"),
-        ("leaves", "the pitch has -10 to 120 cm; choose other parameters for it, or duration_s = 1.96"),
+        (
+            "leaves",
+            "leaves the pitch after 2.00 s of 3 s: a square of 7.5 cm there takes x = 196.25 to .* "
+            "the pitch has -10 to 120 cm; choose other parameters for it, or duration_s = 1.96",
+        ),
         ("turns", "leaves the pitch: angle must be within"),
-        ("fails", "reference 'odd' failed at 2.002000 s: KeyError: 't_s' ("),
-        ("not made", "reference 'odd' cannot be made: RuntimeError: no file of points ("),
+        ("fails", r"reference 'odd' failed at 2.002000 s: KeyError: 't_s' \("),
+        ("not made", r"reference 'odd' cannot be made: RuntimeError: no file of points \("),
     ],
 )
 def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(
@@ -180,5 +184,5 @@ def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(
     install(tmp_path, "odd", "1", {"odd": "plug_odd:Odd"}, "references", plug_odd=FOREIGN)
     message = refusal("", f'kind = "odd", how = "{how}"', 3.0)
     assert message.startswith(f"my.toml: {HERE}.reference: ")
-    assert expected in message
-    parse(text("", 'kind = "odd", how = "good"', 86_400.0), "my.toml")
+    assert re.search(expected, message)
+    parse(text("", 'kind = "odd", how = "good"', 3.0), "my.toml")

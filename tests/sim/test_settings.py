@@ -243,13 +243,14 @@ LAWS_OF_OURS = LAWS.names()
 
 
 @pytest.mark.parametrize("law", LAWS_OF_OURS)
-@pytest.mark.parametrize("other", LAWS_OF_OURS)
-def test_any_law_takes_the_place_of_any_other(law, other):
+def test_any_law_takes_the_place_of_any_other(law):
     key = "network.robot.controller.law"
-    text = load("fig6", [f"{key}={law}"]).text
-    assert parse(text, "written.toml", [f"{key}={other}"]).networks[0].robot[0].controller.name() == other
+    text = load("fig6", [f"{key}={law}", "duration_s=0.1"]).text
     unnamed = text.replace('law = "yang_kim"\n', "")  # the default need not be named
-    assert parse(unnamed, "written.toml", [f"{key}={other}"]).networks[0].robot[0].controller.name() == other
+    for other in LAWS_OF_OURS:
+        for written in {text, unnamed}:
+            settled = parse(written, "written.toml", [f"{key}={other}"])
+            assert settled.networks[0].robot[0].controller.name() == other
 
 
 @pytest.mark.parametrize("source", ["fig6", str(TWO_TEAMS)])

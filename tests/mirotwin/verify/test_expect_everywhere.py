@@ -1,7 +1,5 @@
 """`--expect` with a check of a user's own in test, campaign, fuzz and replay, and what settings leave out there."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest
@@ -63,7 +61,9 @@ def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin, here):
 
 def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here):
     code, out, _ = mirotwin(
-        *("fuzz", "--time", "3s", "--jobs", 1, "--minimise", "1s", "--out", "out"), "--expect", "stands_still"
+        *("fuzz", "--time", "1s", "--jobs", 1, "--minimise", "0.2s", "--out", "out"),
+        "--expect",
+        "stands_still",
     )
     assert code == 1
     case = next((here / "out" / "crashes").glob("stands_still-*.stream"))

@@ -1,14 +1,12 @@
 """lcov tracefiles: written, read back, added up, and read by lcov itself."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from contextlib import suppress
 from copy import deepcopy
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
@@ -30,6 +28,7 @@ RECORDS = st.builds(
 TRACEFILES = st.dictionaries(st.from_regex(r"[a-z][a-z/]{0,9}\.c", fullmatch=True), RECORDS, max_size=4)
 
 
+@settings(max_examples=40)
 @given(TRACEFILES)
 def test_what_is_written_is_read_back(tracefile):
     assert decode(encode(tracefile), "x.info") == tracefile
@@ -41,6 +40,7 @@ def test_a_name_that_begins_like_a_line_is_read_back_as_a_name(name):
     assert decode(encode(tracefile), "x.info") == tracefile
 
 
+@settings(max_examples=40)
 @given(TRACEFILES, TRACEFILES)
 def test_adding_up_does_not_depend_on_the_order(one, other):
     forth, back = deepcopy(one), deepcopy(other)
@@ -52,6 +52,7 @@ def test_adding_up_does_not_depend_on_the_order(one, other):
     assert forth == back
 
 
+@settings(max_examples=40)
 @given(TRACEFILES)
 def test_a_run_added_to_itself_has_every_count_twice_and_no_line_more(tracefile):
     total = deepcopy(tracefile)
@@ -63,6 +64,7 @@ def test_a_run_added_to_itself_has_every_count_twice_and_no_line_more(tracefile)
         }
 
 
+@settings(max_examples=40)
 @given(TRACEFILES, TRACEFILES)
 def test_tracefiles_put_one_behind_the_other_read_as_their_sum(one, other):
     total = deepcopy(one)
@@ -119,6 +121,7 @@ def test_functions_are_read_as_lcov_2_writes_them():
     assert decode(LCOV_2, "x.info") == {"a.cpp": FileRecord({3: 2, 12: 5}, functions)}
 
 
+@settings(max_examples=40)
 @given(TRACEFILES)
 def test_both_forms_of_functions_say_the_same(tracefile):
     assert decode(as_lcov_2(encode(tracefile)), "x.info") == tracefile
@@ -147,6 +150,7 @@ def test_functions_of_one_file_do_not_lend_their_lines_to_the_next():
         decode(LCOV_2 + "TN:\nSF:b.cpp\nFNA:0,1,f\nend_of_record\n", "x.info")
 
 
+@settings(max_examples=40)
 @given(st.text(max_size=200))
 def test_any_text_is_a_tracefile_or_is_refused(text):
     with suppress(BadInput):
