@@ -248,8 +248,8 @@ def test_any_law_takes_the_place_of_any_other(law):
     text = load("fig6", [f"{key}={law}", "duration_s=0.1"]).text
     unnamed = text.replace('law = "yang_kim"\n', "")  # the default need not be named
     for other in LAWS_OF_OURS:
-        for written in {text, unnamed}:
-            settled = parse(written, "written.toml", [f"{key}={other}"])
+        for form in {text, unnamed}:
+            settled = parse(form, "written.toml", [f"{key}={other}"])
             assert settled.networks[0].robot[0].controller.name() == other
 
 
