@@ -1,94 +1,68 @@
 """What a robot at a port answers beside what its twin answers to the same characters at the same ticks.
 
 An answer comes `delay` after the twin's: radio, adapter, operating system and scheduling. The shortest delay of a talk
-is what the way costs; what an answer takes longer is how well its time is known, and the question's too. Positions
-and flags that this time leaves open are not judged.
-
-Positions, `accepted` and `rejected` are compared by how they change from one answer to the next: a robot on the desk
-was switched on some time ago.
+is what the way costs, and is taken off all ticks. What an answer takes longer is how well its time is known, and the
+question's too: positions and flags that this leaves open are not judged. Positions, `accepted` and `rejected` are
+compared by how they change from one answer to the next: a robot on the desk was switched on some time ago.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame
-from miro_protocol.table import (
-    FAILSAFE_OFF_TICKS,
-    FAILSAFE_STOP_TICKS,
-    FRESH_AGAIN_TICKS,
-    ROBOT_COUNTS,
-    TICKS_PER_MS,
-)
-from miro_protocol.transmission import DOWN, Transmission
+from miro_protocol.table import FAILSAFE_OFF_TICKS, FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, TICKS_PER_MS
 from miro_sim.periods import Period
+from miro_sim.world.conditions import answer_of
+from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
+from mirotwin.recording.sequences import on_air, pairs
 
-WITHIN_COUNTS = 20
-WITHIN_MS = 20.0
+WITHIN_TICKS = 20 * TICKS_PER_MS
 """A little more than the 16 ms for which a USB adapter may keep a character."""
+ANSWERS = CompareRule(kind="answers", within_ticks=WITHIN_TICKS)
 TOGETHER_TICKS = 500 * TICKS_PER_MS
 """Answers with the same slot and number that are farther apart are to different questions."""
+EARLY_TICKS = 5 * TICKS_PER_MS
+"""By so much a robot with a fast crystal may be earlier than its twin."""
+LIMITS_TICKS = (FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, FAILSAFE_OFF_TICKS)
 GAP_TICKS = 2 * TICKS_PER_MS
 """So near to a limit of time, a robot and its twin may judge either way: where they count from and what they round."""
 STATUS = 0xA2
 """Command error, excessive error, motor off: bits of an LM629's status that do not depend on what was before."""
-SAMPLE_TICKS = 8192
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 """A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
 """Answers before and after one that tell how late frames were that nobody answered."""
-LIMITS_TICKS = (FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, FAILSAFE_OFF_TICKS)
 
 
-class AnswerTolerance(msgspec.Struct, frozen=True):
-    """Positions may be `counts` apart and what time leaves open; answers may come `late_ticks` later than the first."""
-
-    counts: int = WITHIN_COUNTS
-    late_ticks: int = int(WITHIN_MS * TICKS_PER_MS)
-
-
-class TimedAnswer(msgspec.Struct, frozen=True):
-    """What was said, and when the PC had heard all of it."""
+class TimedAnswer(NamedTuple):
+    """An answer, and when the PC had heard all of it. `text`: whose, and to which question."""
 
     tick: int
+    text: str
     said: TelemetryFrame
 
 
-class AnswerPair(msgspec.Struct, frozen=True):
-    """An answer of the robot and of its twin to the same question; None: there is none."""
-
-    port: TimedAnswer | None
-    twin: TimedAnswer | None
-
-    @property
-    def tick(self) -> int:
-        one = self.twin or self.port
-        assert one is not None
-        return one.tick
-
-
-class MatchedAnswers(msgspec.Struct, frozen=True):
-    """Answers to the same question."""
-
-    port: TimedAnswer
-    twin: TimedAnswer
+AnswerPair = tuple[TimedAnswer | None, TimedAnswer | None]
+"""Of the robot and of its twin, to the same question; None: there is none."""
 
 
 class RobotBesideTwin(msgspec.Struct, frozen=True):
-    """A robot beside its twin, by answers. `way_ticks`: the shortest delay; `unsure_ticks`: the most beyond it."""
+    """The answers of the robot in `slot` and of its twin. `unsure_ticks`: how well their times are known."""
 
     slot: int
     pairs: list[AnswerPair]
-    way_ticks: int = 0
-    unsure_ticks: int = 0
+    unsure_ticks: int
 
 
 class PortComparison(msgspec.Struct, frozen=True):
@@ -96,102 +70,74 @@ class PortComparison(msgspec.Struct, frozen=True):
 
     robots: list[RobotBesideTwin]
     differences: list[Difference]
-    silent: tuple[int, ...] = ()
-    not_judged: int = 0
+    silent: tuple[int, ...]
+    not_judged: int
 
 
-def answers(periods: Sequence[Period], network: int = 0) -> list[TimedAnswer]:
-    """The valid answers that the PC heard."""
+def answers(periods: Sequence[Period], slots: Sequence[int] = range(256)) -> list[TimedAnswer]:
+    """The valid answers that the PC heard of robots in these slots."""
     decoder, found = TelemetryDecoder(), []
-    for one in _wire(periods, network):
-        if one.direction == DOWN:
-            continue
+    for one in on_air(periods, 0, sent=False):
         for event in decoder.feed(one.data):
-            if isinstance(event, Received):
-                try:
-                    said = event.message(max(ROBOT_COUNTS))
-                except ContentError:
-                    continue
-                if isinstance(said, TelemetryFrame):
-                    found.append(TimedAnswer(one.end_tick, said))
+            said = answer_of(event) if isinstance(event, Received) else None
+            if said is not None and said.slot in slots:
+                found.append(TimedAnswer(one.end_tick, f"answer of {said.slot} to {said.seq}", said))
     return found
 
 
 def compare(
-    port: Sequence[Period], twin: Sequence[Period], robots: int, tolerance: AnswerTolerance, network: int = 0
+    port: Sequence[Period], twin: Sequence[Period], robots: int, rule: CompareRule = ANSWERS
 ) -> PortComparison:
     """The answers in a recording made at a port, and in that of the twin."""
-    heard, computed = answers(port, network), answers(twin, network)
-    there = {answer.said.slot for answer in heard}
-    sent = _Sent(port, robots, network)
+    there = sorted({answer.said.slot for answer in answers(port)})
+    silent = {answer.said.slot for answer in answers(twin)} - set(there)
+    sent = _Sent(port, robots)
     found: list[Difference] = []
-    telemetries, open_values = [], 0
-    for slot in sorted(there):
-        mine = [answer for answer in heard if answer.said.slot == slot]
-        telemetry = _side_by_side(slot, mine, [one for one in computed if one.said.slot == slot])
-        judge = _Judge(telemetry, sent, tolerance, network)
-        found += judge.differences()
-        open_values += judge.not_judged
-        telemetries.append(telemetry)
-    silent = tuple(sorted({answer.said.slot for answer in computed} - there))
-    found.sort(key=lambda one: one.tick)
-    return PortComparison(telemetries, found, silent, open_values)
+    beside, open_values = [], 0
+    for slot in there:
+        both = _side_by_side(answers(port, [slot]), answers(twin, [slot]))
+        late = [here.tick - there.tick for here, there in both if here is not None and there is not None]
+        beside.append(RobotBesideTwin(slot, both, max(late, default=0)))
+        for one in _judged(both, late, slot, sent, rule):
+            if one is None:
+                open_values += 1
+            else:
+                found.append(one)
+    return PortComparison(beside, sorted(found, key=lambda one: one.tick), tuple(sorted(silent)), open_values)
 
 
-def _side_by_side(slot: int, port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer]) -> RobotBesideTwin:
-    """Pairs in the order of time; each answer stands in one."""
-    pairs: list[AnswerPair] = []
-    place = 0
+def _side_by_side(port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer]) -> list[AnswerPair]:
+    """With the ticks of the port less the shortest delay."""
+    heard = defaultdict(list)
+    for answer in port:
+        heard[answer.text].append(answer.tick)
+    delays = []
     for answer in twin:
-        match = _match(port, place, answer)
-        if match is None:
-            pairs.append(AnswerPair(None, answer))
-            continue
-        pairs += [AnswerPair(extra, None) for extra in port[place:match]]
-        pairs.append(AnswerPair(port[match], answer))
-        place = match + 1
-    pairs += [AnswerPair(extra, None) for extra in port[place:]]
-    delays = [one.port.tick - one.twin.tick for one in pairs if one.port and one.twin]
+        ticks = heard[answer.text]
+        at = bisect_left(ticks, answer.tick - EARLY_TICKS)
+        if at < len(ticks) and ticks[at] - answer.tick < TOGETHER_TICKS:
+            delays.append(ticks[at] - answer.tick)
     way = min(delays, default=0)
-    return RobotBesideTwin(slot, pairs, way, max(delays, default=0) - way)
-
-
-def _match(port: Sequence[TimedAnswer], place: int, twin: TimedAnswer) -> int | None:
-    """Where, from `place` on, the robot answers the question that the twin answers."""
-    for at in range(place, len(port)):
-        if port[at].tick - twin.tick >= TOGETHER_TICKS:
-            return None
-        if port[at].said.seq == twin.said.seq and twin.tick - port[at].tick < TOGETHER_TICKS:
-            return at
-    return None
-
-
-def _wire(periods: Sequence[Period], network: int) -> Iterator[Transmission]:
-    for period in periods:
-        for one in period.wire:
-            if one.network == network:
-                yield one
+    shifted = [answer._replace(tick=answer.tick - way) for answer in port]
+    return list(pairs(shifted, twin, 0, TOGETHER_TICKS))
 
 
 class _Sent:
-    """What the host said: when each transmission ended, and the fastest wheel of a robot that it told."""
+    """What the host said: when each transmission ended, and the fastest wheel of each robot that was told by then."""
 
-    def __init__(self, periods: Sequence[Period], robots: int, network: int) -> None:
+    def __init__(self, periods: Sequence[Period], robots: int) -> None:
         decoder = Decoder(robots)
         self.ends: list[int] = []
         self.words: list[list[int]] = []
         words = [0] * robots
-        for one in _wire(periods, network):
-            if one.direction != DOWN:
-                continue
+        for one in on_air(periods, 0, sent=True):
             for event in decoder.feed(one.data):
-                if isinstance(event, Received):
-                    try:
-                        said = event.message(robots)
-                    except ContentError:
-                        continue
-                    if isinstance(said, TeamFrame):
-                        words = [max(abs(left), abs(right)) for left, right in said.velocities]
+                try:
+                    said = event.message(robots) if isinstance(event, Received) else None
+                except ContentError:
+                    continue
+                if isinstance(said, TeamFrame):
+                    words = [max(abs(left), abs(right)) for left, right in said.velocities]
             self.ends.append(one.end_tick)
             self.words.append(words)
 
@@ -209,92 +155,53 @@ class _Sent:
         return max((words[slot] for words in self.words[first:last] if slot < len(words)), default=0)
 
 
-class _Judge:
-    """Differences of one robot and its twin."""
+def _judged(
+    both: Sequence[AnswerPair], late: Sequence[int], slot: int, sent: _Sent, rule: CompareRule
+) -> Iterator[Difference | None]:
+    """The differences of one robot and its twin; None for a value that time leaves open. `late`: of each full pair."""
 
-    def __init__(
-        self, telemetry: RobotBesideTwin, sent: _Sent, tolerance: AnswerTolerance, network: int
-    ) -> None:
-        self.telemetry = telemetry
-        self.sent = sent
-        self.tolerance = tolerance
-        self.network = network
-        self.not_judged = 0
-        delays = [
-            one.port.tick - one.twin.tick - telemetry.way_ticks
-            for one in telemetry.pairs
-            if one.port is not None and one.twin is not None
-        ]
-        self._near = [max(delays[max(0, at - NEAR) : at + NEAR + 1]) for at in range(len(delays))]
-        """How late the answers around each one were: so late were the frames between them, perhaps."""
-        self._place = 0
+    def differs(tick: int, name: str, mine: int | str | None, twins: int | str | None) -> Difference:
+        return Difference(tick, tick // CONTROL_PERIOD_TICKS, 0, slot, name, mine, twins)
 
-    def differences(self) -> Iterator[Difference]:
-        before: MatchedAnswers | None = None
-        for pair in self.telemetry.pairs:
-            if pair.port is None or pair.twin is None:
-                if (
-                    before is not None
-                ):  # a robot may not take the first frame of a talk: its number may be known
-                    yield self._difference(pair.tick, "answer", _seq(pair.port), _seq(pair.twin))
-                continue
-            both = MatchedAnswers(pair.port, pair.twin)
-            late = self._unsure(both)
-            if late > self.tolerance.late_ticks:
-                text = f"{late / TICKS_PER_MS:.1f} ms late"
-                yield self._difference(pair.tick, "answer", text, "in time")
-            if before is not None:
-                yield from self._fields(before, both)
-            before = both
-            self._place += 1
-
-    def _fields(self, before: MatchedAnswers, both: MatchedAnswers) -> Iterator[Difference]:
-        unsure = self._near[self._place - 1] + self._near[self._place]
-        timely = not self.sent.near_a_limit(before.twin.tick, both.twin.tick, unsure)
-        for name, take, exact in _FIELDS:
-            mine, twins = take(before.port.said, both.port.said), take(before.twin.said, both.twin.said)
-            if mine == twins:
-                continue
-            if not timely:
-                self.not_judged += 1
-            elif exact or abs(mine - twins) > self._counts(before, both, unsure):
-                yield self._difference(both.twin.tick, name, mine, twins)
-
-    def _counts(self, before: MatchedAnswers, both: MatchedAnswers, unsure_ticks: int) -> float:
-        """How far positions may be apart: the tolerance, and how far the fastest wheel goes in the time left open."""
-        word = self.sent.fastest(self.telemetry.slot, before.twin.tick, both.twin.tick)
-        return self.tolerance.counts + word * unsure_ticks / SAMPLE_TICKS / 256
-
-    def _unsure(self, both: MatchedAnswers) -> int:
-        return both.port.tick - both.twin.tick - self.telemetry.way_ticks
-
-    def _difference(
-        self, tick: int, name: str, mine: int | str | None, twins: int | str | None
-    ) -> Difference:
-        index, slot = tick // CONTROL_PERIOD_TICKS, self.telemetry.slot
-        return Difference(tick, index, self.network, slot, name, mine, twins)
+    near = [max(late[max(0, at - NEAR) : at + NEAR + 1]) for at in range(len(late))]
+    before: tuple[TimedAnswer, TimedAnswer] | None = None
+    full = 0
+    for here, there in both:
+        if here is None or there is None:
+            one = here or there
+            if before is not None and one is not None:  # the first may be to a number that the robot knew
+                question = f"to question {one.said.seq}"
+                yield differs(one.tick, "answer", here and question, there and question)
+            continue
+        if late[full] > rule.within_ticks:
+            yield differs(there.tick, "answer", f"{late[full] / TICKS_PER_MS:.1f} ms late", "in time")
+        if before is not None:
+            window = before[1].tick, there.tick
+            unsure = near[full - 1] + near[full]
+            timely = not sent.near_a_limit(*window, unsure)
+            way = sent.fastest(slot, *window) * unsure / LM629_SAMPLE_TICKS / 256
+            for name, (take, exact) in FIELDS.items():
+                mine, twins = take(before[0].said, here.said), take(before[1].said, there.said)
+                if mine != twins and not timely:
+                    yield None
+                elif abs(mine - twins) > (0 if exact else rule.within_counts + way):
+                    yield differs(there.tick, name, mine, twins)
+        before = here, there
+        full += 1
 
 
-def _seq(answer: TimedAnswer | None) -> str | None:
-    return None if answer is None else f"to question {answer.said.seq}"
+def _went(name: str, modulus: int, least: int) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
+    """By how much a value that wraps went on."""
+    return lambda one, other: (getattr(other, name) - getattr(one, name) - least) % modulus + least
 
 
-def _moved(name: str) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
-    """By how much 16 bits of a position went on, as a signed number."""
-    return lambda one, other: (getattr(other, name) - getattr(one, name) + 0x8000 & 0xFFFF) - 0x8000
-
-
-def _counted(name: str) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
-    return lambda one, other: (getattr(other, name) - getattr(one, name)) & 0xFF
-
-
-_FIELDS: tuple[tuple[str, Callable[[TelemetryFrame, TelemetryFrame], int], bool], ...] = (
-    ("accepted", _counted("accepted"), True),
-    ("rejected", _counted("rejected"), True),
-    ("flags", lambda one, other: int(other.flags), True),
-    ("status left", lambda one, other: other.status_left & STATUS, True),
-    ("status right", lambda one, other: other.status_right & STATUS, True),
-    ("left moved", _moved("position_left"), False),
-    ("right moved", _moved("position_right"), False),
-)
-"""Name, what is compared of an answer and the one before, and whether it has to be equal."""
+FIELDS: dict[str, tuple[Callable[[TelemetryFrame, TelemetryFrame], int], bool]] = {
+    "accepted": (_went("accepted", 1 << 8, 0), True),
+    "rejected": (_went("rejected", 1 << 8, 0), True),
+    "flags": (lambda one, other: int(other.flags), True),
+    "status left": (lambda one, other: other.status_left & STATUS, True),
+    "status right": (lambda one, other: other.status_right & STATUS, True),
+    "left moved": (_went("position_left", 1 << 16, -1 << 15), False),
+    "right moved": (_went("position_right", 1 << 16, -1 << 15), False),
+}
+"""What is compared of an answer and the one before, and whether it has to be equal."""

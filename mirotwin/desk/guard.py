@@ -6,7 +6,7 @@ frames may still make something else of them: no guard on this side of the radio
 
 from __future__ import annotations
 
-import msgspec
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from miro_host.wheels import Wheels
@@ -14,25 +14,41 @@ from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, FrameType, Opcode
+from mirotwin.shell.command import Option, Options
+from mirotwin.shell.options import FiniteNumber
 
+HEADING = "A robot at a port"
 MAX_SPEED_M_S = 0.5
 """Of each wheel, unless another limit is given. A third of what the robot can do."""
 STOP_FRAMES = 3
-UNITS_PER_M_S = Wheels().units_per_m_s
+WHEELS = Wheels()
+_WHERE = "Talk to a robot: /dev/ttyUSB0, or any URL that pyserial knows."
+_MOTION = "Send what moves a robot, too. Without it only what lets it stand is sent."
+_FASTEST = FiniteNumber(0.0, WHEELS.limit_m_s)
 
 
-class MotionLimits(msgspec.Struct, frozen=True):
-    """What the user allows. Without `motion` all velocities have to be 0, and no gains may be set."""
+class DeskOptions(Options, frozen=True, kw_only=True):
+    """Where a robot is, and what may be done to it. `port` None: no robot, only its twin."""
 
-    motion: bool = False
-    max_speed_m_s: float = MAX_SPEED_M_S
+    port: Annotated[str | None, Option(metavar="URL", heading=HEADING, help=_WHERE)] = None
+    allow_motion: Annotated[bool, Option(heading=HEADING, needs="port", help=_MOTION)] = False
+    max_speed: Annotated[
+        float,
+        Option(
+            type=_FASTEST,
+            metavar="M_S",
+            heading=HEADING,
+            needs="port",
+            help="Refuse what makes a wheel faster, in m/s.",
+        ),
+    ] = MAX_SPEED_M_S
 
 
 class Guard:
     """Checks what is sent to the robots of one port. `layout`: robots of the network that was spoken to last."""
 
-    def __init__(self, limits: MotionLimits, path: str = "") -> None:
-        self.limits = limits
+    def __init__(self, desk: DeskOptions, path: str = "") -> None:
+        self.desk = desk
         self.path = path
         self.layout = 0
         self.last_seq = 0
@@ -52,33 +68,26 @@ class Guard:
                         self.layout, self.last_seq = count, message.seq
 
     def _check(self, message: TeamFrame | ServiceFrame, place: str) -> None:
-        what = _moves(message)
-        if what and not self.limits.motion:
+        moves, fastest = "", 0.0
+        if isinstance(message, ServiceFrame) and message.opcode != Opcode.PING:
+            moves = f"service frame with opcode {message.opcode}"
+        for slot, pair in enumerate(message.velocities if isinstance(message, TeamFrame) else ()):
+            left, right = (word / WHEELS.units_per_m_s for word in pair)
+            fastest = max(fastest, abs(left), abs(right))
+            if any(pair) and not moves:
+                moves = f"robot {slot} told {left:.3f} and {right:.3f} m/s"
+        if moves and not self.desk.allow_motion:
             remedy = "clear its way or lift its wheels off the ground, then give --allow-motion"
-            raise BadInput(self.path, place, f"{what}, which may move a real robot", remedy)
-        if isinstance(message, TeamFrame):
-            fastest = max(abs(word) for pair in message.velocities for word in pair) / UNITS_PER_M_S
-            if fastest > self.limits.max_speed_m_s:
-                most = f"at most {self.limits.max_speed_m_s:g} m/s are allowed"
-                raise BadInput(self.path, place, f"a wheel at {fastest:.3f} m/s; {most}", "raise --max-speed")
+            raise BadInput(self.path, place, f"{moves}, which may move a real robot", remedy)
+        if fastest > self.desk.max_speed:
+            most = f"at most {self.desk.max_speed:g} m/s are allowed"
+            raise BadInput(self.path, place, f"a wheel at {fastest:.3f} m/s; {most}", "raise --max-speed")
 
     def stop_frames(self) -> bytes:
         """Frames that tell all robots to stand, in numbers that are fresh after what was sent."""
-        layouts = (self.layout,) if self.layout else ROBOT_COUNTS
-        found = b""
-        for count in layouts:
-            for step in range(1, STOP_FRAMES + 1):
-                seq = (self.last_seq + step) % SEQ_MODULUS
-                found += encode(TeamFrame(FrameType.TEAM, seq, ((0, 0),) * count), count)
-        return found
-
-
-def _moves(message: TeamFrame | ServiceFrame) -> str:
-    """What moves a robot, or may: "" for a frame that does not."""
-    if isinstance(message, ServiceFrame):
-        return "" if message.opcode == Opcode.PING else f"service frame with opcode {message.opcode}"
-    for slot, (left, right) in enumerate(message.velocities):
-        if left or right:
-            speeds = f"{left / UNITS_PER_M_S:.3f} and {right / UNITS_PER_M_S:.3f} m/s"
-            return f"robot {slot} told {speeds}"
-    return ""
+        stop = FrameType.TEAM
+        return b"".join(
+            encode(TeamFrame(stop, (self.last_seq + step) % SEQ_MODULUS, ((0, 0),) * count), count)
+            for count in ((self.layout,) if self.layout else ROBOT_COUNTS)
+            for step in range(1, STOP_FRAMES + 1)
+        )

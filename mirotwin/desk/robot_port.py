@@ -1,35 +1,50 @@
-"""Robots behind a serial port of this PC: characters go out at a tick, and come in with the tick of their arrival.
+"""Robots behind a serial port of this PC, under the names of a `World`: what a PC can do with them and see of them.
 
-    with RobotPort("/dev/ttyUSB0", MotionLimits()) as port:
-        port.run_to(port.tick + 24_000)        waits, and reads what comes
-        port.send(data)                        now; tick of the first start bit
-        port.answers                           valid answers so far
-                                               at the end, whatever happened: stop frames
+    with RobotPort(desk, scenario) as port:      opened; at the end, whatever happened: stop frames
+        port.greet()                             who is there; tick 0 is now
+        port.inject(data)                        sends what the guard allows; tick of the first start bit
+        port.run_until(Answer(slot=0), within=ms(80))
 
-Ticks count from the opening, 24 in a microsecond of the wall clock. `miro://` without `realtime` has its own clock.
+Ticks are 24 in a microsecond of the wall clock (`miro://` without `realtime` has its own), and an event is known when
+its characters are there. What needs a robot's inside, or a switch on it, raises NotObservable.
 """
 
 from __future__ import annotations
 
 import errno
+import os
 import select
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import TracebackType
-from typing import Any, NamedTuple
+from types import SimpleNamespace, TracebackType
+from typing import Any, NoReturn
 
+import msgspec
 import serial
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import HOST_CHARACTER_TICKS, TICKS_PER_SECOND
-from miro_protocol.decoder import TelemetryDecoder
-from miro_protocol.events import Event, Received
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK, TICKS_PER_SECOND, ticks
+from miro_protocol.decoder import Decoder, TelemetryDecoder
+from miro_protocol.events import Event as Decoded
+from miro_protocol.events import Received
+from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.table import FRESH_AGAIN_TICKS, SEQ_MODULUS, FrameType
 from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
-from mirotwin.desk.guard import Guard, MotionLimits
+from miro_sim.periods import Period
+from miro_sim.scenario.keys import Scenario
+from miro_sim.world.conditions import Answer, Condition, Heard, Sent, answer_of
+from miro_sim.world.events import Cursor, Event, HostLog
+from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
+from mirotwin.desk.guard import DeskOptions, Guard
+from mirotwin.recording.recorder import TOGETHER, Recorder
 
+PORT = "port"
+"""`source` of a recording that was made here."""
+SEEN = (Answer, Heard, Sent)
+"""The conditions that a PC can see."""
 BAUD = 9600
 BLOCKED_S = 1.0
 """A port that takes no characters for so long is blocked: its buffers are full, and nobody empties them."""
@@ -39,6 +54,21 @@ READ_BYTES = 4096
 CUT_TICKS = TICKS_PER_SECOND // 10
 """What came so long before is no part of an answer that goes on now; USB adapters keep characters for 16 ms."""
 REOPENINGS = 3
+BOOT_TICKS = TICKS_PER_SECOND // 10
+"""A twin that is switched on at tick 0 is up by then."""
+ROUNDS = 4
+"""How often each robot is asked who it is."""
+APART = 32
+"""Numbers between the last question of the greeting and what follows it."""
+PAUSE_TICKS = FRESH_AGAIN_TICKS + TICKS_PER_SECOND // 10
+"""After the greeting: after so long a silence any other number is fresh."""
+AFTER_TICKS = TICKS_PER_SECOND // 5
+"""An answer that comes later than this is none."""
+PIECE_BYTES = 200
+LEAD_TICKS = PIECE_BYTES * HOST_CHARACTER_TICKS // 2
+"""Of a long transmission the next piece is handed over so long before the piece under way is sent."""
+SETTLED_TICKS = 2 * CONTROL_PERIOD_TICKS
+"""An answer that is whole belongs to no earlier period than this; a question is told when it is sent."""
 _REMEDIES = {
     errno.ENOENT: ("there is no such port", "`python -m serial.tools.list_ports` lists those there are"),
     errno.EACCES: ("no permission to open it", "join the group that owns it (dialout), and log in again"),
@@ -50,32 +80,53 @@ class PortError(BadInput):
     """A port that cannot be opened, or is there no more."""
 
 
-class TimedFrame(NamedTuple):
-    """A valid answer, whole at `tick`."""
+class NotObservable(Exception):
+    """Something of a robot that no port shows."""
 
-    tick: int
-    frame: Received
+    def __init__(self, what: str) -> None:
+        super().__init__(f"{what}: not observable on a port")
+
+
+def check_observable(scenario: Scenario) -> None:
+    """Raises NotObservable for a test that needs more than the one network of a port, and a PC that sees no pitch."""
+    if len(scenario.networks) > 1:
+        raise NotObservable(f"{len(scenario.networks)} networks, of which a port is one")
+    if scenario.networks[0].host != "silent":
+        raise NotObservable("a controller, which needs a camera")
 
 
 class RobotPort:
-    """An open port. Use as a context manager. `limits`: what may be sent; `name`: of what is sent, in errors.
+    """The robots at `desk.port`, in a network and for a duration as in `scenario`. `name`: of what is sent, in errors.
 
-    `sent`: as it went out; `received`: whole answers and characters between them, as they came; `late_ticks`: how late
-    each transmission of a schedule was. `listener` is given the characters as they come, and when.
+    `wire`: what went out, and whole answers and the characters between them, as they came; its ticks count from the
+    opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
+    answers; `delay_ticks`: from a question to its whole answer, the shortest and the longest of the greeting.
+    `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: with real-time priority.
     """
 
-    def __init__(self, url: str, limits: MotionLimits, name: str = "") -> None:
-        self.url = url
-        self.guard = Guard(limits, name)
-        self.sent: list[Transmission] = []
-        self.received: list[Transmission] = []
-        self.answers: list[TimedFrame] = []
+    def __init__(
+        self, desk: DeskOptions, scenario: Scenario, name: str = "", recorder: Recorder | None = None
+    ) -> None:
+        assert desk.port is not None
+        self.url = desk.port
+        self.guard = Guard(desk, name)
+        self.scenario = scenario
+        self.recorder = recorder
+        spec = scenario.networks[0]
+        self.log = HostLog(0, lambda tick: tick)
+        self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=())]
+        self.end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
+        self.observers: list[Callable[[Period], object]] = []
+        self.faults: tuple[()] = ()
+        self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []
-        self.free_tick = 0
-        self.stopped = False
-        self.listener: Callable[[bytes, int], object] = lambda data, now: None
+        self.slots: tuple[int, ...] = ()
+        self.delay_ticks = (0, 0)
+        self.began_tick = self.free_tick = 0
+        self.stopped = self.told_to_stop = self.prompt = False
+        self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
-        self._heard_tick = 0
+        self._heard_tick = self._end_tick = self._recorded = 0
         self._began_ns = time.monotonic_ns()
         self._open()
 
@@ -88,6 +139,7 @@ class RobotPort:
                 self._descriptor = self._serial.fileno()
 
     def __enter__(self) -> RobotPort:
+        self.prompt = realtime_priority()
         return self
 
     def __exit__(
@@ -95,34 +147,85 @@ class RobotPort:
     ) -> None:
         with _undisturbed():
             self.stop()
+            if self.prompt:
+                realtime_priority(False)
+            self._keep(self._decoder.flush(), self._heard_tick)
+            self._record(max(self._now, self.free_tick, self._end_tick) + TOGETHER * CONTROL_PERIOD_TICKS)
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
 
+    # ---- time --------------------------------------------------------------------------------------------
+
     @property
-    def tick(self) -> int:
-        """Now."""
+    def _now(self) -> int:
+        """Since the opening."""
         if self._virtual:
             return int(self._serial.virtual_tick)
         return (time.monotonic_ns() - self._began_ns) * 24 // 1000
 
+    @property
+    def tick(self) -> int:
+        return self._now - self.began_tick
+
+    @property
+    def finished(self) -> bool:
+        return self.tick >= self.end_tick
+
+    @property
+    def period_end(self) -> int:
+        return (self.tick // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
+
+    def run_to(self, tick: int) -> None:
+        """Waits until then, and reads. Raises PortError."""
+        while (left := tick - self.tick) > 0:
+            self._take(self._read(left))
+        self._take(self._read(0))
+
+    def run_for(self, for_ticks: int) -> None:
+        self.run_to(self.tick + for_ticks)
+
+    def run_until(self, condition: Condition, *others: Condition, within: int | None = None) -> Event:
+        return self.waits.until([condition, *others], within)
+
     # ---- sending -----------------------------------------------------------------------------------------
 
-    def send(self, data: bytes, place: str = "", due_tick: int | None = None) -> Transmission:
-        """Sends now what the guard allows; it was due at `due_tick`. Raises BadInput, PortError."""
-        self.guard.check(data, place)
-        tick = self.tick
+    def earliest_tick(self, network: int = 0) -> int:
+        return max(self.tick, self.free_tick - self.began_tick)
+
+    def inject(
+        self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: Sequence[int] = ()
+    ) -> int:
+        """Sends now, or waits until `at_tick` first; the tick of the first start bit. Raises BadInput, PortError."""
+        if bad_stop:
+            raise NotObservable("a character with a bad stop bit")
+        if at_tick is not None:
+            self.run_to(at_tick)
+        self.guard.check(data)
+        now = self._now
         with self._told():
             self._serial.write(data)
-        if due_tick is not None:
-            self.late_ticks.append(max(0, tick - due_tick))
-        sent = Transmission(max(tick, self.free_tick), DOWN, data)
+        if at_tick is not None:
+            self.late_ticks.append(max(0, now - self.began_tick - at_tick))
+        sent = Transmission(max(now, self.free_tick), DOWN, data)
         self.free_tick = sent.end_tick
-        self.sent.append(sent)
-        return sent
+        self.wire.append(sent)
+        tick = sent.tick - self.began_tick
+        self.log.note(Event(tick=tick, what="sent", data=data))
+        return tick
+
+    def play(self, sent: Iterable[Transmission], each: Callable[[int], object] = lambda tick: None) -> None:
+        """Sends these at their ticks, and reads meanwhile and a little longer; `each` is told how far it is."""
+        for one in sent:
+            for start in range(0, len(one.data), PIECE_BYTES):
+                due = one.tick + start * HOST_CHARACTER_TICKS - (LEAD_TICKS if start else 0)
+                self.inject(one.data[start : start + PIECE_BYTES], at_tick=due)
+            self._record(self._now - SETTLED_TICKS)
+            each(one.end_tick)
+        self.run_to(self.earliest_tick() + AFTER_TICKS)
 
     def stop(self) -> None:
         """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
-        self.stopped = False
+        self.told_to_stop = False
         frames = self.guard.stop_frames()
         for _ in range(REOPENINGS):
             with suppress(serial.SerialException, OSError, PortError):
@@ -132,27 +235,69 @@ class RobotPort:
                 self._serial.write(frames)
                 if not self._virtual:
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
-                self.stopped = True
+                self.told_to_stop = True
                 return
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
             time.sleep(LOOK_S)
 
-    # ---- waiting and reading -----------------------------------------------------------------------------
+    # ---- who is there ------------------------------------------------------------------------------------
 
-    def run_to(self, tick: int) -> None:
-        """Waits until then, and reads. Raises PortError."""
-        while (left := tick - self.tick) > 0:
-            self._take(self._read(left / TICKS_PER_SECOND))
-        self._take(self._read(0.0))
+    def greet(self, robots: int | None = None, next_seq: int = 0) -> None:
+        """Asks each robot of the network some times, standing; then silence, after which `next_seq` is fresh.
 
-    def run_to_character(self, tick: int) -> None:
-        """The same, but no longer than to the next characters that come."""
-        self._take(self._read(max(0, tick - self.tick) / TICKS_PER_SECOND))
+        Raises BadInput where nobody answers.
+        """
+        robots = robots or self.networks[0].spec.robots
+        self._counted, first, cursor = {}, len(self.wire), Cursor(self.log)
+        seq = (next_seq - APART - ROUNDS * robots) % SEQ_MODULUS
+        asked: dict[int, int] = {}
+        self.run_to(BOOT_TICKS)
+        for _ in range(ROUNDS * robots):
+            asked[seq] = self.inject(encode(TeamFrame(FrameType.TEAM_ASK, seq, ((0, 0),) * robots), robots))
+            self.run_to(asked[seq] + CONTROL_PERIOD_TICKS)
+            seq = (seq + 1) % SEQ_MODULUS
+        self.run_to(self.tick + PAUSE_TICKS)
+        heard = [(event.tick, answer_of(event.frame)) for _, event in cursor.read() if event.frame]
+        delays, counted = [], {}
+        for tick, said in heard:
+            if said is not None and said.seq in asked and said.slot == said.seq % robots:
+                delays.append(tick - asked[said.seq])
+                since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
+                counted[said.slot] = (said.accepted + since, said.rejected)
+        if not delays:
+            self._keep(self._decoder.flush(), self._heard_tick)
+            raise BadInput(self.url, "", *self._why_nobody(robots, first, bool(heard)))
+        self.slots, self.delay_ticks, self._counted = (
+            tuple(sorted(counted)),
+            (min(delays), max(delays)),
+            counted,
+        )
+        self.began_tick = self._now
+        self.waits = PortWaits(self)
 
-    def _read(self, wait_s: float) -> bytes:
+    def _why_nobody(self, robots: int, first: int, answered: bool) -> tuple[str, str]:
+        """What came instead of answers, and what to do."""
+        came = b"".join(one.data for one in self.wire[first:] if one.direction == UP)
+        asked = f"no robot of a network of {robots} answers {ROUNDS * robots} questions"
+        if not came:
+            return f"{asked}: nothing comes", "is it switched on, and is this its radio's port?"
+        if any(isinstance(event, Received) for event in Decoder(robots).feed(came)):
+            return f"{asked}: the port echoes what is sent", "turn the echo of the adapter off"
+        if answered:
+            return f"{asked}, but others answer", "is it a network of another size?"
+        what = f"{asked}: {len(came)} characters come that are no answer, {came[:6].hex(' ')} .."
+        return what, "is this the radio's port, and is its rate 9600 baud?"
+
+    # ---- reading -----------------------------------------------------------------------------------------
+
+    def read_one(self, tick: int) -> None:
+        """Waits until then, but no longer than to the next characters that come."""
+        self._take(self._read(max(0, tick - self.tick)))
+
+    def _read(self, wait_ticks: int) -> bytes:
         """What is there, or is the first to come in this time."""
-        port = self._serial
+        port, wait_s = self._serial, wait_ticks / TICKS_PER_SECOND
         with self._told():
             if self._virtual:
                 port.timeout = wait_s
@@ -167,25 +312,32 @@ class RobotPort:
             return found
 
     def _take(self, data: bytes) -> None:
-        now = self.tick
-        if data:
-            if now - self._heard_tick > CUT_TICKS and self._decoder.pending:
-                self._keep(self._decoder.flush(), self._heard_tick)
-            self._heard_tick = now
-            self._keep(self._decoder.feed(data), now)
-            self.listener(data, now)
+        if not data:
+            return
+        now = self._now
+        if now - self._heard_tick > CUT_TICKS and self._decoder.pending:
+            self._keep(self._decoder.flush(), self._heard_tick)
+        self._heard_tick = now
+        for byte in data:
+            self.log.note(Event(tick=now - self.began_tick, what="heard", value=byte))
+        self._keep(self._decoder.feed(data), now)
 
-    def _keep(self, events: list[Event], now: int) -> None:
-        for event in events:
-            last = self.received[-1].end_tick if self.received else 0
-            tick = max(last, now - len(event.data) * character_ticks(UP))
-            self.received.append(Transmission(tick, UP, event.data))
-            if isinstance(event, Received):
-                self.answers.append(TimedFrame(now, event))
+    def _keep(self, decoded: Iterable[Decoded], now: int) -> None:
+        for one in decoded:
+            came = Transmission(max(self._end_tick, now - len(one.data) * character_ticks(UP)), UP, one.data)
+            self._end_tick = came.end_tick
+            self.wire.append(came)
+            if isinstance(one, Received):
+                said = answer_of(one)
+                slot = -1 if said is None else said.slot
+                frame = self._from_zero(one, slot)
+                self.log.note(Event(tick=now - self.began_tick, what="answer", value=slot, frame=frame))
 
-    def end(self) -> None:
-        """What was heard of no whole answer is received too."""
-        self._keep(self._decoder.flush(), self._heard_tick)
+    def _from_zero(self, frame: Received, slot: int) -> Received:
+        """The answer with counters that began with the greeting; they are its last two bytes."""
+        counts = self._counted.get(slot, (0, 0))
+        last = bytes(byte - count & 0xFF for byte, count in zip(frame.body[-2:], counts, strict=True))
+        return msgspec.structs.replace(frame, body=frame.body[:-2] + last)
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -195,10 +347,65 @@ class RobotPort:
             what = f"it takes no characters for {BLOCKED_S:g} s"
             raise PortError(self.url, "", what, "look at its flow control, and at who reads it") from None
         except (serial.SerialException, OSError) as error:
-            seconds = self.tick / TICKS_PER_SECOND
+            seconds = self._now / TICKS_PER_SECOND
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
             raise PortError(self.url, f"{seconds:.3f} s", f"the port is lost: {error}") from None
+
+    # ---- a recording like any other ----------------------------------------------------------------------
+
+    def _record(self, until_tick: int) -> None:
+        """Writes the periods that are over by then: what is broken off is there up to there."""
+        if self.recorder is None or until_tick < (self._recorded + TOGETHER) * CONTROL_PERIOD_TICKS:
+            return
+        while (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:
+            there = sorted((one for one in self.wire if one.tick < end_tick), key=lambda one: one.tick)
+            self.wire = [one for one in self.wire if one.tick >= end_tick]
+            begin_tick = self._recorded * CONTROL_PERIOD_TICKS
+            self.recorder.write(Period(self._recorded, begin_tick, (), tuple(there), ""))
+            self._recorded += 1
+        self.recorder.flush()
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise NotObservable(f"`{name}` of a robot's world")
+
+
+class PortWaits:
+    """Waits on what the PC sees; each event is taken by one of them."""
+
+    def __init__(self, port: RobotPort) -> None:
+        self.port = port
+        self.cursor = Cursor(port.log)
+        self.backlog: list[Event] = []
+
+    def collect(self) -> None:
+        self.backlog += [event for _, event in self.cursor.read()]
+
+    def pass_over(self) -> None:
+        """What was collected does not count for the next wait."""
+        self.backlog.clear()
+
+    def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
+        """The next event for which one of them is true. Raises WaitExpired, NotObservable."""
+        for condition in conditions:
+            if not isinstance(condition, SEEN):
+                raise NotObservable(f"{condition}")
+        port, begun_tick = self.port, self.port.tick
+        deadline = NEVER_TICK if within is None else begun_tick + within
+        seen: list[Event] = []
+        while True:
+            self.collect()
+            while self.backlog and self.backlog[0].tick <= deadline:
+                event = self.backlog.pop(0)
+                if any(condition.met_by(event) for condition in conditions):
+                    return event
+                seen.append(event)
+            if port.finished or port.tick >= deadline:
+                why = "the run ended" if port.finished else f"{within} ticks passed"
+                raise WaitExpired(conditions, begun_tick, port.tick, why, seen[-SEEN_AT_MOST:])
+            port.read_one(min(deadline, port.end_tick))
 
 
 def _opened(url: str) -> Any:
@@ -215,6 +422,15 @@ def _opened(url: str) -> Any:
             number = errno.EBUSY
         what, remedy = _REMEDIES.get(number or 0, (f"cannot be opened: {error}", ""))
         raise PortError(url, "", what, remedy) from None
+
+
+def realtime_priority(wanted: bool = True) -> bool:
+    """Asks the system to wake this thread before all others, or no longer; whether it does. Few users may."""
+    policy = "SCHED_FIFO" if wanted else "SCHED_OTHER"
+    with suppress(AttributeError, OSError):  # not everywhere, or not allowed
+        os.sched_setscheduler(0, getattr(os, policy), os.sched_param(int(wanted)))
+        return wanted
+    return False
 
 
 @contextmanager

@@ -25,10 +25,10 @@ def live_scenario(source: str, settings: Sequence[str] = (), also: Also = nothin
     if own.scenario.step:
         what = "a live session does no steps"
         raise ScenarioError(source, "step", what, "run them by `mirotwin test`, or remove them")
-    return load(source, (*settings, *_live_settings(own.scenario)), also)
+    return load(source, (*settings, *live_settings(own.scenario)), also)
 
 
-def _live_settings(scenario: Scenario) -> list[str]:
+def live_settings(scenario: Scenario) -> list[str]:
     found = [f"duration_s={LONGEST_S!r}"]
     for index, network in enumerate(scenario.networks):
         found.append(f'network.{index}.host="silent"')

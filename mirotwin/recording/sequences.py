@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Action, RadioState, Reset
@@ -25,6 +25,16 @@ class LogEntry(NamedTuple):
         return f"{self.text} at tick {self.tick}"
 
 
+class Entry(Protocol):
+    """What can be put side by side."""
+
+    @property
+    def tick(self) -> int: ...
+    @property
+    def text(self) -> str: ...
+
+
+E = TypeVar("E", bound=Entry)
 Pair = tuple[LogEntry | None, LogEntry | None]
 
 
@@ -38,14 +48,14 @@ def commands(periods: Sequence[Period], index: int, side: str, answers: bool) ->
 
 
 def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[LogEntry]:
-    """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
-    return [LogEntry(one.tick, _text(one)) for one in _on_air(periods, network, sent)]
+    """What is `on_air`."""
+    return [LogEntry(one.tick, _text(one)) for one in on_air(periods, network, sent)]
 
 
 def characters(periods: Sequence[Period], network: int) -> list[LogEntry]:
     """The same of its robots, character by character: where they are parted by pauses is no matter."""
     found = []
-    for one in _on_air(periods, network, False):
+    for one in on_air(periods, network, False):
         for value, stop_good, tick in one.symbols():
             found.append(LogEntry(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
     return found
@@ -72,7 +82,8 @@ def _action(action: Action) -> str:
     return f"robot {action.slot} {what} {level}"
 
 
-def _on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
+def on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
+    """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
     for period in periods:
         for one in period.wire:
             if one.network == network and (one.direction == DOWN) == sent:
@@ -85,22 +96,35 @@ def _text(one: Transmission) -> str:
 
 
 def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int) -> Iterator[Pair]:
-    """The pairs that differ, in the order of time; None stands where one side has nothing.
+    """The pairs that differ: of those that are alike, both say the same and are at most `within_ticks` apart."""
+    for here, there in pairs(one, other, within_ticks):
+        if (
+            here is None
+            or there is None
+            or here.text != there.text
+            or abs(here.tick - there.tick) > within_ticks
+        ):
+            yield here, there
 
-    Two that say the same are alike if they are at most `within_ticks` apart. After a pair that is not alike the
+
+def pairs(
+    one: Sequence[E], other: Sequence[E], within_ticks: int, same_ticks: int = SAME_TICKS
+) -> Iterator[tuple[E | None, E | None]]:
+    """All of both, in the order of time; None stands where one side has nothing.
+
+    Two that say the same are one if they are at most `same_ticks` apart. After a pair that is not alike the
     comparison goes on after it: what is missing on one side shifts nothing.
     """
     first = second = 0
     while first < len(one) and second < len(other):
         here, there = one[first], other[second]
         apart = abs(here.tick - there.tick)
-        alike = here.text == there.text and apart <= SAME_TICKS
+        alike = here.text == there.text and apart <= same_ticks
         if alike and apart > within_ticks:  # unless the later one is the next on the earlier side
             early = (one, first, there) if here.tick < there.tick else (other, second, here)
             alike = not _follows(*early, within_ticks)
         if alike or apart <= within_ticks:
-            if not alike or apart > within_ticks:
-                yield here, there
+            yield here, there
             first, second = first + 1, second + 1
         elif here.tick < there.tick:
             yield here, None
@@ -112,7 +136,7 @@ def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int
     yield from ((None, there) for there in other[second:])
 
 
-def _follows(found: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
+def _follows(found: Sequence[Entry], index: int, wanted: Entry, within_ticks: int) -> bool:
     """Whether one behind `index` says what `wanted` says, at its time."""
     for place in range(index + 1, len(found)):
         if found[place].tick > wanted.tick + within_ticks:

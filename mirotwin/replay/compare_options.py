@@ -9,7 +9,7 @@ import click
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
-from mirotwin.desk.compare import AnswerTolerance
+from mirotwin.desk.compare import ANSWERS
 from mirotwin.recording.compare import (
     KINDS,
     WITHIN_COUNTS,
@@ -50,7 +50,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             type=FiniteNumber(0, 1000),
             metavar="MS",
             help=f"bytes, commands, answers: how far apart in time. Default {WITHIN_TICKS / _TICKS_PER_MS:g},"
-            f" of answers {AnswerTolerance().late_ticks / _TICKS_PER_MS:g}.",
+            f" of answers {ANSWERS.within_ticks / _TICKS_PER_MS:g}.",
         ),
     ] = None
     within_counts: Annotated[
@@ -92,7 +92,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
     def rule(self) -> CompareRule:
         """The comparison that was asked for."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
-        usual = AnswerTolerance().late_ticks if self.kind == "answers" else WITHIN_TICKS
+        usual = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
         return CompareRule(
             kind=self.kind,
             within_ticks=usual if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
@@ -102,17 +102,12 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             to_tick=None if self.to_time is None else self.to_time.ticks(),
         )
 
-    def tolerance(self, file: str) -> AnswerTolerance:
-        """Of robots at a port. Raises BadInput for a comparison that cannot be made there."""
-        rule = self.rule
-        other = self.given("from_time", "to_time") or (self.given("kind") if self.kind != "answers" else [])
-        if other:
+    def of_answers(self, file: str) -> CompareRule:
+        """The comparison of robots at a port. Raises BadInput for one that cannot be made there."""
+        kind = self.given("kind") if self.kind != "answers" else []
+        if other := self.given("from_time", "to_time") or kind:
             raise BadInput(file, other[0], "is not for what was recorded at a port", "use --compare answers")
-        return (
-            AnswerTolerance(rule.within_counts, rule.within_ticks)
-            if self.kind == "answers"
-            else AnswerTolerance()
-        )
+        return self.rule if self.kind == "answers" else ANSWERS
 
     def described(self) -> str:
         """The comparison in words."""

@@ -13,7 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import SPACE_BYTES, Image
 from miro_sim.periods import Period
-from mirotwin.desk.options import HEADING, DeskOptions
+from mirotwin.desk.guard import HEADING, DeskOptions
 from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
@@ -178,18 +178,13 @@ def replay(options: ReplayOptions) -> int:
     if desk.port:
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
-        recorded = record_at_port(
-            job, image, file, desk, desk.port, options.out, options.force, options.quiet
-        )
-        file = str(recorded)
+        file = str(record_at_port(job, image, file, desk, options.out, options.force, options.quiet))
         job, image = load_job(file, None, options.engine)
     if job.origin:
         from mirotwin.replay.replay_port import compare_with_twin
 
-        tolerance = compare.tolerance(file)
-        return compare_with_twin(
-            job, image, file, tolerance, options.everything, options.quiet, compare.as_json
-        )
+        rule = compare.of_answers(file)
+        return compare_with_twin(job, image, file, rule, options.everything, options.quiet, compare.as_json)
     if compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", what, "give --port, or another comparison")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
+from typing import BinaryIO
 
 import msgspec
 import tomli_w
@@ -16,19 +18,17 @@ from miro_protocol.events import Received
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_sim.radio.params import Radio
-from miro_sim.scenario.file import load
+from miro_sim.scenario.file import changed
 from miro_sim.scenario.keys import Scenario
-from mirotwin.desk.compare import AnswerTolerance, PortComparison, compare
-from mirotwin.desk.guard import Guard
-from mirotwin.desk.options import DeskOptions
-from mirotwin.desk.recorded import PORT, PortRecording
-from mirotwin.desk.robot_port import RobotPort
-from mirotwin.desk.session import greet, play
+from mirotwin.desk.compare import PortComparison, compare
+from mirotwin.desk.guard import DeskOptions, Guard
+from mirotwin.desk.robot_port import PORT, RobotPort, realtime_priority
+from mirotwin.ports.live import live_settings
+from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json
 from mirotwin.rerun.job import Job, rerun_job
-from mirotwin.rerun.script import DEFAULT_SCENARIO, sent_in
+from mirotwin.rerun.script import sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.outputs import RECORDING, OutputFolder
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
@@ -36,58 +36,89 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.case import tables_of
 
 WORDS = ("robot", "twin")
-SPARE_S = 60.0
-"""A talk may take so much longer than planned: its scenario has to last as long."""
+LATE_MS = 2.0
+_TWIN = (
+    "network.0.radio={bit_error_rate=0.0, carrier='on', squelch=true}",
+    "camera={kind='gaussian'}",
+    "expect={}",
+    "step=[]",
+)
+"""Settings of the twin: an ideal radio, and a camera that nobody steers by."""
 
 
 def record_at_port(
-    job: Job, image: Image, file: str, desk: DeskOptions, url: str, out: Path | None, force: bool, quiet: bool
+    job: Job, image: Image, file: str, desk: DeskOptions, out: Path | None, force: bool, quiet: bool
 ) -> Path:
     """Sends all that the job's hosts send to the robots at the port; the recording of it. Raises BadInput."""
     sent = _sendable(job, file, desk)
-    robots = job.scenario.networks[0].robots
     folder = OutputFolder(out or _default(file), force, (RECORDING,), ours=out is None)
-    recorded = job.firmware if image is job.image else b""
-    source = twin_source(job.scenario, job.seed, image, seconds(sent[-1].end_tick), recorded)
+    source = twin_source(job.scenario, job.seed, image, job.firmware if image is job.image else b"")
+    robots = job.scenario.networks[0].robots
+    decoder = Decoder(robots)
+    numbers = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
     with ExitStack() as files:
         files.enter_context(folder)
         folder.keep = (RECORDING,)
-        stream = files.enter_context(folder.part(RECORDING).open("wb", buffering=0))
+        stream = _WrittenApart(files.enter_context(folder.part(RECORDING).open("wb")))
+        files.callback(stream.close)
         recorder = files.enter_context(Recorder(stream, source))
-        with RobotPort(url, desk.limits, file) as port:
-            recording = PortRecording(port, recorder)
-            try:
-                _talk(port, recording, sent, robots, quiet)
-            finally:
-                recording.finish()
-        _tell(port, sent)
+        with RobotPort(desk, job.scenario, file, recorder) as port:
+            port.greet(next_seq=next(numbers, 0))
+            shortest, longest = (ticks / TICKS_PER_MS for ticks in port.delay_ticks)
+            slots = f"{', '.join(map(str, port.slots))} of {robots}"
+            complain(
+                f"{port.url}: robot {slots} answers, {shortest:.1f} to {longest:.1f} ms after a question"
+            )
+            later = CONTROL_PERIOD_TICKS - sent[0].tick
+            when = f"{seconds(port.began_tick + later):.3f} s later than in the file"
+            complain(f"all times are {when}, which begins after the greeting")
+            due = [msgspec.structs.replace(one, tick=one.tick + later) for one in sent]
+            with ProgressBar("sending", due[-1].end_tick, quiet) as bar:
+                port.play(due, bar.to)
+    late = [ticks / TICKS_PER_MS for ticks in sorted(port.late_ticks)]
+    of_99, hint = late[len(late) * 99 // 100], ""
+    if of_99 > LATE_MS and not port.prompt:
+        hint = "; this process may not ask for real-time priority, which would help"
+    told = f"99 % less than {of_99:.2f} ms late, all less than {late[-1]:.2f} ms"
+    complain(f"{len(sent)} transmissions sent, {told}{hint}")
     return folder.path / RECORDING
 
 
-def _talk(
-    port: RobotPort, recording: PortRecording, sent: Sequence[Transmission], robots: int, quiet: bool
-) -> None:
-    greeting = greet(port, robots, _first_seq(sent, robots))
-    shortest, longest = (ticks / TICKS_PER_MS for ticks in greeting.delay_ticks)
-    slots = ", ".join(map(str, greeting.slots))
-    complain(
-        f"{port.url}: robot {slots} of {robots} answers, {shortest:.1f} to {longest:.1f} ms after a question"
-    )
-    offset = -(-port.tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS + CONTROL_PERIOD_TICKS
-    offset = max(offset - sent[0].tick, 0)
-    complain(f"all times are {seconds(offset):.3f} s later than in the file, which begins after the greeting")
-    with ProgressBar("sending", sent[-1].end_tick, quiet) as bar:
+class _WrittenApart:
+    """A file that a thread of its own writes: a disk that is busy makes no transmission late."""
 
-        def went(one: Transmission) -> None:
-            recording.keep()
-            bar.to(one.end_tick)
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._thread = ThreadPoolExecutor(
+            1, initializer=realtime_priority
+        )  # else who holds the GIL waits for others
+        self._under_way: list[Future[int | None]] = []
 
-        play(port, sent, offset, went)
+    def _do(self, what: Callable[..., int | None], *given: object) -> None:
+        while self._under_way and self._under_way[0].done():
+            self._under_way.pop(0).result()
+        self._under_way.append(self._thread.submit(what, *given))
+
+    def write(self, data: bytes | memoryview) -> int:
+        self._do(self._file.write, bytes(data))
+        return len(data)
+
+    def seek(self, place: int) -> int:
+        self._do(self._file.seek, place)
+        return place
+
+    def flush(self) -> None:
+        self._do(self._file.flush)
+
+    def close(self) -> None:
+        self._thread.shutdown()
+        for one in self._under_way:
+            one.result()
 
 
 def _sendable(job: Job, file: str, desk: DeskOptions) -> list[Transmission]:
     """What is to be sent. Raises BadInput for what no port can send, or the guard does not allow."""
-    sent = sent_in(job.script)
+    sent, guard = sent_in(job.script), Guard(desk, file)
     if not sent:
         raise BadInput(file, "", "no line from host to robot", "nothing can be sent")
     for one in sent:
@@ -97,21 +128,10 @@ def _sendable(job: Job, file: str, desk: DeskOptions) -> list[Transmission]:
         if one.bad_stop:
             what = "has a character with a bad stop bit, which no serial port sends"
             raise BadInput(file, f"tick {one.tick}", what, "leave the line out")
-    if len(sent) < len(job.script):
-        count = len(job.script) - len(sent)
-        complain(f"{file}: {count} actions on robots and radios are not observable on a port, and left out")
-    guard = Guard(desk.limits, file)
-    for one in sent:
         guard.check(one.data, f"tick {one.tick}")
+    if count := len(job.script) - len(sent):
+        complain(f"{file}: {count} actions on robots and radios are not observable on a port, and left out")
     return sent
-
-
-def _first_seq(sent: Sequence[Transmission], robots: int) -> int:
-    """The number of the first frame."""
-    decoder = Decoder(robots)
-    return next(
-        (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received)), 0
-    )
 
 
 def _default(file: str) -> Path:
@@ -120,11 +140,9 @@ def _default(file: str) -> Path:
     return Path("runs") / f"{stem or 'stream'}-port"
 
 
-def twin_source(
-    scenario: Scenario, seed: int, image: Image, duration_s: float, firmware: bytes = b""
-) -> RunSource:
+def twin_source(scenario: Scenario, seed: int, image: Image, firmware: bytes = b"") -> RunSource:
     """What the twin of robots at a port is made from; `firmware`: the file of an image that is not on the disk."""
-    twin = _twin(scenario, duration_s + SPARE_S)
+    twin = changed(scenario, scenario.name, [*live_settings(scenario), *_TWIN])
     return RunSource(
         scenario_name=twin.name,
         scenario_text=tomli_w.dumps(tables_of(twin)),
@@ -136,55 +154,17 @@ def twin_source(
     )
 
 
-def _twin(scenario: Scenario, duration_s: float) -> Scenario:
-    """The scenario with an ideal radio and a silent host; nobody steers by a camera, and references stand."""
-    network = scenario.networks[0]
-    robots = []
-    for robot in network.robot:
-        reference = robot.reference
-        if isinstance(reference, msgspec.Struct) and hasattr(reference, "drive_s"):
-            reference = msgspec.structs.replace(reference, drive_s=0.0)
-        robots.append(msgspec.structs.replace(robot, reference=reference))
-    network = msgspec.structs.replace(
-        network,
-        host="silent",
-        radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
-        robot=tuple(robots),
-    )
-    camera = load(DEFAULT_SCENARIO, ["camera={kind = 'gaussian'}", "expect={}"]).scenario.camera
-    return msgspec.structs.replace(
-        scenario, duration_s=duration_s, networks=(network,), camera=camera, expect={}, step=()
-    )
-
-
-def _tell(port: RobotPort, sent: Sequence[Transmission]) -> None:
-    """How well the schedule was kept."""
-    late = sorted(port.late_ticks) or [0]
-    most = late[-1] / TICKS_PER_MS
-    of_99 = late[min(len(late) - 1, len(late) * 99 // 100)] / TICKS_PER_MS
-    complain(
-        f"{len(sent)} transmissions sent, 99 % less than {of_99:.2f} ms late, all less than {most:.2f} ms;"
-        f" {len(port.answers)} answers"
-    )
-
-
 def compare_with_twin(
-    job: Job,
-    image: Image,
-    file: str,
-    tolerance: AnswerTolerance,
-    everything: bool,
-    quiet: bool,
-    as_json: bool,
+    job: Job, image: Image, file: str, rule: CompareRule, everything: bool, quiet: bool, as_json: bool
 ) -> int:
     """Runs the twin with what was sent at the port, and compares its answers; the exit code."""
-    comparison = compared(job, image, file, tolerance, quiet or as_json)
+    comparison = compared(job, image, file, rule, quiet or as_json)
     found = comparison.differences
     code = DIVERGENCE if found else DONE
     if as_json:
-        document = {"file": file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
-        result = differences_as_json(found, everything, WORDS)
-        print_json(document | {"not_judged": comparison.not_judged, **result, "exit_code": code})
+        head = {"file": file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
+        head["not_judged"] = comparison.not_judged
+        print_json(head | differences_as_json(found, everything, WORDS) | {"exit_code": code})
     elif found and not quiet:
         print_differences(found, everything, WORDS)
     for slot in comparison.silent:
@@ -192,9 +172,8 @@ def compare_with_twin(
     if comparison.not_judged:
         complain(f"{comparison.not_judged} values are not judged: they depend on times too near to a limit")
     if found:
-        complain(
-            f"the robot differs from its twin in control period {found[0].period}, {found[0].said(WORDS)}"
-        )
+        first = f"in control period {found[0].period}, {found[0].said(WORDS)}"
+        complain(f"the robot differs from its twin {first}")
     elif not as_json:
         count = sum(len(one.pairs) for one in comparison.robots)
         unsure_ms = max((one.unsure_ticks for one in comparison.robots), default=0) / TICKS_PER_MS
@@ -202,9 +181,9 @@ def compare_with_twin(
     return code
 
 
-def compared(job: Job, image: Image, file: str, tolerance: AnswerTolerance, quiet: bool) -> PortComparison:
+def compared(job: Job, image: Image, file: str, rule: CompareRule, quiet: bool) -> PortComparison:
     """The recorded answers beside those of the twin."""
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     with ProgressBar("running the twin", end_tick, quiet) as bar:
         again = rerun_job(job, image, file, end_tick, bar.to)
-    return compare(job.recorded, again.periods, job.scenario.networks[0].robots, tolerance)
+    return compare(job.recorded, again.periods, job.scenario.networks[0].robots, rule)

@@ -12,10 +12,8 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
-from mirotwin.desk.guard import MAX_SPEED_M_S
-from mirotwin.desk.options import DeskOptions
-from mirotwin.desk.port_world import NotObservable, PortWaits, PortWorld
-from mirotwin.desk.robot_port import RobotPort
+from mirotwin.desk.guard import DeskOptions
+from mirotwin.desk.robot_port import NotObservable, PortWaits, RobotPort, check_observable
 from mirotwin.testing.link import Link
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.rig_options import marker_options, rig_options
@@ -29,51 +27,40 @@ NAME = "mirotwin-port"
 
 def desk_of(config: pytest.Config) -> DeskOptions:
     """What the command line says of a port."""
-    speed = config.getoption("--mirotwin-max-speed", default=None)
-    return DeskOptions(
-        port=config.getoption("--mirotwin-port", default=None),
-        allow_motion=bool(config.getoption("--mirotwin-allow-motion", default=False)),
-        max_speed=MAX_SPEED_M_S if speed is None else float(speed),
-    )
+    given = {name: config.getoption(f"mirotwin_{name}", None) for name in DeskOptions.__struct_fields__}
+    return DeskOptions(**{name: value for name, value in given.items() if value is not None})
 
 
 class PortFixtures:
     """A plugin whose fixtures stand in for those of the twin. The port is opened for each test."""
 
     def __init__(self, config: pytest.Config) -> None:
-        desk = desk_of(config)
-        assert desk.port is not None
-        self.url, self.limits = desk.port, desk.limits
+        self.desk = desk_of(config)
 
     def pytest_report_header(self) -> str:
-        return f"mirotwin: robots at {self.url}; what a port does not show is skipped"
+        return f"mirotwin: robots at {self.desk.port}; what a port does not show is skipped"
 
     @pytest.fixture
-    def mirotwin_port(
-        self, request: pytest.FixtureRequest, _mirotwin_seed: int
-    ) -> Generator[PortWorld, None, None]:
+    def world(self, request: pytest.FixtureRequest, _mirotwin_seed: int) -> Generator[RobotPort, None, None]:
         """The robots at the port, standing, and told to stand again when the test is over."""
         try:
             marks = [(mark.args, mark.kwargs) for mark in request.node.iter_markers("mirotwin")]
             asked = rig_options(marker_options(marks), request.node.path.parent, None, _mirotwin_seed)
-            network = asked.scenario.networks[0]
-            if len(asked.scenario.networks) > 1 or network.host != "silent":
-                pytest.skip("not observable on a port: several networks, or a controller that needs a camera")
+            check_observable(asked.scenario)
             if asked.scenario.expect:
                 names = ", ".join(asked.scenario.expect)
                 request.node.add_report_section("call", "mirotwin", f"{names}: not observable on a port")
-            with RobotPort(self.url, self.limits, request.node.name) as port:
-                yield PortWorld(port, asked.scenario)
+            with RobotPort(self.desk, asked.scenario, request.node.name) as port:
+                port.greet()
+                yield port
+        except NotObservable as error:
+            pytest.skip(str(error))
         except BadInput as error:
             pytest.fail(str(error), pytrace=False)
 
     @pytest.fixture
-    def world(self, mirotwin_port: PortWorld) -> PortWorld:
-        return mirotwin_port
-
-    @pytest.fixture
-    def link(self, mirotwin_port: PortWorld) -> Link:
-        return Link(cast("World", mirotwin_port), waits=PortWaits(mirotwin_port))
+    def link(self, world: RobotPort) -> Link:
+        return Link(cast("World", world), waits=PortWaits(world))
 
     @pytest.fixture
     def links(self, link: Link) -> list[Link]:
@@ -95,5 +82,5 @@ class PortFixtures:
         except NotObservable as error:
             pytest.skip(str(error))
         except WaitExpired as error:
-            world = getattr(item, "funcargs", {})["mirotwin_port"]
+            world = getattr(item, "funcargs", {})["world"]
             raise WaitFailed.of(error, world).with_traceback(error.__traceback__) from None

@@ -6,18 +6,15 @@ out without changing what follows: the test ends there. Neither passes; they are
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
-from miro_sim.scenario.keys import Scenario
-from mirotwin.desk.options import DeskOptions
-from mirotwin.desk.port_world import SEEN, NotObservable, PortWorld
-from mirotwin.desk.recorded import PortRecording
-from mirotwin.desk.robot_port import RobotPort
+from mirotwin.desk.guard import DeskOptions
+from mirotwin.desk.robot_port import SEEN, NotObservable, RobotPort, check_observable
 from mirotwin.recording.recorder import Recorder
 from mirotwin.replay.replay_port import twin_source
 from mirotwin.shell.outputs import RECORDING, whole_file
@@ -41,6 +38,7 @@ if TYPE_CHECKING:
 
 NOTED = "not observable on a port"
 _CAN_FAIL = (WaitStep, NeverStep)
+_PASSED_OVER = (*_CAN_FAIL, HoldStep, CheckStep, SaveStep)
 
 
 def unseen(step: Step) -> str:
@@ -48,50 +46,49 @@ def unseen(step: Step) -> str:
     if isinstance(step, SendStep):
         bad = getattr(step.what, "bad_stop", ()) or "!" in getattr(step.what, "hex", "")
         return "no serial port sends a bad stop bit" if bad else ""
-    if isinstance(step, WaitStep | NeverStep):
-        return "" if isinstance(step.condition, SEEN) else "it is inside the robot"
     if isinstance(step, StreamStep | PauseStep):
         return ""
-    if isinstance(step, HoldStep | CheckStep):
-        return "it is inside the robot"
-    return "only a twin can be saved" if isinstance(step, SaveStep) else "only a twin has such a switch"
+    if isinstance(step, SaveStep):
+        return "only a twin can be saved"
+    if isinstance(step, _PASSED_OVER):
+        return "" if isinstance(getattr(step, "condition", None), SEEN) else "it is inside the robot"
+    return "only a twin has such a switch"
 
 
 def run_port_test(
-    path: str, image: Image, desk: DeskOptions, url: str, settings: Sequence[str], artifacts: Path | None
+    path: str, image: Image, desk: DeskOptions, settings: Sequence[str], artifacts: Path | None
 ) -> Outcome:
     """Plays a file's steps at the port. `artifacts`: below it the recording is left. Whatever happens is an outcome."""
     folder = None if artifacts is None else folder_of(artifacts, path)
     try:
-        return _run(path, image, desk, url, settings, folder)
+        return _run(path, image, desk, settings, folder)
     except NotObservable as error:
-        return Outcome(path, "not observable", notes=(f"{error}",))
+        return Outcome(path, "not observable", notes=(f"{path}: {error}",))
     except BadInput as error:
         return Outcome(path, "error", (f"{error}",))
 
 
-def _run(
-    path: str, image: Image, desk: DeskOptions, url: str, settings: Sequence[str], folder: Path | None
-) -> Outcome:
+def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], folder: Path | None) -> Outcome:
     text = load_test(path, settings)
-    scenario = text.scenario
-    _check(scenario, path)
-    steps = steps_of(scenario, path)
+    check_observable(text.scenario)
+    steps = steps_of(text.scenario, path)
     notes = [f"{step}: {NOTED}: {why}" for step in steps if (why := unseen(step))]
-    notes += [f"expectation {name}: {NOTED}" for name in scenario.expect]
-    playable = list(_playable(steps))
+    notes += [f"expectation {name}: {NOTED}" for name in text.scenario.expect]
+    seen = [step for step in steps if not unseen(step)]
+    switches = [step.number for step in steps if unseen(step) and not isinstance(step, _PASSED_OVER)]
+    playable = [step for step in seen if not switches or step.number < switches[0]]
     with ExitStack() as stack:
-        port = stack.enter_context(RobotPort(url, desk.limits, path))
+        recorder = None
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            source = twin_source(scenario, 0, image, scenario.duration_s)
             part = stack.enter_context(whole_file(folder / RECORDING, "--artifacts"))
-            recorder = stack.enter_context(Recorder(stack.enter_context(part.open("wb")), source))
-            stack.callback(PortRecording(port, recorder).finish)
-        world = PortWorld(port, scenario)
-        player = Player(cast("World", world), playable, path)  # which asks of it what a PC can see
+            stream = stack.enter_context(part.open("wb"))
+            recorder = stack.enter_context(Recorder(stream, twin_source(text.scenario, 0, image)))
+        port = stack.enter_context(RobotPort(desk, text.scenario, path, recorder))
+        port.greet()
+        player = Player(cast("World", port), playable, path)  # which asks of it what a PC can see
         player.play()
-        tick = world.tick
+        tick = port.tick
     lines = () if player.failure is None else (f"step failed: {player.failure}",)
     judged = any(isinstance(step, _CAN_FAIL) for step in player.steps[: player.done])
     return Outcome(
@@ -104,21 +101,5 @@ def _run(
         tick=tick,
         left=str(folder) if folder is not None and lines else "",
         left_out=text.notes,
-        unseen=len(steps) - len(playable) + len(scenario.expect),
+        unseen=len(steps) - len(playable) + len(text.scenario.expect),
     )
-
-
-def _check(scenario: Scenario, path: str) -> None:
-    if len(scenario.networks) > 1:
-        raise NotObservable(f"{path}: {len(scenario.networks)} networks, of which a port is one")
-    if scenario.networks[0].host != "silent":
-        raise NotObservable(f"{path}: a controller, which needs a camera")
-
-
-def _playable(steps: Sequence[Step]) -> Iterator[Step]:
-    """Those that can be done, up to the first without which the rest means something else."""
-    for step in steps:
-        if not unseen(step):
-            yield step
-        elif not isinstance(step, WaitStep | NeverStep | HoldStep | CheckStep | SaveStep):
-            return

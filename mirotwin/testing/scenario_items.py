@@ -50,7 +50,7 @@ class ScenarioItem(pytest.Item):
             raise ScenarioFailed(f"{error}") from None
         artifacts = _path(self.config, "artifacts")
         if desk.port:
-            outcome = run_port_test(file, image, desk, desk.port, (), artifacts)
+            outcome = run_port_test(file, image, desk, (), artifacts)
         else:
             outcome = run_test(file, image, seed, artifacts=artifacts, again=again)
         self._note(outcome, again)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from miro_exact.bad_input import BadInput
-from mirotwin.desk.options import DeskOptions
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
@@ -146,7 +146,7 @@ def test(options: TestOptions) -> int:
 
             again = options.line_for(file)
             image = load_firmware(options.firmware)
-            outcome = run_port_test(file, image, desk, desk.port, settings, options.artifacts)
+            outcome = run_port_test(file, image, desk, settings, options.artifacts)
         elif file.endswith(CASE_SUFFIX):
             outcome = cases.run(file)
             again = replay_line(file, options.firmware, cases.check_of(file))

@@ -3,30 +3,29 @@
 A rule is seen in what the robot answers (`ANSWERS`), or in how many frames it has accepted by the end of the trial
 (`COUNTED`). What a PC cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses
 within a frame that are shorter than it can time. Where answers of a robot that breaks the rule may be the same, only a
-failure is a verdict (`ONLY_FAILURES`). A trial that fails although characters came in time is a failure;
-where they did not, it is tried again, and in the end not judged.
+failure is a verdict (`ONLY_FAILURES`). A trial that fails is tried again: noise may have spoilt it. A rule fails
+where each trial failed, and in one of them characters came in time; where they never did, it is not judged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal, Unpack, get_args
-
-import msgspec
+from typing import Unpack
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.table import ROBOT_COUNTS, TICKS_PER_MS
 from miro_protocol.transmission import Transmission, joined
-from mirotwin.desk.guard import MotionLimits
-from mirotwin.desk.port_world import PortWorld
-from mirotwin.desk.robot_port import RobotPort
-from mirotwin.desk.session import Greeting, greet, play
+from miro_sim.world.events import Cursor
+from mirotwin.desk.guard import DeskOptions
+from mirotwin.desk.robot_port import PortError, RobotPort
+from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.trial import make_trial
-from mirotwin.verify.conform.trial_script import Expectation, Frame, How, Pairs, TrialScript
+from mirotwin.verify.conform.run import Outcome, in_order
+from mirotwin.verify.conform.trial import trial_of
+from mirotwin.verify.conform.trial_script import Frame, How, Pairs, TrialScript
 
 ANSWERS = ("P41", "P43", "P44", "P45", "P48", "P49", "P50", "P61")
 COUNTED = ("P04", "P05", "P06", "P07", "P08", "P10", "P13", "P14", "P16", "P17", "P20", "P21", "P34")
@@ -63,17 +62,8 @@ SURE_TICKS = 5 * TICKS_PER_MS
 """Characters that come and go so much later than others still say what a trial wants to know. Chosen: half of what a
 robot has to act in, a quarter of the shortest margin of the silences."""
 TRIES = 4
-
-PortVerdict = Literal["passed", "failed", "not judged", "not observable"]
-PORT_VERDICTS: tuple[PortVerdict, ...] = get_args(PortVerdict)
-
-
-class PortOutcome(msgspec.Struct, frozen=True):
-    """The result of a rule at a port: what was wanted and found, or why it is not judged."""
-
-    rule: str
-    verdict: PortVerdict
-    text: str = ""
+NOISY = {"P49": 16}
+"""More tries: noise between the frames of a keyed radio makes robots count windows that nobody sent."""
 
 
 class PortScript(TrialScript):
@@ -83,7 +73,6 @@ class PortScript(TrialScript):
         super().__init__(topology)
         self.standing = standing
         self.fresh = 0
-        self._seen_by_answers: list[Expectation] = []
 
     def words(self) -> Pairs:
         return ((0, 0),) * self.n if self.standing else super().words()
@@ -103,8 +92,7 @@ class PortScript(TrialScript):
         """The same, where a PC can send it; else nothing, for as long."""
         before = len(self.said)
         frame = super().say(kind, payload, step, what, words, **how)
-        pauses = how.get("pauses", {}).values()
-        if "bad_stop" in how or any(pause < SHORTEST_US for pause in pauses):
+        if "bad_stop" in how or any(pause < SHORTEST_US for pause in how.get("pauses", {}).values()):
             del self.said[before:]
         elif how.get("fresh", True):
             self.fresh += 1
@@ -112,114 +100,91 @@ class PortScript(TrialScript):
             self.seq = frame.seq  # else a robot that takes it would not take the next one, and count right
         return frame
 
-    def answered(self, question: Frame, slot: int, *more: Any, **named: Any) -> None:
-        before = len(self.expected)
-        super().answered(question, slot, *more, **named)
-        self._seen_by_answers += self.expected[before:]
 
-    def silent(self, after_tick: int, until_tick: int, why: str) -> None:
-        before = len(self.expected)
-        super().silent(after_tick, until_tick, why)
-        self._seen_by_answers += self.expected[before:]
+def try_at_port(rules: Sequence[Rule], desk: DeskOptions) -> Iterator[Outcome]:
+    """Each as soon as it is known. Raises BadInput where no robot answers, PortError."""
+    with RobotPort(desk, trial_of(rules[0]).scenario) as port:
+        topology = _robot_at(port)
 
-    def first_seq(self) -> int:
-        """The number of the first frame."""
-        decoder = Decoder(self.n)
-        events = (event for one in self.said for event in decoder.feed(one.data))
-        return next(event.seq for event in events if isinstance(event, Received))
+        def tried(rule: Rule) -> Outcome:
+            if rule.id in NOT_OBSERVABLE:
+                return Outcome(rule.id, (), unseen=NOT_OBSERVABLE[rule.id])
+            return _try_often(rule, port, topology)
 
-    def judged(self) -> list[Expectation]:
-        """What answers show of the trial; the robot was switched on before."""
-        return [one for one in self._seen_by_answers if "of power-on" not in one.wanted]
+        yield from in_order(rules, tried)
 
 
-def find_robot(port: RobotPort) -> tuple[Greeting, Topology]:
-    """The robot at the port: that in the lowest slot of a network of three, or of five. Raises BadInput."""
+def _robot_at(port: RobotPort) -> Topology:
+    """That in the lowest slot of a network of three, or of five."""
     for robots in ROBOT_COUNTS:
         try:
-            greeting = greet(port, robots)
-        except BadInput:
-            if robots == ROBOT_COUNTS[-1]:
-                raise
-            continue
-        return greeting, Topology(robots, greeting.slots[:1])
-    raise AssertionError
-
-
-def try_at_port(rules: Sequence[Rule], url: str, limits: MotionLimits) -> Iterator[PortOutcome]:
-    """Each as soon as it is known. Raises BadInput where no robot answers, PortError."""
-    with RobotPort(url, limits, url) as port:
-        _, topology = find_robot(port)
-        for rule in rules:
-            if rule.id in NOT_OBSERVABLE:
-                yield PortOutcome(rule.id, "not observable", NOT_OBSERVABLE[rule.id])
-            else:
-                yield _try_often(rule, port, topology)
-
-
-def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> PortOutcome:
-    unsure = 0
-    for _ in range(TRIES):
-        try:
-            found, unsure = _try(rule, port, topology)
+            port.greet(robots)
+            break
         except BadInput as error:
-            if not error.remedy or "--" not in error.remedy:
+            if robots == ROBOT_COUNTS[-1] or isinstance(error, PortError):
                 raise
-            return PortOutcome(rule.id, "not judged", f"{error.what}; {error.remedy}")
-        if not found and rule.id in ONLY_FAILURES:
-            return PortOutcome(rule.id, "not judged", f"it does not fail, but {ONLY_FAILURES[rule.id]}")
-        if not found:
-            return PortOutcome(rule.id, "passed")
-        if unsure <= SURE_TICKS:
-            return PortOutcome(rule.id, "failed", found)
-    late = f"characters come and go up to {unsure / TICKS_PER_MS:.1f} ms late"
-    return PortOutcome(
-        rule.id, "not judged", f"{late}, {SURE_TICKS / TICKS_PER_MS:g} ms are allowed; {found}"
-    )
+    return Topology(robots, port.slots[:1])
 
 
-def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[str, int]:
-    """What is wrong, or "", and how well the times of the trial are known."""
-    script = PortScript(topology, standing=not port.guard.limits.motion)
+def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
+    """Noise, or a character that came late, may spoil a trial: who breaks a rule fails each of them."""
+    sure: tuple[Failure, ...] = ()
+    for _ in range(NOISY.get(rule.id, TRIES)):
+        try:
+            failure, unsure_ticks = _try(rule, port, topology)
+        except BadInput as error:
+            if sure:
+                break  # the trial has silenced the robot
+            if "--" not in error.remedy:
+                raise
+            return Outcome(rule.id, (), unsure=f"{error.what}; {error.remedy}")
+        if failure is None:
+            only = ONLY_FAILURES.get(rule.id, "")
+            return Outcome(rule.id, (), unsure=only and f"it does not fail, but {only}")
+        if unsure_ticks <= SURE_TICKS:
+            sure = (failure,)
+    late = f"characters come and go up to {unsure_ticks / TICKS_PER_MS:.1f} ms late"
+    allowed = f"{SURE_TICKS / TICKS_PER_MS:g} ms are allowed"
+    return Outcome(rule.id, sure, unsure="" if sure else f"{late}, {allowed}; {failure}")
+
+
+def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | None, int]:
+    """What is wrong, and how well the times of the trial are known."""
+    slot = topology.slots[0]
+    script = PortScript(topology, standing=not port.guard.desk.allow_motion)
     rule.write(script)
-    counted = rule.id in COUNTED
-    last = script.ask(topology.slots[0], gap_ms=36.0)
-    trial = make_trial(msgspec.structs.replace(rule, topologies=(topology,)))
-    world = PortWorld(port, trial.scenario, script.first_seq())
-    first = len(port.late_ticks)
-    seen = Observed(topology.robots, topology.slots[0])
-    cursor = world.networks[0].log.end
+    last = script.ask(slot, gap_ms=36.0)
+    sent, decoder = _whole(script.said), Decoder(script.n)
+    first = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
+    port.greet(script.n, next(first))
+    cursor, begun = Cursor(port.log), len(port.late_ticks)
+    seen = Observed(script.n, slot)
 
-    def gather(one: Transmission | None = None) -> None:
-        nonlocal cursor
-        log = world.networks[0].log
-        for _, event in log.since(cursor):
+    def gather(tick: int) -> None:
+        for _, event in cursor.read():
             if event.what != "sent":
                 seen.take(event)
-        cursor = log.end
+        seen.end_tick = tick
 
-    play(port, _whole(script.said), world.began_tick, gather)
-    gather()
-    seen.end_tick = world.tick
-    delays = [answer.tick - last.tick for answer in seen.answers if answer.frame.seq == last.seq][-1:]
-    shortest, longest = world.greeting.delay_ticks
-    unsure = max([*port.late_ticks[first:], longest - shortest, *(delay - shortest for delay in delays)])
-    slot = topology.slots[0]
-    for expectation in script.judged():
-        if not expectation.slots or slot in expectation.slots:
-            what = expectation.test(seen)
-            if what is not None:
-                return f"wanted {expectation.wanted}, found {what[1]}", unsure
-    if counted:
-        wanted = script.fresh % 256
-        said = [
-            answer.said for answer in seen.answers if answer.said is not None and answer.frame.seq == last.seq
-        ]
-        found = said[-1].accepted if said else None
-        if found != wanted:
-            shown = "no answer" if found is None else f"{found}"
-            return f"wanted {wanted} frames accepted by {last.what}, found {shown}", unsure
-    return "", unsure
+    port.play(sent, gather)
+    gather(port.tick)
+    answered = [one for one in seen.answers if one.frame.seq == last.seq and one.said is not None][-1:]
+    shortest, longest = port.delay_ticks
+    delays = [one.tick - last.tick for one in answered]
+    unsure = max(*port.late_ticks[begun:], longest - shortest, *(delay - shortest for delay in delays))
+
+    def failed(tick: int, wanted: str, found: str) -> tuple[Failure, int]:
+        return Failure("conforms_to", 0, slot, tick, wanted, found), unsure
+
+    for one in script.expected:  # what power-on did is told by now
+        if one.by_answers and (not one.slots or slot in one.slots) and "of power-on" not in one.wanted:
+            if (what := one.test(seen)) is not None:
+                return failed(what[0], one.wanted, what[1])
+    counts = [one.said.accepted for one in answered if one.said is not None]
+    if rule.id in COUNTED and counts != [script.fresh % 256]:
+        found = f"{counts[0]}" if counts else "no answer"
+        return failed(port.tick, f"{script.fresh % 256} frames accepted by {last.what}", found)
+    return None, unsure
 
 
 def _whole(said: Sequence[Transmission]) -> list[Transmission]:
@@ -227,8 +192,5 @@ def _whole(said: Sequence[Transmission]) -> list[Transmission]:
     found: list[Transmission] = []
     for one in sorted(said, key=lambda one: one.tick):
         both = joined(found[-1], one) if found and found[-1].end_tick == one.tick else None
-        if both is not None:
-            found[-1] = both
-        else:
-            found.append(one)
+        found[-1 if both else len(found) :] = [both or one]
     return found

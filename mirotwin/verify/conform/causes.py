@@ -18,9 +18,9 @@ def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
 
 
 def causes_first(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    """Failed rules that hide others, then other failed ones, those not judged, and those that are kept."""
+    """Failed rules that hide others, then other failed ones, those not judged, those that are kept, and the rest."""
     places = {id: place for place, id in enumerate(hidden_by(outcomes))}
-    verdicts = ("failed", "not judged", "passed")
+    verdicts = ("failed", "not judged", "passed", "not observable")
     return sorted(outcomes, key=lambda one: (verdicts.index(one.verdict), places.get(one.rule, len(places))))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import click
 import msgspec
@@ -12,7 +12,7 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
-from mirotwin.desk.options import DeskOptions
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.firmware_image import load_firmware
@@ -47,9 +47,6 @@ from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.verify.conform.table import ALL as EVERY_RULE
 from mirotwin.verify.conform.table import LONG, RULES, chapter_of, find
-
-if TYPE_CHECKING:
-    from mirotwin.verify.conform.by_answers import PortOutcome
 
 LINES = 5
 """Firmware faults that are listed."""
@@ -108,92 +105,57 @@ def conform(options: ConformOptions) -> int:
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", options.image)
-    if options.desk.port:
+    at_port = options.desk.port
+    if at_port:
         if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
             raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
-        return _conform_at_port(rules, options, options.desk.port)
-    firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
-    if options.explain is not None:
-        return _explain(find(options.explain), firmware, options.seed)
-    if artifacts is not None:
-        _make_room(artifacts, rules)
+        from mirotwin.verify.conform.by_answers import try_at_port  # loads pyserial
+
+        properties = {"port": at_port}
+        tried = try_at_port(rules, options.desk)
+    else:
+        firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
+        if options.explain is not None:
+            return _explain(find(options.explain), firmware, options.seed)
+        if artifacts is not None:
+            _make_room(artifacts, rules)
+        sha256, seed = firmware.sha256, f"{options.seed}"
+        properties = {"firmware": firmware.path.name, "firmware_sha256": sha256, "seed": seed}
+        tried = try_all(rules, firmware, options.seed, keep=artifacts is not None)
     outcomes: list[Outcome] = []
+    lost: BadInput | None = None
     with ProgressBar("trying rules", len(rules), quiet) as bar:
-        for outcome in try_all(rules, firmware, options.seed, keep=artifacts is not None):
-            outcomes.append(outcome)
-            bar.to(len(outcomes))
-            if artifacts is not None:
-                for name, text in outcome.cases:
-                    write_case(artifacts / name, text)
-                    leave_image(artifacts, firmware)
+        try:
+            for outcome in tried:
+                outcomes.append(outcome)
+                bar.to(len(outcomes))
+                if artifacts is not None:
+                    for name, text in outcome.cases:
+                        write_case(artifacts / name, text)
+                        leave_image(artifacts, firmware)
+        except BadInput as error:  # a robot that was lost: what was found before is told
+            lost = error
     outcomes = with_faults(outcomes, rules)
-    if junit is not None:
-        properties = {
-            "firmware": firmware.path.name,
-            "firmware_sha256": firmware.sha256,
-            "seed": f"{options.seed}",
-        }
-        with whole_file(junit, "--junit") as part:
+    if outcomes or lost is None:
+        _tell(outcomes, rules, options, properties)
+    if lost is not None:
+        raise lost
+    wrong = any(one.failures or one.cause for one in outcomes)
+    return _report_faults(outcomes) or (EXPECTATION_FAILED if wrong else DONE)
+
+
+def _tell(
+    outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions, properties: dict[str, str]
+) -> None:
+    if options.junit is not None:
+        with whole_file(options.junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin conform", _test_cases(outcomes, rules), properties))
     if options.as_json:
         _print_json(outcomes)
-    else:
-        _print_table(outcomes, rules, quiet, options.everything)
-        if artifacts is not None and not quiet:
-            _print_replays(outcomes, artifacts)
-    return _report_faults(outcomes) or (
-        DONE if all(outcome.passed for outcome in outcomes) else EXPECTATION_FAILED
-    )
-
-
-def _conform_at_port(rules: Sequence[Rule], options: ConformOptions, url: str) -> int:
-    """Tries rules on the robot at the port; the exit code. Where the robot is lost, what was found is told first."""
-    from mirotwin.verify.conform.by_answers import try_at_port  # loads pyserial
-
-    outcomes: list[PortOutcome] = []
-    names = {rule.id: rule.name for rule in rules}
-    try:
-        with ProgressBar("trying rules", len(rules), options.quiet) as bar:
-            for outcome in try_at_port(rules, url, options.desk.limits):
-                outcomes.append(outcome)
-                bar.to(len(outcomes))
-                if options.as_json:
-                    click.echo(msgspec.json.encode(outcome))
-    finally:
-        if outcomes:
-            _tell_of_port(outcomes, names, options, url)
-    return EXPECTATION_FAILED if any(one.verdict == "failed" for one in outcomes) else DONE
-
-
-def _tell_of_port(
-    outcomes: Sequence[PortOutcome], names: dict[str, str], options: ConformOptions, url: str
-) -> None:
-    from mirotwin.verify.conform.by_answers import PORT_VERDICTS
-
-    if options.junit is not None:
-        verdicts = {"passed": "passed", "failed": "failure"}
-        cases = [
-            TestCase(
-                name=f"{one.rule} {names[one.rule]}",
-                classname="conform.port",
-                verdict=verdicts.get(one.verdict, "skipped"),  # type: ignore[arg-type]
-                lines=[one.text] if one.text else [],
-            )
-            for one in outcomes
-        ]
-        with whole_file(options.junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin conform", cases, {"port": url}))
-    if not options.as_json:
-        table = Table(box=None, pad_edge=False)
-        for head in ("rule", "name", "verdict", "why"):
-            table.add_column(head, overflow="fold")
-        for one in outcomes:
-            if one.verdict == "failed" or not options.quiet:
-                table.add_row(one.rule, names[one.rule], one.verdict, one.text)
-        if table.rows:
-            show(table)
-        counts = [f"{sum(one.verdict == verdict for one in outcomes)} {verdict}" for verdict in PORT_VERDICTS]
-        show(f"{len(outcomes)} rules: {', '.join(counts)}")
+        return
+    _print_table(outcomes, rules, options.quiet, options.everything)
+    if options.artifacts is not None and not options.quiet:
+        _print_replays(outcomes, options.artifacts)
 
 
 def _explain(rule: Rule, firmware: Image, seed: int) -> int:
@@ -241,6 +203,9 @@ def _test_cases(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Test
         if outcome.cause:
             because = f"not judged: {outcome.cause} failed, {find(outcome.cause).broken}"
             case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
+        elif outcome.unsure or outcome.unseen:
+            because = f"{outcome.verdict}: {outcome.unsure or outcome.unseen}"
+            case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
         elif outcome.failures:
             lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
             case = msgspec.structs.replace(case, verdict="failure", lines=lines)
@@ -256,6 +221,7 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
             "verdict": outcome.verdict,
             "cause": outcome.cause or None,
             "hint": outcome.hint or None,
+            "why": outcome.unsure or outcome.unseen or None,
             "failures": len(outcome.failures),
             "first": None if first is None else msgspec.to_builtins(first),
             "faults": outcome.fault_count,
@@ -272,9 +238,9 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
     for head in ("rule", "name", "verdict", "first failure"):
         table.add_column(head, overflow="fold")
     for outcome in causes_first(outcomes):
-        if (outcome.passed and quiet) or (outcome.cause and not everything):
+        if (quiet and not outcome.failures) or (outcome.cause and not everything):
             continue
-        first = failure_text(outcome.failures[0]) if outcome.failures else ""
+        first = failure_text(outcome.failures[0]) if outcome.failures else outcome.unsure or outcome.unseen
         if outcome.hint and outcome.hint not in begin:
             first = f"{outcome.hint}; {first}"
         because = f"presupposes {outcome.cause}, which failed" if outcome.cause else first
@@ -293,7 +259,8 @@ def _counts(outcomes: Sequence[Outcome]) -> str:
     verdicts = [outcome.verdict for outcome in outcomes]
     tried = "1 rule" if len(outcomes) == 1 else f"{len(outcomes)} rules"
     text = f"{tried}: {verdicts.count('passed')} passed, {verdicts.count('failed')} failed"
-    return text + (f", {verdicts.count('not judged')} not judged" if "not judged" in verdicts else "")
+    others = [f", {verdicts.count(one)} {one}" for one in ("not judged", "not observable") if one in verdicts]
+    return text + "".join(others)
 
 
 def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:

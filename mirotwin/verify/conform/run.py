@@ -7,7 +7,7 @@ about them, whichever trial they came in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
@@ -33,6 +33,7 @@ class Outcome(msgspec.Struct, frozen=True):
     """The result of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
     its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
     `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
+    At a port, `unseen`: why answers do not show it; `unsure`: why it is not judged.
     """
 
     rule: str
@@ -42,14 +43,18 @@ class Outcome(msgspec.Struct, frozen=True):
     cases: tuple[tuple[str, str], ...] = ()
     cause: str = ""
     hint: str = ""
+    unseen: str = ""
+    unsure: str = ""
 
     @property
     def passed(self) -> bool:
-        return not self.failures and not self.cause
+        return self.verdict == "passed"
 
     @property
     def verdict(self) -> str:
-        return "passed" if self.passed else "failed" if self.failures else "not judged"
+        if self.failures:
+            return "failed"
+        return "not judged" if self.cause or self.unsure else "not observable" if self.unseen else "passed"
 
 
 def failure_text(failure: Failure) -> str:
@@ -117,19 +122,29 @@ def try_all(rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = Fal
     firmware did, before it failed, what another of `rules` forbids: what comes after that says nothing of the rule.
     """
     forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
+
+    def tried(rule: Rule) -> Outcome:
+        outcome = try_rule(rule, image, seed, keep)
+        if not outcome.failures:
+            return outcome
+        cause = next((forbidden[kind] for kind in _before(outcome) if kind in forbidden), "")
+        if cause:
+            return msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
+        place = (outcome.failures[0].network, image, seed)
+        hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
+        return msgspec.structs.replace(outcome, hint=hint)
+
+    return in_order(rules, tried)
+
+
+def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
+    """Those that others presuppose first. Where one of `rules` failed that a rule presupposes, it is not `tried`."""
     causes: dict[str, str] = {}
     for rule in _presupposed_first(rules):
         cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")
-        outcome = Outcome(rule.id, (), cause=cause) if cause else try_rule(rule, image, seed, keep)
-        if outcome.failures:
-            cause = next((forbidden[kind] for kind in _before(outcome) if kind in forbidden), "")
-            if cause:
-                outcome = msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
-            else:
-                place = (outcome.failures[0].network, image, seed)
-                hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
-                outcome = msgspec.structs.replace(outcome, hint=hint)
-            causes[rule.id] = cause or rule.id
+        outcome = Outcome(rule.id, (), cause=cause) if cause else tried(rule)
+        if outcome.failures or outcome.cause:
+            causes[rule.id] = outcome.cause or rule.id
         yield outcome
 
 

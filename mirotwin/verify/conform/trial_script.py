@@ -80,12 +80,16 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """`test` says what is wrong. It is over at `tick`: later events change nothing in it. `slots`: () is all robots."""
+    """`test` says what is wrong. It is over at `tick`: later events change nothing in it. `slots`: () is all robots.
+
+    `by_answers`: what the PC hears is all that it needs.
+    """
 
     tick: int
     wanted: str
     test: Callable[[Observed], Found]
     slots: tuple[int, ...] = ()
+    by_answers: bool = False
 
 
 class How(TypedDict, total=False):
@@ -253,9 +257,14 @@ class TrialScript:
     # ---- expecting -----------------------------------------------------------------------------------------
 
     def expect(
-        self, tick: int, wanted: str, test: Callable[[Observed], Found], slots: tuple[int, ...] = ()
+        self,
+        tick: int,
+        wanted: str,
+        test: Callable[[Observed], Found],
+        slots: tuple[int, ...] = (),
+        by_answers: bool = False,
     ) -> None:
-        self.expected.append(Expectation(tick, wanted, test, slots))
+        self.expected.append(Expectation(tick, wanted, test, slots, by_answers))
 
     def obeyed(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
         """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
@@ -323,7 +332,7 @@ class TrialScript:
             what = says(answer, observed) if says is not None else ""
             return (answer.tick, what) if what else None
 
-        self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,))
+        self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,), by_answers=True)
 
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
         """The PC hears nothing in between."""
@@ -336,7 +345,7 @@ class TrialScript:
             answer = next(iter(observed.answers_in(spoke.tick, heard[-1].tick)), None)
             return spoke.tick, characters(heard) + (f": {who(answer)}" if answer is not None else "")
 
-        self.expect(until_tick, f"silence: {why}", test)
+        self.expect(until_tick, f"silence: {why}", test, by_answers=True)
 
 
 def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str:

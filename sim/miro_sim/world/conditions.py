@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from miro_host.wheels import Wheels
+from miro_protocol import events
 from miro_protocol.frames import ContentError, TelemetryFrame
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, Flags
 from miro_robot.lm629.commands import BY_NAME
@@ -109,13 +110,19 @@ class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
         return not wanted or wanted.items() <= answer_fields(event).items()
 
 
+def answer_of(frame: events.Received) -> TelemetryFrame | None:
+    """What an answer says; None for what no robot may say."""
+    try:
+        said = frame.message(max(ROBOT_COUNTS))
+    except ContentError:
+        return None
+    return said if isinstance(said, TelemetryFrame) else None
+
+
 def answer_fields(event: Event) -> dict[str, int | bool]:
     """What an answer says, under the keys of `Answer`; nothing where it says what no robot may."""
-    try:
-        answer = None if event.frame is None else event.frame.message(max(ROBOT_COUNTS))
-    except ContentError:
-        return {}
-    if not isinstance(answer, TelemetryFrame):
+    answer = None if event.frame is None else answer_of(event.frame)
+    if answer is None:
         return {}
     flags = {str(flag.name).lower(): bool(answer.flags & flag) for flag in Flags}
     return flags | {key: getattr(answer, key) for key in ("slot", *Answer.DETAILS) if key not in flags}

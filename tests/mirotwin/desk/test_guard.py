@@ -12,9 +12,10 @@ from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
-from mirotwin.desk.guard import Guard, MotionLimits
+from mirotwin.desk.guard import DeskOptions, Guard
 
-MOVING = MotionLimits(motion=True, max_speed_m_s=0.5)
+STANDING = DeskOptions(port="COM1")
+MOVING = DeskOptions(port="COM1", allow_motion=True, max_speed=0.5)
 
 
 def team(*pairs, seq=0):
@@ -27,7 +28,7 @@ def test_the_smallest_velocity_of_any_robot_is_refused_where_nothing_may_move(pl
     pairs = [(0, 0)] * 3
     pairs[place] = pair
     with pytest.raises(BadInput, match=f"robot {place} told .* may move a real robot; .*--allow-motion"):
-        Guard(MotionLimits()).check(team(*pairs))
+        Guard(STANDING).check(team(*pairs))
 
 
 @pytest.mark.parametrize(
@@ -35,12 +36,12 @@ def test_the_smallest_velocity_of_any_robot_is_refused_where_nothing_may_move(pl
 )
 def test_gains_and_accelerations_count_as_motion(frame):
     with pytest.raises(BadInput, match="service frame with opcode"):
-        Guard(MotionLimits()).check(encode(frame, 3))
+        Guard(STANDING).check(encode(frame, 3))
     Guard(MOVING).check(encode(frame, 3))
 
 
 def test_what_lets_robots_stand_is_always_allowed():
-    guard = Guard(MotionLimits())
+    guard = Guard(STANDING)
     guard.check(team())
     guard.check(encode(ServiceFrame.ping(1, 0), 3))
     guard.check(bytes(range(256)))
@@ -50,7 +51,7 @@ def test_what_lets_robots_stand_is_always_allowed():
 def test_a_wheel_is_refused_above_the_limit_and_only_there(word, slot, right):
     pairs = [(0, 0)] * 3
     pairs[slot] = (0, word) if right else (word, 0)
-    fast = abs(word) / Wheels().units_per_m_s > MOVING.max_speed_m_s
+    fast = abs(word) / Wheels().units_per_m_s > MOVING.max_speed
     refused = pytest.raises(BadInput, match=r"at most 0\.5 m/s are allowed; raise --max-speed")
     with refused if fast else nullcontext():
         Guard(MOVING).check(team(*pairs))
@@ -58,7 +59,7 @@ def test_a_wheel_is_refused_above_the_limit_and_only_there(word, slot, right):
 
 @given(st.lists(st.integers(1, 5), max_size=4))
 def test_a_frame_in_pieces_is_read_as_one(sizes):
-    data, guard = b"\x55" + team((1, 1)), Guard(MotionLimits())
+    data, guard = b"\x55" + team((1, 1)), Guard(STANDING)
     *pieces, last = [data[start:end] for start, end in pairwise([0, *accumulate(sizes), None])]
     for piece in pieces:
         guard.check(piece)
@@ -68,7 +69,7 @@ def test_a_frame_in_pieces_is_read_as_one(sizes):
 
 def test_a_frame_for_networks_of_five_is_read_too():
     with pytest.raises(BadInput, match="robot 4 told"):
-        Guard(MotionLimits()).check(encode(TeamFrame(0, 0, ((0, 0),) * 4 + ((9, 9),)), 5))
+        Guard(STANDING).check(encode(TeamFrame(0, 0, ((0, 0),) * 4 + ((9, 9),)), 5))
 
 
 @given(st.integers(0, 63))
@@ -81,6 +82,6 @@ def test_stop_frames_are_fresh_after_what_was_sent(seq):
 
 
 def test_before_anything_was_sent_robots_of_both_layouts_are_told_to_stop():
-    frames = Guard(MotionLimits()).stop_frames()
+    frames = Guard(STANDING).stop_frames()
     for robots in (3, 5):
         assert [event for event in Decoder(robots).feed(frames) if isinstance(event, Received)]

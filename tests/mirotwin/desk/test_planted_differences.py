@@ -90,7 +90,7 @@ def test_an_answer_that_gets_lost_is_missing_where_it_was(mirotwin, tmp_path, mo
     taken = RobotPort._take
 
     def deaf(port, data):
-        taken(port, b"" if 40 * PERIOD < port.tick < 44 * PERIOD else data)
+        taken(port, b"" if 40 * PERIOD < port._now < 44 * PERIOD else data)
 
     monkeypatch.setattr(RobotPort, "_take", deaf)
     found = first(mirotwin, tmp_path, ROBOT)
@@ -98,5 +98,20 @@ def test_an_answer_that_gets_lost_is_missing_where_it_was(mirotwin, tmp_path, mo
     assert 40 <= found["period"] <= 44
 
 
-def test_a_wheel_of_another_radius_is_not_seen_by_its_encoder(mirotwin, tmp_path):
-    assert first(mirotwin, tmp_path, f"{ROBOT}&set=network.robot.wheel_radius_mismatch=0.02") is None
+@pytest.mark.parametrize("key", ["robot.wheel_radius_mismatch=0.02", "radio.baud_offset_ppm=10000"])
+def test_what_no_answer_depends_on_is_not_seen(mirotwin, tmp_path, key):
+    assert first(mirotwin, tmp_path, f"{ROBOT}&set=network.{key}") is None
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@pytest.mark.parametrize(("reload", "percent"), [("B3", 1.3), ("B1", -1.3), ("B6", 5.4)])
+def test_a_serial_port_of_another_rate_is_told_where_it_matters(mirotwin, drive, reload, percent):
+    text = source_files()["protocol.h"]
+    right = "TIMER2_RELOAD_LOW            0xB2"
+    made = build({"protocol.h": text.replace(right, right.replace("B2", reload))})
+    robot = f"{ROBOT}&firmware={made.image}"
+    code, _, err = mirotwin("replay", drive, "--port", robot, "--allow-motion", "-q")
+    assert code == (0 if abs(percent) < 2 else 2), err
+    if code:
+        assert "characters come that are no answer" in err
+        assert "is its rate 9600 baud?" in err

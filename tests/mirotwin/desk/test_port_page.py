@@ -4,7 +4,6 @@ import re
 
 import pytest
 
-from mirotwin.desk.compare import PortComparison
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.port_page import _marks
 from tests.mirotwin.desk.rig import ROBOT
@@ -27,7 +26,7 @@ def test_an_equal_robot_and_its_twin_are_on_one_page(page):
     text = page(ROBOT)
     assert "The robot answers as its twin does." in text
     assert "Robot 0 and its twin" in text
-    for name in ("position_left", "position_right", "flags", "accepted", "rejected"):
+    for name in ("left-moved", "right-moved", "flags", "accepted", "rejected"):
         assert f'id="plot-0-{name}"' in text
 
 
@@ -40,7 +39,7 @@ def test_where_they_part_stands_in_the_table(page):
 def test_a_difference_is_marked_in_the_plot_of_its_channel_and_in_no_other():
     left = Difference(24_000_000, 29, 0, 0, "left moved", 408, -414)
     lost = Difference(48_000_000, 59, 0, 0, "answer", None, "to question 5")
-    found = PortComparison([], [left, left, lost])
+    found = [left, left, lost]
     assert _marks(found, 0, "left moved") == [1.0, 2.0]
     assert _marks(found, 0, "flags") == [2.0]
     assert _marks(found, 1, "left moved") == []

@@ -17,15 +17,15 @@ from miro_exact.bad_input import BadInput
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import TeamFrame, encode
-from mirotwin.desk.guard import MotionLimits
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
-from mirotwin.desk.session import greet
+from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.desk.rig import stream_text
 from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
 
 MS = 24_000
-MOVING = MotionLimits(motion=True)
+SCENARIO = silent_scenario(())
 DRIVE = encode(TeamFrame(0, 20, ((300, 300),) * 3), 3)
 
 
@@ -59,6 +59,10 @@ def pty():
     found.close()
 
 
+def robots_at(url, motion=True):
+    return RobotPort(DeskOptions(port=str(url), allow_motion=motion), SCENARIO)
+
+
 def stops(data):
     """Whether what was sent ends with three frames that tell all robots to stand."""
     found = [event.message(3) for event in Decoder(3).feed(data) if isinstance(event, Received)]
@@ -66,16 +70,16 @@ def stops(data):
 
 
 def test_a_port_that_is_closed_has_told_its_robots_to_stop(pty):
-    with RobotPort(pty.path, MOVING) as port:
-        port.send(DRIVE)
+    with robots_at(pty.path) as port:
+        port.inject(DRIVE)
         assert pty.read() == DRIVE
-    assert port.stopped
+    assert port.told_to_stop
     assert stops(DRIVE + pty.read())
 
 
-def broken_off(path, do, error, limits=MOVING):
+def broken_off(path, do, error, motion=True):
     """A talk that ends by an error; the port, and the error's line."""
-    port = RobotPort(str(path), limits)
+    port = robots_at(path, motion)
     with pytest.raises(error) as caught, port:
         do(port)
     assert "\n" not in str(caught.value)
@@ -85,7 +89,7 @@ def broken_off(path, do, error, limits=MOVING):
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, SystemExit])
 def test_whatever_ends_a_talk_the_robots_are_told_to_stop_first(pty, error):
     def do(port):
-        port.send(DRIVE)
+        port.inject(DRIVE)
         raise error
 
     broken_off(pty.path, do, error)
@@ -93,7 +97,7 @@ def test_whatever_ends_a_talk_the_robots_are_told_to_stop_first(pty, error):
 
 
 def test_what_is_not_allowed_is_not_sent(pty):
-    _, said = broken_off(pty.path, lambda port: port.send(DRIVE), BadInput, MotionLimits())
+    _, said = broken_off(pty.path, lambda port: port.inject(DRIVE), BadInput, False)
     assert "--allow-motion" in said
     sent = pty.read()
     assert stops(sent)
@@ -101,24 +105,23 @@ def test_what_is_not_allowed_is_not_sent(pty):
 
 
 def test_characters_come_with_the_time_at_which_they_were_there(pty):
-    with RobotPort(pty.path, MOVING) as port:
+    with robots_at(pty.path) as port:
         os.write(pty.master, b"abc")
-        port.run_to(port.tick + 20 * MS)
+        port.run_for(20 * MS)
         before = port.tick
-        port.end()
-    assert [one.data for one in port.received] == [b"abc"]
-    assert port.received[0].end_tick <= before
+    assert [one.data for one in port.wire] == [b"abc"]
+    assert port.wire[0].end_tick <= before
 
 
 def test_a_port_that_vanishes_is_told_in_one_line(pty):
     def do(port):
-        port.send(DRIVE)
+        port.inject(DRIVE)
         pty.close()
-        port.run_to(port.tick + 500 * MS)
+        port.run_for(500 * MS)
 
     port, said = broken_off(pty.path, do, PortError)
     assert re.match(f"{pty.path}: [0-9.]+ s: the port is lost: ", said)
-    assert not port.stopped
+    assert not port.told_to_stop
 
 
 def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
@@ -126,14 +129,14 @@ def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
     link.symlink_to(pty.path)
 
     def do(port):
-        port.send(DRIVE)
+        port.inject(DRIVE)
         link.unlink()
         link.symlink_to(other.path)
         pty.close()
-        port.run_to(port.tick + 500 * MS)
+        port.run_for(500 * MS)
 
     port, _ = broken_off(link, do, PortError)
-    assert port.stopped
+    assert port.told_to_stop
     assert stops(other.read())
     other.close()
 
@@ -141,16 +144,16 @@ def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
 def test_a_port_that_takes_nothing_more_is_told_and_its_buffer_is_emptied_for_the_stop_frames(pty):
     def do(port):
         for _ in range(100):
-            port.send(DRIVE * 40)
+            port.inject(DRIVE * 40)
 
     port, said = broken_off(pty.path, do, PortError)
     assert "it takes no characters for 1 s; look at its flow control" in said
-    assert (port.stopped, stops(pty.read())) == (True, True)
+    assert (port.told_to_stop, stops(pty.read())) == (True, True)
 
 
 def test_a_port_of_another_program_is_not_opened(pty):
-    with RobotPort(pty.path, MOVING), pytest.raises(PortError, match="another program has it open; end that"):
-        RobotPort(pty.path, MOVING)
+    with robots_at(pty.path), pytest.raises(PortError, match="another program has it open; end that"):
+        robots_at(pty.path)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +169,7 @@ def test_a_port_that_the_system_refuses_is_told_with_a_remedy(monkeypatch, numbe
 
     monkeypatch.setattr(serial, "serial_for_url", refuse)
     with pytest.raises(PortError, match=f"^/dev/ttyUSB9: {said}"):
-        RobotPort("/dev/ttyUSB9", MOVING)
+        robots_at("/dev/ttyUSB9")
 
 
 @pytest.mark.parametrize(
@@ -180,7 +183,7 @@ def test_a_port_that_the_system_refuses_is_told_with_a_remedy(monkeypatch, numbe
 )
 def test_a_port_that_is_none_is_told_in_one_line(url, said):
     with pytest.raises(PortError, match=said) as caught:
-        RobotPort(url, MOVING)
+        robots_at(url)
     assert "\n" not in str(caught.value)
 
 
@@ -208,8 +211,8 @@ def answering(pty, answer):
 )
 def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     answering(pty, answer)
-    port, told = broken_off(pty.path, lambda port: greet(port, 3), BadInput, MotionLimits())
-    assert port.stopped
+    port, told = broken_off(pty.path, RobotPort.greet, BadInput, False)
+    assert port.told_to_stop
     assert re.search(said, told)
 
 

@@ -96,7 +96,7 @@ def test_a_command_without_a_port_loads_nothing_for_ports_or_the_bare_processor(
         [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
     )
     loaded = done.stdout.rpartition("loaded: ")[2].split()
-    assert "mirotwin.desk.options" in loaded
+    assert "mirotwin.desk.guard" in loaded
     assert not {"serial", "mirotwin.desk.robot_port", "mirotwin.verify.bare"}.intersection(loaded)
 
 
