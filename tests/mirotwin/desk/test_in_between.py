@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from tests import children
-from tests.mirotwin.desk.rig import stream_text
+from tests.mirotwin.desk.rig import as_hardware, stream_text
 from tests.mirotwin.ports.rig import PROGRAM, served
 
 SETTINGS = ("--set", "network.radio.bit_error_rate=0", "--set", 'camera={kind="gaussian"}')
@@ -156,7 +156,8 @@ def test_nothing_differs_but_times(tmp_path, between):
     (tmp_path / "drive.stream").write_text(stream_text(FRAMES))
     with (
         served(
-            "fig6", "--tcp", 0, "--pty", tmp_path / "pty", *SETTINGS, "--out", tmp_path / "session"
+            *("fig6", "--tcp", 0, "--pty", tmp_path / "pty", *SETTINGS, "--out", tmp_path / "session"),
+            preexec_fn=as_hardware,
         ) as session,
         between(session, tmp_path) as url,
     ):

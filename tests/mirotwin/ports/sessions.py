@@ -31,9 +31,10 @@ BUSY = "while True: pass"
 
 
 @contextmanager
-def load(processes: int) -> Iterator[None]:
+def load(processes: int, nice: int = 0) -> Iterator[None]:
     """So many processes that do nothing but compute."""
-    busy = [children.start([sys.executable, "-c", BUSY], stdout=subprocess.DEVNULL) for _ in range(processes)]
+    command = ["nice", "-n", f"{nice}", sys.executable, "-c", BUSY]
+    busy = [children.start(command, stdout=subprocess.DEVNULL) for _ in range(processes)]
     try:
         yield
     finally:
