@@ -16,8 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.dmath import atan2, wrap_pi
 from miro_host.laws.yang_kim import POSITION_ERROR_M
 from miro_host.posture import Posture
-from miro_host.theory.assumptions import ALPHA_RAD, across, radius
-from miro_host.theory.computed_torque import disturbance
+from miro_host.theory import ALPHA_RAD, across, radius
 from miro_sim.periods import RobotPeriod
 from mirotwin.recording.channels import TheoryMessage
 from mirotwin.recording.chattering import Chattering
@@ -105,8 +104,8 @@ class TheoryTrack:
         (v, w), self._velocity = self._velocity, (robot.v_m_s, robot.w_rad_s)
         if self._demand is None or tick - self._tick != CONTROL_PERIOD_TICKS:
             return None, None
-        f1 = disturbance(self._demand[0], (robot.v_m_s - v) / PERIOD_S)
-        f2 = disturbance(self._demand[1], (robot.w_rad_s - w) / PERIOD_S)
+        f1 = self._demand[0] - (robot.v_m_s - v) / PERIOD_S
+        f2 = self._demand[1] - (robot.w_rad_s - w) / PERIOD_S
         self.f1_m_s2.append(f1)
         self.f2_rad_s2.append(f2)
         if self._surfaces is not None:

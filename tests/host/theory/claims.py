@@ -12,12 +12,11 @@ from rich.table import Table
 
 from miro_host.posture import Posture
 from miro_host.references.line import StraightLine
-from miro_host.theory import stability
-from miro_host.theory.assumptions import HALF_PI, across
-from miro_host.theory.simulation import BodySimulation
-from tests.host.theory import ideal
+from miro_host.theory import HALF_PI, across
+from tests.host.theory import ideal, stability
 from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
 from tests.host.theory.layer import NO_GUARD, rising
+from tests.host.theory.simulation import BodySimulation
 
 
 def figures():

@@ -1,4 +1,4 @@
-"""Robots of the theory on their way: laws as demands for `miro_host.theory.simulation`, and the paper's starts."""
+"""Robots of the theory on their way: laws as demands for `tests.host.theory.simulation`, and the paper's starts."""
 
 import math
 import random
@@ -11,11 +11,11 @@ from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.theory.assumptions import across
-from miro_host.theory.matrices import times
-from miro_host.theory.simulation import BodySimulation
-from miro_host.theory.stability import lyapunov
-from miro_host.theory.unicycle import UnicycleBody, inertia
+from miro_host.theory import across
+from tests.host.theory.matrices import times
+from tests.host.theory.simulation import BodySimulation
+from tests.host.theory.stability import lyapunov
+from tests.host.theory.unicycle import UnicycleBody, inertia
 
 ROBOT = UnicycleBody(mass_kg=0.5, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.020, track_m=0.068)
 LITERAL = Gains()  # a set that draws Figs. 6 to 8, with boundary layers and guards

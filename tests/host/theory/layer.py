@@ -5,8 +5,8 @@ import random
 from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.line import StraightLine
-from miro_host.theory import stability
-from miro_host.theory.assumptions import across, radius
+from miro_host.theory import across, radius
+from tests.host.theory import stability
 
 NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
 

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from miro_host.theory import matrices
-from miro_host.theory.mechanics import (
+from tests.host.theory import matrices
+from tests.host.theory.ideal import ROBOT
+from tests.host.theory.mechanics import (
     System,
     acceleration,
     constrained,
@@ -17,8 +18,7 @@ from miro_host.theory.mechanics import (
     reduced,
     residual,
 )
-from miro_host.theory.unicycle import UnicycleBody, cartesian, cartesian_rates, inertia, polar, polar_rates
-from tests.host.theory.ideal import ROBOT
+from tests.host.theory.unicycle import UnicycleBody, cartesian, cartesian_rates, inertia, polar, polar_rates
 
 BODIES = st.builds(
     UnicycleBody,

@@ -10,10 +10,10 @@ from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.theory import computed_torque
-from miro_host.theory.simulation import BodySimulation
-from miro_host.theory.unicycle import UnicycleBody, inertia
+from tests.host.theory import computed_torque
 from tests.host.theory.ideal import LITERAL, ROBOT, beside, paper_law
+from tests.host.theory.simulation import BodySimulation
+from tests.host.theory.unicycle import UnicycleBody, inertia
 from tests.naive.host_ideal_loop import drive
 
 

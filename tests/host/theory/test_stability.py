@@ -10,8 +10,8 @@ from miro_host.laws.yang_kim import YangKim, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.theory import stability
-from miro_host.theory.assumptions import HALF_PI, across, radius
+from miro_host.theory import HALF_PI, across, radius
+from tests.host.theory import stability
 from tests.host.theory.ideal import PRINTED
 from tests.host.theory.layer import NO_GUARD, rates, rising, states
 

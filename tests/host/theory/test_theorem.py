@@ -11,8 +11,7 @@ import pytest
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.theory import stability
-from miro_host.theory.simulation import BodySimulation
+from tests.host.theory import stability
 from tests.host.theory.ideal import (
     PRINTED,
     ROBOT,
@@ -24,6 +23,7 @@ from tests.host.theory.ideal import (
     paper_law,
     random_starts,
 )
+from tests.host.theory.simulation import BodySimulation
 
 ERRORS = [(StraightLine(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
 

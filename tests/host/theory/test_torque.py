@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_host.theory import computed_torque
-from miro_host.theory.unicycle import UnicycleBody, inertia
+from tests.host.theory import computed_torque
 from tests.host.theory.ideal import ROBOT
 from tests.host.theory.test_mechanics import BODIES
+from tests.host.theory.unicycle import UnicycleBody, inertia
 
 DEMANDS = st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2)
 DISTURBANCES = st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=2)

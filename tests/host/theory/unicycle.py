@@ -8,8 +8,8 @@ and V follow from the kinetic energy m (rho'^2 + rho^2 phi'^2) / 2 + J theta'^2 
 import msgspec
 
 from miro_exact.dmath import sincos
-from miro_host.theory.matrices import Matrix, Vector, diagonal
-from miro_host.theory.mechanics import System
+from tests.host.theory.matrices import Matrix, Vector, diagonal
+from tests.host.theory.mechanics import System
 
 
 class UnicycleBody(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Writes the tables of protocol/README.md from the table: `python -m miro_protocol.document`."""
+"""Writes the tables of protocol/README.md from the table: `python -m docs.site.protocol_tables`."""
 
 from __future__ import annotations
 

@@ -11,7 +11,17 @@ columns of n-m numbers, which for its robot, m = 1, is the same.
 
 import msgspec
 
-from miro_host.theory.matrices import Matrix, Vector, added, dot, product, solution, solved, times, transposed
+from tests.host.theory.matrices import (
+    Matrix,
+    Vector,
+    added,
+    dot,
+    product,
+    solution,
+    solved,
+    times,
+    transposed,
+)
 
 
 class System(msgspec.Struct, frozen=True):

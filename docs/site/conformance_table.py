@@ -1,4 +1,4 @@
-"""Writes the table of docs/conformance.md from the rules: `python -m mirotwin.verify.conform.document`."""
+"""Writes the table of docs/conformance.md from the rules: `python -m docs.site.conformance_table`."""
 
 from __future__ import annotations
 

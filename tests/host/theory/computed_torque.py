@@ -7,7 +7,7 @@ by a number known beforehand does not follow where the model itself is wrong: wi
 in (10), f = (1 - H^-1 H^) (z_r' + u) + H^-1 tau_d contains u, and so the gain P that is to exceed it.
 """
 
-from miro_host.theory.matrices import Matrix, Vector, added, solution, solved, times
+from tests.host.theory.matrices import Matrix, Vector, added, solution, solved, times
 
 
 def torque(h: Matrix, g: Vector, demanded: Vector) -> Vector:

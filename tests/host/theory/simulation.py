@@ -14,10 +14,10 @@ import msgspec
 from miro_exact.dmath import atan2, sincos
 from miro_host.integrator import Limits, clamp
 from miro_host.posture import Posture
-from miro_host.theory import computed_torque
-from miro_host.theory.assumptions import radius
-from miro_host.theory.matrices import Vector, solution, times
-from miro_host.theory.unicycle import UnicycleBody, cartesian_rates, inertia, polar_rates
+from miro_host.theory import radius
+from tests.host.theory import computed_torque
+from tests.host.theory.matrices import Vector, solution, times
+from tests.host.theory.unicycle import UnicycleBody, cartesian_rates, inertia, polar_rates
 
 Chart = Literal["cartesian", "polar"]
 Torques = Callable[[float], Vector]
