@@ -1,15 +1,19 @@
-"""Random machine states for single-step vectors.
+"""Random machine states for single-step vectors: `python -m tests.vectors.vector_draw --out DIR`, a file an opcode.
 
-The format and the execution are in `vectors.py`. The source of chance is a function given by the caller: `draw(n)`
-returns an integer from 0 to n - 1.
+The same seed writes the same bytes; more vectors per opcode only add to them. The format and the execution are in
+`vectors.py`.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
+from itertools import count
+from pathlib import Path
 
+from miro_exact.rng import Stream
 from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE, disassemble
-from miro_robot.mcs51.vectors import REGISTERS, State, Vector, VectorRunner, table_address
+from tests.vectors.vectors import REGISTERS, State, Vector, VectorRunner, encode, table_address
 
 Draw = Callable[[int], int]
 
@@ -190,3 +194,26 @@ def _name(state: State) -> str:
     size = LENGTH[code[state.pc]]
     raw = " ".join(f"{code[(state.pc + offset) & 0xFFFF]:02x}" for offset in range(size))
     return f"{raw}  {disassemble(bytes(code), state.pc)}"
+
+
+def drawing(stream):
+    """Successive draws from a stream: `draw(n)` is an integer from 0 to n - 1."""
+    drawn = count()
+    return lambda n: stream.u32(next(drawn)) * n >> 32
+
+
+def write(folder, per_opcode=8, seed=1, opcodes=range(256)):
+    """Files `00.json` and so on into `folder`, which is made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for opcode in opcodes:
+        draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
+        (folder / f"{opcode:02x}.json").write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--per-opcode", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    write(asked.out, asked.per_opcode, asked.seed)
