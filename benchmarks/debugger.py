@@ -64,10 +64,9 @@ class Editor:
         source, self.requests = os.pipe()
         self.answers = io.BytesIO()
         wire = Wire(lambda size: os.read(source, size), self.answers)
-        self.adapter = Adapter(wire, lambda given: (debugger, [], "begin"))
+        self.adapter = Adapter(wire)
+        self.adapter.use(debugger)
         self.seq = 0
-        for command in ("initialize", "launch", "configurationDone"):
-            self.ask(command)
 
     def ask(self, command: str, **given: Any) -> None:
         """One request, and all that comes of it."""

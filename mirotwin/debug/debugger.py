@@ -1,30 +1,35 @@
 """What a debugger does with a timeline: breakpoints, steps by line and by instruction, the last writer; both ways.
 
-A step by line stops where the C line of its function becomes another one. A search runs at full speed from mark to
-mark; a frame is told by SP and the static height of the instruction, so calls and interrupts in between cost little.
+A step by line stops where another C line begins. A search runs at full speed from mark to mark; a frame is told by SP
+and the static height of the instruction, so calls and interrupts in between cost little.
 """
 
 from __future__ import annotations
 
 import bisect
 from collections.abc import Callable, Collection
-from typing import Literal
-
-import msgspec
+from typing import Literal, NamedTuple
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.names import SFRS
 from miro_robot.mcs51.opcodes import LENGTH, is_call
-from mirotwin.debug.expression import NoValue, Term, Value, content, expression, number
+from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import Moment, Symbols
-from mirotwin.debug.timeline import Core, Timeline, Trap
+from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
 from mirotwin.rerun.inspected_run import BareRun
 
 How = Literal["into", "over", "out"]
-_SPACES = ("iram", "sfr", "xram", "bit")
+BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
+_STEPS: dict[str, How] = {"step": "into", "stepi": "into", "next": "over", "finish": "out"}
+_BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}
+_COUNTS: dict[str, Callable[[int, int], bool]] = {
+    "": int.__eq__, "=": int.__eq__, "==": int.__eq__, ">": int.__gt__, ">=": int.__ge__, "<": int.__lt__,
+    "<=": int.__le__, "%": lambda index, every: index % every == 0,
+}  # fmt: skip
 
 
 class Breakpoint:
@@ -32,29 +37,34 @@ class Breakpoint:
     `written` is written, and `count` fits how often that was so since the run began.
     """
 
-    def __init__(self, number: int, text: str, addresses: Collection[int] | None) -> None:
+    def __init__(self, number: int, text: str, addresses: Collection[int]) -> None:
         self.number = number
         self.text = text
-        self.addresses = addresses
+        self.addresses = frozenset(addresses)
         self.condition: Term | None = None
         self.written: Bytes | None = None
         self.count: Callable[[int], bool] | None = None
         self.log: Callable[[Moment], str] | None = None
-        self.hits: list[tuple[int, int]] = []  # (cycle, processor) of those that are counted
+        self.hits: list[tuple[int, int]] = []  # (cycle, processor), up to `counted_to`
         self.counted_to = 0
 
-    def index(self, hit: tuple[int, int]) -> int:
-        """How many hits there were with this one."""
-        if not self.hits or hit > self.hits[-1]:
-            self.hits.append(hit)
-        return bisect.bisect_left(self.hits, hit) + 1
+
+class Said(NamedTuple):
+    """What a log says, and where."""
+
+    cycle: int
+    core: int
+    text: str
+    address: int
 
 
-class Written(msgspec.Struct, frozen=True):
-    """An instruction that writes a variable: where it stands at `tick`, and the frames there."""
+class _Line(NamedTuple):
+    """A C line that is under way in the frame at `base`; `entered`: at the first instruction of its function."""
 
-    tick: int
-    frames: list[StackFrame]
+    base: int
+    line: SourceLine | None
+    level: int
+    entered: bool
 
 
 class Debugger:
@@ -68,14 +78,10 @@ class Debugger:
         self.symbols = symbols
         self.everyone = everyone
         self.breakpoints: list[Breakpoint] = []
-        self.told: list[tuple[int, int, str, int]] = []  # (cycle, processor, text, address) of logs
+        self.told: list[Said] = []
         self._numbers = 0
 
     # Where it stands
-
-    @property
-    def core(self) -> Core:
-        return self.timeline.core
 
     @property
     def cpu(self) -> Cpu:
@@ -85,23 +91,14 @@ class Debugger:
         return self.symbols.unwinder.frames(self.cpu)
 
     def moment(self, frame: int = 0) -> Moment:
-        return Moment(self.symbols, self.core, self.frames()[frame] if frame else None, not frame)
-
-    @property
-    def _went(self) -> bool:
-        """Whether it stands behind the start of the run."""
-        return self.timeline.tick > self.timeline.begin_tick
-
-    @property
-    def _base(self) -> int:
-        return self.symbols.unwinder.base(self.cpu)
+        return Moment(self.symbols, self.timeline.core, frame)
 
     # Breakpoints
 
     def add(self, text: str, addresses: Collection[int], condition: str = "", count: str = "") -> Breakpoint:
         """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is not one."""
         self._numbers += 1
-        found = Breakpoint(self._numbers, text, frozenset(addresses))
+        found = Breakpoint(self._numbers, text, addresses)
         found.condition = expression(condition) if condition else None
         found.count = _counting(count) if count else None
         self.breakpoints.append(found)
@@ -112,148 +109,111 @@ class Debugger:
     ) -> Breakpoint:
         """A data breakpoint: before an instruction that writes what `text` means. Raises BadInput."""
         written = self.bytes_of(text, place)
-        found = self.add(text, self._writers(written) or (), condition, count)
-        found.addresses = self._writers(written)
+        found = self.add(text, self._writers(written), condition, count)
         found.written = written
         return found
 
     def bytes_of(self, text: str, place: Value | None = None) -> Bytes:
         """Where `text` lies. Raises NoValue for what lies in no memory that is written."""
         value = place or expression(text)(self.moment())
-        if value.kind is None or value.space not in _SPACES:
+        space, address, size = value.space, value.address, value.kind.size if value.kind else 0
+        if space == "bit":
+            sfr = address >= 0x80
+            space, address = ("sfr", address & 0xF8) if sfr else ("iram", 0x20 + (address >> 3))
+        if not size or space not in ("iram", "sfr", "xram"):
             raise NoValue(
                 f"{text} lies in no memory that can be watched", "name a variable: `print` says what it is"
             )
-        if value.space == "bit":
-            byte = value.address & 0xF8 if value.address >= 0x80 else 0x20 + (value.address >> 3)
-            return Bytes("sfr" if value.address >= 0x80 else "iram", byte, 1)
-        return Bytes(value.space, value.address, value.kind.size)
+        if space == "sfr" and address in _BY_THE_WAY:
+            raise NoValue(f"{text} changes with nearly every instruction", "watch a variable")
+        return Bytes(space, address, size)
 
-    def _writers(self, written: Bytes) -> Collection[int] | None:
-        """Where instructions may write it; None, any, where code lies in RAM."""
-        run = self.timeline.run
+    def _writers(self, written: Bytes) -> Collection[int]:
+        """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""
+        run, unwinder = self.timeline.run, self.symbols.unwinder
         if isinstance(run, BareRun) and run.machine.bus.code_of is not None:
-            return None
-        found = written.writers(self.symbols.image.code, self.symbols.instructions)
-        stack = self.symbols.image.symbols.stack()[0]
-        return (
-            found | self.symbols.unwinder.vectors
-            if written.space == "iram" and written.end > stack
-            else found
-        )
+            return self.timeline.everywhere
+        first, last = self.symbols.image.symbols.stack()
+        on_stack = written.first <= last and written.end > first
+        found = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
+        return found | unwinder.vectors if written.space == "iram" and on_stack else found
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
-        if written.are_written(cpu):
-            return True
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
-        return bool(entered) and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
+        pushed = entered and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
+        return bool(pushed) or written.are_written(cpu)
 
     def _traps(self, step: Trap | None = None, silent: bool = False) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
         table: dict[int, list[Breakpoint]] = {}
-        anywhere = [one for one in self.breakpoints if one.addresses is None]
         for one in self.breakpoints:
-            for address in one.addresses or ():
+            for address in one.addresses:
                 table.setdefault(address, []).append(one)
-        cores = range(len(self.timeline.cores)) if self.everyone else (self.timeline.focus,)
 
         def ask(core: Core) -> object:
-            for one in (*table.get(core.cpu.pc, ()), *anywhere):
-                if self._stops(one, core, silent):
-                    return one
-            if (
-                step is not None
-                and core is self.core
-                and (step.addresses is None or core.cpu.pc in step.addresses)
-            ):
+            place = core.cpu.pc
+            found = next((one for one in table.get(place, ()) if self._stops(one, core, silent)), None)
+            if found is None and step is not None and core is self.timeline.core and place in step.addresses:
                 return step.ask(core)
-            return None
+            return found
 
-        found = {}
-        for at in cores:
-            own = step if at == self.timeline.focus else None
-            every = anywhere or (own is not None and own.addresses is None)
-            addresses = None if every else {*table, *(own.addresses or () if own is not None else ())}
-            if every or addresses:
-                found[at] = Trap(addresses, ask)
-        if step is not None and self.timeline.focus not in found:
-            found[self.timeline.focus] = step
-        return found
+        cores = range(len(self.timeline.cores)) if self.everyone else [self.timeline.focus]
+        traps = {at: Trap(table, ask) for at in cores}
+        if step is not None:
+            traps[self.timeline.focus] = Trap({*table, *step.addresses}, ask)
+        return traps
 
-    def _stops(self, one: Breakpoint, core: Core, silent: bool) -> bool:
+    def _is_met(self, one: Breakpoint, core: Core) -> bool:
         if one.written is not None and not self._writes(one.written, core.cpu):
             return False
-        moment = Moment(self.symbols, core)
-        if one.condition is not None and not _holds(one.condition, moment):
+        return one.condition is None or _holds(one.condition, Moment(self.symbols, core))
+
+    def _stops(self, one: Breakpoint, core: Core, silent: bool) -> bool:
+        if not self._is_met(one, core):
             return False
         at = (core.cpu.cycles, self.timeline.cores.index(core))
-        if one.count is not None and not one.count(one.index(at)):
-            return False
-        if one.log is None:
-            return True
-        if not silent:
-            self.told.append((*at, one.log(moment), core.cpu.pc))
-        return False
+        if one.count is not None:
+            if not one.hits or at > one.hits[-1]:
+                one.hits.append(at)
+            if not one.count(bisect.bisect_left(one.hits, at) + 1):
+                return False
+        if one.log is not None and not silent:
+            self.told.append(Said(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
+        return one.log is None
 
-    def _count_up(self) -> None:
+    def _count_hits(self) -> None:
         """Counts the hits from the start of the run up to now, where a breakpoint asks for their number."""
-        behind = [
-            one for one in self.breakpoints if one.count is not None and one.counted_to < self.timeline.tick
-        ]
-        if behind:
-            here, focus = self.timeline.tick, self.timeline.focus
-            every, self.breakpoints = self.breakpoints, behind
-            counts = [one.count for one in behind]
-            for one in behind:
-                one.count = lambda index: False
-            self.timeline.go_to(min(one.counted_to for one in behind))
-            self.timeline.find(self._traps(silent=True), here)
-            for one, count in zip(behind, counts, strict=True):
-                one.count, one.counted_to = count, here
-            self.breakpoints = every
-            self.timeline.focus = focus
-            self.timeline.go_to(here)
+        for one in self.breakpoints:
+            if one.count is not None and one.counted_to < self.timeline.tick:
+                ask = Trap(one.addresses, lambda core, one=one: self._is_met(one, core) or None)  # type: ignore[misc]
+                with self.timeline.staying():
+                    hits = self.timeline.hits_back(dict.fromkeys(self._traps(), ask))
+                    one.hits = [hit[:2] for hit in hits][::-1]
+                one.counted_to = self.timeline.tick
 
     # Moving
 
+    def move(self, verb: str, by_instruction: bool = False) -> str:
+        """`continue`, `step`, `next`, `finish` or `stepi`; with an `r` before it backwards. Raises BadInput."""
+        back, name = verb[0] == "r", verb.removeprefix("r")
+        if name == "continue":
+            return self.go_on(back)
+        return self.step(_STEPS[name], back, by_instruction or name == "stepi")
+
     def go_on(self, back: bool = False) -> str:
         """To the next breakpoint, or the one before."""
-        self._count_up()
-        return self._back({}) if back else self._forward(None)
+        return self._back() if back else self._forward()
 
     def go_to(self, tick: int) -> str:
-        """To a tick, or as near as the processor comes to it behind it. A long way can be interrupted."""
-        if tick > self.timeline.frontier:
-            self.timeline.go_to(min(tick, self.timeline.frontier))
-            self.timeline.find({}, tick)
-        self.timeline.go_to(tick) if not self.timeline.run.over else None
+        """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
+        timeline = self.timeline
+        if tick > timeline.frontier:
+            timeline.go_to(timeline.frontier)
+            timeline.find({}, tick)
+        if not timeline.run.over:
+            timeline.go_to(tick)
         return self._at_end() or "goto"
-
-    def _forward(self, step: Trap | None) -> str:
-        self.told.clear()
-        hit = self.timeline.find(self._traps(step))
-        if hit is not None:
-            self.told = [one for one in self.told if one[:2] <= hit[:2]]
-            return self._named(hit.found)
-        return self._at_end() or "interrupted"
-
-    def _back(self, traps: dict[int, Trap]) -> str:
-        hit = self.timeline.find_back(traps or self._traps(silent=True))
-        if hit is not None:
-            return self._named(hit.found)
-        return "interrupted" if self._went else "the run begins here"
-
-    def _named(self, found: object) -> str:
-        return f"breakpoint {found.number}" if isinstance(found, Breakpoint) else "step"
-
-    def _at_end(self) -> str:
-        if not self.timeline.run.over:
-            return ""
-        faults = [core.board.faults[-1] for core in self.timeline.cores if core.board and core.board.faults]
-        if isinstance(self.timeline.run, BareRun):
-            faults = self.timeline.run.machine.faults[-1:]
-        return f"firmware fault: {faults[-1]}" if faults else "the run ends here"
 
     def step(self, how: How, back: bool = False, by_instruction: bool = False) -> str:
         """One line, or one instruction where it asks for that or no line is known. Raises BadInput."""
@@ -263,28 +223,53 @@ class Debugger:
             return self._instruction_back(how) if back else self._instruction(how)
         return self._line_back(how) if back else self._line(how)
 
+    def _forward(self, step: Trap | None = None) -> str:
+        self.told.clear()
+        self._count_hits()
+        hit = self.timeline.find(self._traps(step))
+        for one in self.breakpoints:
+            one.counted_to = max(one.counted_to, self.timeline.tick)
+        if hit is None:
+            return self._at_end() or INTERRUPTED
+        self.told = [one for one in self.told if one[:2] <= hit[:2]]
+        return _named(hit)
+
+    def _back(self) -> str:
+        self._count_hits()
+        hit = self.timeline.find_back(self._traps(silent=True))
+        return self._at_begin() if hit is None else _named(hit)
+
+    def _at_begin(self) -> str:
+        return INTERRUPTED if self.timeline.tick > self.timeline.begin_tick else BEGINS
+
+    def _at_end(self) -> str:
+        if not self.timeline.run.over:
+            return ""
+        faults = [core.board.faults[-1] for core in self.timeline.cores if core.board and core.board.faults]
+        if isinstance(self.timeline.run, BareRun):
+            faults = self.timeline.run.machine.faults[-1:]
+        return f"firmware fault: {faults[-1]}" if faults else "the run ends here"
+
     # By instruction
 
     def _instruction(self, how: How) -> str:
         cpu, pc, sp = self.cpu, self.cpu.pc, self.cpu.sp
         if how == "over" and is_call(cpu.code_at(pc)):
-            behind = (pc + LENGTH[cpu.code_at(pc)]) & 0xFFFF
-            return self._forward(Trap({behind}, lambda core: core.cpu.sp == sp or None))
+            after = (pc + LENGTH[cpu.code_at(pc)]) & 0xFFFF
+            return self._forward(Trap({after}, lambda core: core.cpu.sp == sp or None))
         self.timeline.step()
-        return self._at_end() or "step"
+        return self._at_end() or STEPPED
 
     def _instruction_back(self, how: How) -> str:
-        base = self._base
-        while True:
-            if not self.timeline.step_back():
-                return "the run begins here"
+        base = self.symbols.unwinder.base(self.cpu)
+        while self.timeline.step_back():
             frames = self.frames()
-            if how != "over" or self._base <= base or len(frames) < 2:
-                return "step"
-            by_interrupt = frames[0].by_interrupt
+            if how != "over" or frames[0].base <= base or len(frames) < 2:
+                return STEPPED
             self._out_back()
-            if not by_interrupt:
-                return "step"
+            if not frames[0].by_interrupt:
+                return STEPPED
+        return BEGINS
 
     # Out of a function
 
@@ -302,144 +287,75 @@ class Debugger:
     def _out_back(self) -> str:
         """To the call, or to where the interrupt came."""
         inner, _ = self._caller()
-        hit = None
         if self.cpu.pc != inner.entry or self.cpu.sp != inner.base:
             entered = Trap({inner.entry}, lambda core: core.cpu.sp == inner.base or None)
-            hit = self.timeline.find_back({self.timeline.focus: entered}, closely=True)
-            if hit is None:
-                return "the run begins here"
+            if self.timeline.find_back({self.timeline.focus: entered}, closely=True) is None:
+                return self._at_begin()
         self.timeline.step_back()
-        return "step"
+        return STEPPED
 
     # By line
 
-    def _line_is(self, core: Core) -> SourceLine | None:
-        return self.symbols.line(core.cpu.pc)
-
-    def _in_frame(self, base: int, wanted: Callable[[SourceLine | None], bool], entry: int = -1) -> Trap:
-        """Where a line of this function begins that is `wanted`, in the frame at `base`; and where the frame began."""
-        first, end = self.symbols.around(self.cpu.pc)
-        starts = {address for address in self.symbols.starts if first <= address < end} | ({entry} - {-1})
-
-        def ask(core: Core) -> object:
-            there = self.symbols.unwinder.base(core.cpu) == base
-            return (there and (core.cpu.pc == entry or wanted(self._line_is(core)))) or None
-
-        return Trap(starts, ask)
+    def _line_of(self, cpu: Cpu) -> _Line:
+        entry = self.symbols.entry(cpu.pc)
+        level = cpu.peripherals.interrupts.in_service
+        return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, cpu.pc == entry)
 
     def _line(self, how: How) -> str:
-        """On to where another line begins, of this function, of one that it calls (`into`), or of its caller."""
-        frames, base, line = self.frames(), self._base, self._line_is(self.core)
-        back = frames[1].pc if len(frames) > 1 else -1
-        level = self.cpu.peripherals.interrupts.in_service
-        own = self._in_frame(base, lambda there: there != line)
-        starts = (
-            frozenset(self.symbols.starts)
-            if how == "into" or not frames[0].known
-            else own.addresses or frozenset()
-        )
+        """On to where another line begins, of this function, of its caller, or (`into`) of one that it calls."""
+        here = self._line_of(self.cpu)
+        without_lines = [frame.pc for frame in self.frames()[1:] if self.symbols.line(frame.pc) is None]
 
         def ask(core: Core) -> object:
-            cpu = core.cpu
-            if cpu.pc == back and cpu.sp == base - 2:
-                return "returned"
-            if own.ask(core):
-                return "line"
-            if how != "into":
-                return (
-                    ("line" if not frames[0].known and cpu.sp <= base else None) if cpu.pc in starts else None
-                )
-            deeper = cpu.pc in starts and self.symbols.unwinder.base(cpu) != base
-            return "line" if deeper and cpu.peripherals.interrupts.in_service == level else None
+            there = self._line_of(core.cpu)
+            if there.base > here.base and (how == "over" or there.level != here.level):
+                return None
+            return there if there[:2] != here[:2] else None
 
-        said = self._forward_found(Trap(starts | ({back} - {-1}), ask))
-        if said != "returned":
-            return said
-        if self.cpu.pc in self.symbols.starts or self.symbols.line(self.cpu.pc) is None:
-            return "step"
-        return self._forward(self._in_frame(self._base, lambda there: True))
-
-    def _forward_found(self, step: Trap) -> str:
-        self.told.clear()
-        hit = self.timeline.find(self._traps(step))
-        if hit is None:
-            return self._at_end() or "interrupted"
-        return "returned" if hit.found == "returned" else self._named(hit.found)
+        return self._forward(Trap({*self.symbols.line_begins, *without_lines}, ask))
 
     def _line_back(self, how: How) -> str:
-        """Back to where a line began: this one if some of it was executed, else the one before."""
-        timeline, line, inside = (
-            self.timeline,
-            self._line_is(self.core),
-            self.cpu.pc not in self.symbols.starts,
-        )
-        frame = self.frames()[0]
-        if how == "into":
-            found = self._any_line_back(frame.base, None if inside else line)
-        elif self.cpu.pc == frame.entry and frame.known and not frame.by_interrupt and frame.entry:
-            self._out_back()
-            found = "line"
-        elif inside:
-            found = "line"
-        else:
-            trap = self._in_frame(frame.base, lambda there: there != line, frame.entry)
-            hit = timeline.find_back({timeline.focus: trap}, closely=True)
-            found = "line" if hit is not None else "begin"
-            if hit is not None and self._line_is(self.core) is None:  # a vector: where the interrupt came
-                timeline.step_back()
-                return "step"
-        if found != "line":
-            return "the run begins here" if found == "begin" else "step"
-        self._begin_of_line()
-        return "step" if self._went else "the run begins here"
+        """Back to where a line began: this one if some of it was executed, else the one before.
 
-    def _any_line_back(self, base: int, line: SourceLine | None) -> str:
-        """The last line begun, of any function at the same level of interrupt; of a routine, where it was called."""
-        level = self.cpu.peripherals.interrupts.in_service
-        vectors = self.symbols.unwinder.vectors
-
-        def ask(core: Core) -> object:
-            cpu = core.cpu
-            if cpu.peripherals.interrupts.in_service != level:
-                return None
-            if cpu.pc in vectors:
-                return "vector"
-            same = self.symbols.unwinder.base(cpu) == base and self._line_is(core) == line
-            return None if same else "line"
-
-        starts = {*self.symbols.starts, *(vectors if level else ())}
-        hit = self.timeline.find_back({self.timeline.focus: Trap(starts, ask)}, closely=True)
-        if hit is not None and hit.found == "vector":
-            self.timeline.step_back()
-        return "begin" if hit is None else str(hit.found)
-
-    def _begin_of_line(self) -> None:
-        """To where the line began that is under way: after the last other line of this frame, or its entry."""
-        timeline, frame, line = self.timeline, self.frames()[0], self._line_is(self.core)
-        if self.cpu.pc == frame.entry:
-            return
-        other = self._in_frame(frame.base, lambda there: there != line, frame.entry)
-        own = self._in_frame(frame.base, lambda there: there == line)
-        hit = timeline.find_back({timeline.focus: other}, closely=True)
-        if hit is not None and self._line_is(self.core) != line:
-            timeline.find({timeline.focus: own})
+        Going back past the entry of a function leaves it: from there on only its callers are looked at.
+        """
+        trap = Trap(self.symbols.line_begins, lambda core: self._line_of(core.cpu))
+        here = self._line_of(self.cpu)
+        outermost = here.base - here.entered
+        begin: Hit | None = None
+        line: _Line | None = None
+        for hit in self.timeline.hits_back({self.timeline.focus: trap}, closely=True):
+            there = hit.found
+            assert isinstance(there, _Line)
+            if there.base > outermost and (how == "over" or there.level != here.level):
+                continue
+            if line is not None and there[:2] != line[:2]:
+                break
+            begin, line = hit, there
+            if there.entered:
+                break
+            outermost = min(outermost, there.base)
+        if begin is None:
+            return self._at_begin()
+        self.timeline.land(begin)
+        return STEPPED
 
     # The last writer
 
-    def last_writer(self, written: Bytes) -> Written | None:
-        """Of bytes, before this moment; it stays where it is."""
-        here, focus = self.timeline.tick, self.timeline.focus
+    def last_writer(self, written: Bytes) -> tuple[int, list[StackFrame]] | None:
+        """(tick, frames) before the instruction that wrote some bytes last; it stays where it is."""
         trap = Trap(self._writers(written), lambda core: self._writes(written, core.cpu) or None)
-        hit = self.timeline.find_back({focus: trap})
-        if hit is not None and not written.are_written(self.cpu):
-            self.timeline.step_back()  # the hardware's call of a routine wrote it
-        found = None if hit is None else Written(self.timeline.tick, self.frames())
-        interrupted = hit is None and self._went
-        self.timeline.focus = focus
-        self.timeline.go_to(here)
-        if interrupted:
-            raise BadInput("", "who", "was interrupted before a writer was found")
-        return found
+        with self.timeline.staying():
+            hit = self.timeline.find_back({self.timeline.focus: trap})
+            if hit is None and self._at_begin() == INTERRUPTED:
+                raise BadInput("", "who", "was interrupted before a writer was found")
+            if hit is not None and not written.are_written(self.cpu):
+                self.timeline.step_back()  # the hardware's call of a routine wrote it
+            return None if hit is None else (self.timeline.tick, self.frames())
+
+
+def _named(hit: Hit) -> str:
+    return f"breakpoint {hit.found.number}" if isinstance(hit.found, Breakpoint) else STEPPED
 
 
 def _holds(condition: Term, moment: Moment) -> bool:
@@ -452,17 +368,8 @@ def _holds(condition: Term, moment: Moment) -> bool:
 
 def _counting(text: str) -> Callable[[int], bool]:
     """`5`: the fifth; `>= 5`: from it on; `% 5`: every fifth. Raises BadInput."""
-    sign, digits = text.strip()[: -len(text.strip().lstrip("<>=% "))].strip(), text.strip().lstrip("<>=% ")
-    rules: dict[str, Callable[[int, int], bool]] = {
-        "": int.__eq__, "=": int.__eq__, "==": int.__eq__, ">": int.__gt__, ">=": int.__ge__, "<": int.__lt__,
-        "<=": int.__le__, "%": lambda index, every: index % every == 0,
-    }  # fmt: skip
-    if sign not in rules or not digits.isdecimal() or not int(digits[:9]) > 0:
+    digits = text.strip().lstrip("<>=% ")
+    sign = text.strip().removesuffix(digits).strip()
+    if sign not in _COUNTS or not digits.isdecimal() or not int(digits[:9]) > 0:
         raise BadInput("", text, "is no count of hits", "give 5, >= 5 or % 5")
-    rule, wanted = rules[sign], int(digits[:9])
-    return lambda index: rule(index, wanted)
-
-
-def shown(term: Term, moment: Moment) -> object:
-    """The value of an expression. Raises NoValue."""
-    return content(term(moment), moment)
+    return lambda index: _COUNTS[sign](index, int(digits[:9]))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any, Protocol
 
 import msgspec
@@ -18,19 +19,13 @@ import msgspec
 from miro_exact.bad_input import BadInput, shortened
 from miro_robot.image.c_types import CType, Fields, value_of
 
-_TOKEN = re.compile(
-    r"\s*(?:(0[xX][0-9a-fA-F]+|[0-9]+)|(\w+:)?([A-Za-z_]\w*)|('(?:\\.|[^'\\])')|"
-    r"(->|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^~!<>().\[\]]))"
-)
-_LEVELS: tuple[tuple[str, ...], ...] = (
-    ("||",), ("&&",), ("|",), ("^",), ("&",), ("==", "!="), ("<", "<=", ">", ">="), ("<<", ">>"), ("+", "-"),
-    ("*", "/", "%"),
-)  # fmt: skip
-_MOST_DEEP, _MOST_SHIFT = 64, 64
+_TOKEN = re.compile(r"(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
+_MOST_TOKENS, _MOST_SHIFT = 128, 64
+_LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
+_RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
 _ESCAPES = {"n": 10, "r": 13, "t": 9, "0": 0}
 MEMORY_OF_POINTER = {"DC": "code", "DX": "xram", "DP": "xram", "DD": "iram", "DI": "iram"}
 _GENERIC = {0x00: "xram", 0x40: "iram", 0x60: "xram", 0x80: "code"}
-_BYTE = CType("int", 1)
 
 
 class NoValue(BadInput):
@@ -73,22 +68,21 @@ def expression(text: str) -> Term:
     reader = _Reader(text)
     term = reader.binary(0)
     if reader.token:
-        raise NoValue(f"{shortened(repr(text))} cannot be read from {shortened(repr(reader.token))} on")
+        raise reader.refused(f"cannot be read from {reader.token!r} on")
     return term
 
 
 def content(value: Value, scope: Scope) -> Any:
-    """What it holds: int, float, bool, list, dict. Raises NoValue for a group."""
+    """What it holds: int, float, bool, list, dict."""
     if value.members is not None:
         return {name: content(get(), scope) for name, get in value.members.items()}
     if value.kind is None or value.number is not None:
         return value.number
-    data = scope.read(value.space, value.address, value.kind.size)
-    return value_of(value.kind, data, value.fields)
+    return value_of(value.kind, scope.read(value.space, value.address, value.kind.size), value.fields)
 
 
 def number(value: Value, scope: Scope) -> Any:
-    """The same of a single number; an array is its address."""
+    """The same of a single number; an array is its address. Raises NoValue."""
     if value.kind is not None and value.kind.kind == "array" and value.number is None:
         return value.address
     found = content(value, scope)
@@ -99,46 +93,41 @@ def number(value: Value, scope: Scope) -> Any:
 
 def children(value: Value) -> list[tuple[str, Value]]:
     """Members and elements by name, empty for a single number."""
-    kind = value.kind
     if value.members is not None:
         return [(name, get()) for name, get in value.members.items()]
-    if kind is not None and kind.kind == "array":
-        return [(f"[{at}]", _element(value, at)) for at in range(kind.count)]
-    if kind is not None and kind.kind == "struct":
-        return [(field.name, member(value, field.name)) for field in value.fields.get(kind.tag, ())]
-    return []
+    if value.kind is not None and value.kind.kind == "array":
+        return [(f"[{at}]", _element(value, at)) for at in range(value.kind.count)]
+    fields = value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
+    return [(field.name, _member(value, field.name)) for field in fields]
 
 
-def member(value: Value, name: str) -> Value:
-    """A member of a struct or of a group, or a bit of a byte. Raises NoValue."""
-    if value.members is not None:
-        if name in value.members:
-            return value.members[name]()
-        raise NoValue(f"has no member {name}", f"it has {', '.join(value.members)}")
-    kind = value.kind
-    for field in value.fields.get(kind.tag, ()) if kind is not None and kind.kind == "struct" else ():
+def _member(value: Value, name: str) -> Value:
+    if value.members is not None and name in value.members:
+        return value.members[name]()
+    fields = value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
+    for field in fields:
         if field.name == name:
             return msgspec.structs.replace(value, kind=field.type, address=value.address + field.offset)
-    raise NoValue(f"has no member {name}")
+    there = [*(value.members or ()), *(field.name for field in fields)]
+    raise NoValue(f"has no member {name}", f"it has {', '.join(there)}" if there else "")
 
 
 def _element(value: Value, index: int) -> Value:
     kind = value.kind
-    if kind is None or kind.kind != "array" or kind.element is None:
+    if kind is None or kind.element is None or kind.kind != "array":
         raise NoValue("is no array")
     if not 0 <= index < kind.count:
         raise NoValue(f"[{index}] is outside of {kind}", f"give 0 to {kind.count - 1}")
     part = None if value.number is None else value.number[index]
-    place = value.address + index * kind.element.size
-    return msgspec.structs.replace(value, kind=kind.element, address=place, number=part)
+    address = value.address + index * kind.element.size
+    return msgspec.structs.replace(value, kind=kind.element, address=address, number=part)
 
 
-def _pointed(value: Value, scope: Scope) -> Value:
+def _pointed(value: Value, scope: Scope, index: int = 0) -> Value:
+    """What a pointer points to, or so many elements after it; of an array its element."""
     kind = value.kind
-    if kind is not None and kind.kind == "array":
-        return _element(value, 0)
     if kind is None or kind.kind != "pointer":
-        raise NoValue("is no pointer", "name a memory: iram[0x30], xram[..], code[..]")
+        return _element(value, index)
     address = number(value, scope)
     space = MEMORY_OF_POINTER.get(kind.tag) or _GENERIC.get(address >> 16, "")
     element = kind.element
@@ -149,7 +138,7 @@ def _pointed(value: Value, scope: Scope) -> Value:
         raise NoValue(
             f"points to {address:#x}, and no debug file says to what", "name a memory: iram[..], xram[..]"
         )
-    return Value(element, space, address & 0xFFFF, fields=value.fields)
+    return Value(element, space, (address & 0xFFFF) + index * element.size, fields=value.fields)
 
 
 def _divided(left: Any, right: Any) -> Any:
@@ -160,20 +149,20 @@ def _divided(left: Any, right: Any) -> Any:
     return abs(left) // abs(right) * (1 if (left < 0) == (right < 0) else -1)
 
 
-def _shifted(left: int, right: int, way: Callable[[int, int], int]) -> int:
+def _shifted(way: Callable[[int, int], int], left: int, right: int) -> int:
     if not 0 <= right <= _MOST_SHIFT:
         raise NoValue(f"a shift by {right}")
     return way(left, right)
 
 
-_OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+_OPERATORS: dict[str, Callable[..., Any]] = {
     "|": operator.or_, "^": operator.xor, "&": operator.and_, "==": operator.eq, "!=": operator.ne,
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
-    "<<": lambda a, b: _shifted(a, b, operator.lshift), ">>": lambda a, b: _shifted(a, b, operator.rshift),
+    "<<": lambda a, b: _shifted(operator.lshift, a, b), ">>": lambda a, b: _shifted(operator.rshift, a, b),
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": _divided,
     "%": lambda a, b: a - b * _divided(a, b),
 }  # fmt: skip
-_SIGNS: dict[str, Callable[[Any], Any]] = {
+_SIGNS: dict[str, Callable[..., Any]] = {
     "-": operator.neg,
     "~": operator.invert,
     "!": operator.not_,
@@ -181,129 +170,27 @@ _SIGNS: dict[str, Callable[[Any], Any]] = {
 }
 
 
-class _Reader:
-    """Reads one expression, token by token."""
+def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
+    """An operator's value of those of its operands."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.at = self.depth = 0
-        self.next()
-
-    def next(self) -> str:
-        """Takes the token that is next, and looks at the one after it."""
-        taken = getattr(self, "token", "")
-        found = _TOKEN.match(self.text, self.at)
-        if found is None and self.text[self.at :].strip():
-            raise NoValue(
-                f"{shortened(repr(self.text))} cannot be read from {shortened(repr(self.text[self.at :]))} on"
-            )
-        self.token = found[0].strip() if found else ""
-        self.parts = found.groups() if found else (None,) * 5
-        self.at = found.end() if found else len(self.text)
-        return taken
-
-    def expect(self, wanted: str) -> None:
-        if self.token != wanted:
-            raise NoValue(f"{shortened(repr(self.text))} lacks a {wanted}")
-        self.next()
-
-    def binary(self, level: int) -> Term:
-        if level == len(_LEVELS):
-            return self.unary()
-        left = self.binary(level + 1)
-        while self.token in _LEVELS[level]:
-            left = _combined(self.next(), left, self.binary(level + 1))
-        return left
-
-    def unary(self) -> Term:
-        self.depth += 1
-        if self.depth > _MOST_DEEP:
-            raise NoValue(f"{shortened(repr(self.text))} is nested too deeply")
-        if self.token in (*_SIGNS, "*", "&"):
-            sign = self.next()
-            term = _signed(sign, self.unary())
-        else:
-            term = self.postfix(self.primary())
-        self.depth -= 1
-        return term
-
-    def postfix(self, term: Term) -> Term:
-        while self.token in (".", "->", "["):
-            how = self.next()
-            if how == "[":
-                term = _indexed(term, self.binary(0))
-                self.expect("]")
-            else:
-                term = _member_of(term, self.next(), how == "->")
-        return term
-
-    def primary(self) -> Term:
-        digits, module, name, character, _ = self.parts
-        if self.token == "(":
-            self.next()
-            term = self.binary(0)
-            self.expect(")")
-            return term
-        if digits is None and name is None and character is None:
-            raise NoValue(
-                f"{shortened(repr(self.text))} lacks a name or a number"
-                + (f" before {self.token}" if self.token else "")
-            )
-        self.next()
-        if name is not None:
-            where = (module or "").removesuffix(":")
-            return lambda scope: scope.find(name, where)
-        if digits is not None:
-            constant = Value(number=int(digits, 16 if digits[:2].lower() == "0x" else 10))
-        else:
-            assert character is not None
-            constant = Value(
-                number=_ESCAPES.get(character[2], ord(character[2]))
-                if "\\" in character
-                else ord(character[1])
-            )
-        return lambda scope: constant
-
-
-def _combined(how: str, left: Term, right: Term) -> Term:
-    if how in ("&&", "||"):
-        stops = how == "||"
-
-        def both(scope: Scope) -> Value:
-            if bool(number(left(scope), scope)) == stops:
-                return Value(number=int(stops))
-            return Value(number=int(bool(number(right(scope), scope))))
-
-        return both
-    apply = _OPERATORS[how]
-
-    def combined(scope: Scope) -> Value:
+    def applied(scope: Scope) -> Value:
         try:
-            return Value(number=_plain(apply(number(left(scope), scope), number(right(scope), scope))))
-        except TypeError:
-            raise NoValue(f"{how} is for whole numbers") from None
-
-    return combined
-
-
-def _signed(sign: str, term: Term) -> Term:
-    if sign == "*":
-        return lambda scope: _pointed(term(scope), scope)
-    if sign == "&":
-        return lambda scope: _address(term(scope))
-    apply = _SIGNS[sign]
-
-    def signed(scope: Scope) -> Value:
-        try:
-            return Value(number=_plain(apply(number(term(scope), scope))))
+            found = apply(*(number(term(scope), scope) for term in terms))
         except TypeError:
             raise NoValue(f"{sign} is for whole numbers") from None
+        return Value(number=int(found) if isinstance(found, bool) else found)
 
-    return signed
+    return applied
 
 
-def _plain(found: Any) -> Any:
-    return int(found) if isinstance(found, bool) else found
+def _either(stops: bool, left: Term, right: Term) -> Term:
+    """`||` (stops where the left side is true) and `&&`."""
+
+    def either(scope: Scope) -> Value:
+        found = bool(number(left(scope), scope))
+        return Value(number=int(found if found == stops else bool(number(right(scope), scope))))
+
+    return either
 
 
 def _address(value: Value) -> Value:
@@ -312,31 +199,106 @@ def _address(value: Value) -> Value:
     return Value(number=value.address, note=f"in {value.space}")
 
 
-def _indexed(term: Term, index: Term) -> Term:
-    def indexed(scope: Scope) -> Value:
-        value, at = term(scope), number(index(scope), scope)
-        if value.kind is not None and value.kind.kind == "pointer":
-            first = _pointed(value, scope)
-            assert first.kind is not None
-            return msgspec.structs.replace(first, address=first.address + at * first.kind.size)
-        return _element(value, at)
+def _member_or_bit(value: Value, name: str, scope: Scope) -> Value:
+    if not name.isdecimal():
+        return _member(value, name)
+    bits = number(value, scope)
+    if not isinstance(bits, int) or int(name) > 31:
+        raise NoValue(f"has no bit {name}")
+    return Value(number=bits >> int(name) & 1)
 
-    return indexed
+
+class _Reader:
+    """Reads one expression, token by token."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens = _TOKEN.findall(text)
+        if len(self.tokens) > _MOST_TOKENS:
+            raise self.refused("is too long")
+
+    def refused(self, what: str) -> NoValue:
+        return NoValue(f"{shortened(repr(self.text))} {what}")
+
+    @property
+    def token(self) -> str:
+        """The next one, "" at the end."""
+        return self.tokens[0] if self.tokens else ""
+
+    def take(self) -> str:
+        taken = self.token
+        del self.tokens[:1]
+        return taken
+
+    def expect(self, wanted: str) -> None:
+        if self.take() != wanted:
+            raise self.refused(f"lacks a {wanted}")
+
+    def binary(self, rank: int) -> Term:
+        left = self.unary()
+        while _RANKS.get(self.token, -1) >= rank:
+            sign = self.take()
+            right = self.binary(_RANKS[sign] + 1)
+            if sign in ("||", "&&"):
+                left = _either(sign == "||", left, right)
+            else:
+                left = _applied(_OPERATORS[sign], sign, left, right)
+        return left
+
+    def unary(self) -> Term:
+        sign = self.token
+        if sign not in (*_SIGNS, "*", "&"):
+            return self.postfix(self.primary())
+        self.take()
+        term = self.unary()
+        if sign == "*":
+            return lambda scope: _pointed(term(scope), scope)
+        if sign == "&":
+            return lambda scope: _address(term(scope))
+        return _applied(_SIGNS[sign], sign, term)
+
+    def postfix(self, term: Term) -> Term:
+        while self.token in (".", "->", "["):
+            how = self.take()
+            if how == "[":
+                term = _indexed(term, self.binary(0))
+                self.expect("]")
+            else:
+                term = _member_of(term, self.take(), how == "->")
+        return term
+
+    def primary(self) -> Term:
+        token = self.take()
+        if token == "(":
+            term = self.binary(0)
+            self.expect(")")
+            return term
+        with suppress(ValueError):
+            return _constant(int(token, 16 if token[:2].lower() == "0x" else 10))
+        if len(token) > 2 and token[0] == "'":
+            return _constant(_ESCAPES.get(token[2], ord(token[2])) if token[1] == "\\" else ord(token[1]))
+        module, _, name = token.rpartition(":")
+        if not name.isidentifier():
+            raise self.refused(f"lacks a name or a number{f' before {token}' if token else ''}")
+        return lambda scope: scope.find(name, module)
+
+
+def _constant(found: int) -> Term:
+    return lambda scope: Value(number=found)
+
+
+def _indexed(term: Term, index: Term) -> Term:
+    return lambda scope: _pointed(term(scope), scope, number(index(scope), scope))
 
 
 def _member_of(term: Term, name: str, through: bool) -> Term:
     def found(scope: Scope) -> Value:
         value = term(scope)
-        if name.isdecimal():
-            bits = number(value, scope)
-            if not isinstance(bits, int) or int(name) > 31:
-                raise NoValue(f"has no bit {name}")
-            return Value(number=bits >> int(name) & 1)
-        return member(_pointed(value, scope) if through else value, name)
+        return _member_or_bit(_pointed(value, scope) if through else value, name, scope)
 
     return found
 
 
 def memory(space: str, size: int) -> Value:
     """A whole memory, as an array of bytes."""
-    return Value(CType("array", size, element=_BYTE, count=size), space)
+    return Value(CType("array", size, element=CType("int", 1), count=size), space)

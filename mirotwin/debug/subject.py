@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import click
 import msgspec
@@ -12,19 +12,19 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
-from miro_robot.firmware import source_folder
+from miro_robot.image import Image
+from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.firmware.coverage_files import SourceFolders, checked_sources, with_debug_files
+from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run
-from mirotwin.replay.firmwares import LinesFrom, load_images
+from mirotwin.replay.firmwares import LinesFrom, debugged_image, load_images
 from mirotwin.rerun.inspected_run import BareRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
-from mirotwin.shell.command import Argument
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.options import AT, RESUME, choose_engine
 from mirotwin.shell.outputs import RECORDINGS, file_in
-from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.times import Time
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
@@ -41,32 +41,28 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
-class Session(NamedTuple):
+class Session(msgspec.Struct):
     """`said`: what there is to know before anything is asked; `why`: why it stands where it does."""
 
-    timeline: Timeline
-    symbols: Symbols
+    debugger: Debugger
     said: list[str]
     why: str
 
 
-def launched(options: DebugSubject, given: dict[str, Any]) -> DebugSubject:
-    """The options with what an editor's launch configuration says: their names, `at` as text. Raises BadInput."""
-    known = {_key(name): name for name in DebugSubject.__struct_fields__ if name != "bare"}
-    found = {known[key]: value for key, value in given.items() if key in known and value is not None}
+def launched(given: Mapping[str, Any]) -> DebugSubject:
+    """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput."""
+    words: list[str] = []
+    names = {_key(name): name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject")}
+    for key in names.keys() & {key for key, value in given.items() if value is not None}:
+        option = f"--{'set' if key == 'set' else names[key].replace('_', '-')}"
+        values = given[key] if isinstance(given[key], list) else [given[key]]
+        words += [word for value in values for word in (option, f"{value}")]
+    command: Any = command_of(DebugSubject)(lambda options: options)  # type: ignore[arg-type, return-value]
     try:
-        if "at" in found:
-            found["at"] = TimeType().convert(found["at"], None, None)
-        types = {one.name: one.type for one in msgspec.structs.fields(DebugSubject)}
-        found = {
-            name: value if name == "at" else msgspec.convert(value, types[name])
-            for name, value in found.items()
-        }
+        found: DebugSubject = command.main([*words, "--", given.get("subject") or ""], standalone_mode=False)
     except click.UsageError as error:
-        raise BadInput("", "launch", error.message) from None
-    except msgspec.ValidationError as error:
-        raise BadInput("", "launch", str(error), f"its keys are {', '.join(known)}") from None
-    return msgspec.structs.replace(options, **found)
+        raise BadInput("", "launch", error.format_message(), f"its keys are {', '.join(names)}") from None
+    return found
 
 
 def _key(name: str) -> str:
@@ -75,46 +71,42 @@ def _key(name: str) -> str:
     return first + "".join(one.capitalize() for one in others)
 
 
-def open_subject(options: DebugSubject) -> Session:
-    """Raises BadInput."""
-    if not options.subject:
+def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
+    """Stands at the start, at `--at`, or at the failed check of a case. Raises BadInput."""
+    subject = options.subject
+    if not subject:
         raise BadInput("", "subject", "is missing", "name a scenario, an image, a recording or a case")
-    subject = (
-        file_in(options.subject, (*RECORDINGS, *CASES)) if os.path.isdir(options.subject) else options.subject
-    )
-    options = msgspec.structs.replace(options, subject=subject)
+    if os.path.isdir(subject):
+        subject = file_in(subject, (*RECORDINGS, *CASES))
+        options = msgspec.structs.replace(options, subject=subject)
     case = _case(options)
     run = open_run(options) if case is None else _run_of(*case, options)
     assert isinstance(run, RobotRun | BareRun)
     if options.resume is not None:
         _resume(run, options.resume)
-    known = next(iter(load_images(options.lines_from, run.image)), None) or with_debug_files(run.image)
-    folder = source_folder()
-    own = [folder] if folder is not None and load_firmware(named=False).sha256 == run.image.sha256 else []
-    symbols = Symbols(known, [*map(Path, checked_sources(options.sources)), *own])
-    said = [] if symbols.image.symbols.names else [_nameless(known.path)]
+    image, folders = debugged_image(
+        run.image, load_images(options.lines_from, run.image), checked_sources(options.sources)
+    )
+    symbols = Symbols(image, folders)
     timeline = Timeline(run)
-    why = "begin"
+    session = Session(Debugger(timeline, symbols, everyone), [], "begin")
+    if not image.symbols.names:
+        session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
     if case is not None:
+        session.why = "case"
         verdict, failure = _judge(case[0], timeline, subject)
-        said, why = [*said, verdict], "case"
+        session.said.append(verdict)
         if failure is not None:
-            slot = failure.slot if options.slot is None else options.slot
-            timeline.focus = timeline.find_core(failure.network, slot)
-            timeline.go_to(failure.tick)
+            _stand_at(timeline, failure, options.slot)
     if options.at is not None:
-        why = "goto"
+        session.why = "goto"
         timeline.go_to(options.at.ticks(run.tick_hz))
-    return Session(timeline, symbols, said, why)
+    return session
 
 
-def _nameless(path: Path) -> str:
-    return f"no symbols: no .map or .cdb beside {path.name}; places are addresses"
-
-
-def _case(options: DebugSubject) -> tuple[Job, Any] | None:
+def _case(options: DebugSubject) -> tuple[Job, Image] | None:
     """The job and the image of a case; None for what is not one."""
-    path = options.subject or ""
+    path = options.subject
     if not os.path.isfile(path) or path.lower().endswith((*IMAGE_SUFFIXES, ".toml")):
         return None
     with open(path, "rb") as file:
@@ -125,13 +117,12 @@ def _case(options: DebugSubject) -> tuple[Job, Any] | None:
     return (job, image) if job.case.verdict else None
 
 
-def _run_of(job: Job, image: Any, options: DebugSubject) -> RobotRun:
-    world = job.world(image)
-    network, slot = options.network or 0, options.slot
-    if slot is None:
-        return RobotRun(world, network)
-    slots = [robot.slot for robot in world.networks[network].robots]
-    return RobotRun(world, network, slots.index(slot))
+def _run_of(job: Job, image: Image, options: DebugSubject) -> RobotRun:
+    run = RobotRun(job.world(image), options.network or 0)
+    if options.slot is None:
+        return run
+    slots = [robot.slot for robot in run.world.networks[run.network].robots]
+    return RobotRun(run.world, run.network, slots.index(options.slot))
 
 
 def _judge(job: Job, timeline: Timeline, path: str) -> tuple[str, Failure | None]:
@@ -149,12 +140,18 @@ def _judge(job: Job, timeline: Timeline, path: str) -> tuple[str, Failure | None
     return f"{how}: {failures[0]}", failures[0]
 
 
+def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
+    place = (failure.network, failure.slot if slot is None else slot)
+    places = [(robot.network, robot.slot) for robot in timeline.robots]
+    timeline.focus = places.index(place) if place in places else timeline.focus
+    timeline.go_to(failure.tick)
+
+
 def _resume(run: RobotRun | BareRun, path: str) -> None:
     if not isinstance(run, RobotRun):
         raise BadInput(path, "--resume", "is a world, and SUBJECT is none", "leave it out")
     try:
         run.world.load(read_input(path))
     except ValueError as error:
-        raise BadInput(
-            path, "--resume", str(error), "give the scenario, settings, seed and firmware it was saved with"
-        ) from None
+        remedy = "give the scenario, settings, seed and firmware it was saved with"
+        raise BadInput(path, "--resume", str(error), remedy) from None

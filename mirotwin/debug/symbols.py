@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image import Image
 from miro_robot.image.c_types import CType
 from miro_robot.image.debug_info import DebugInfo, Sources
-from miro_robot.image.registers import Blocks, RegisterVariable, parse_blocks
-from miro_robot.image.symbol_files import SourceLine, read_text
+from miro_robot.image.registers import RegisterVariable, parse_blocks
+from miro_robot.image.symbol_files import SourceLine, map_overlays, read_text
 from miro_robot.image.variables import Variable, variables_of
 from miro_robot.inspect.frames import StackFrame, Unwinder
 from miro_robot.inspect.symbol_names import SymbolNames
@@ -28,43 +26,15 @@ from mirotwin.debug.expression import NoValue, Value, memory
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
-_BYTE, _WORD, _BIT = CType("int", 1), CType("int", 2), CType("bit", 1)
+_BYTE, _BIT = CType("int", 1), CType("bit", 1)
 SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
-_CHIP = (
-    *(
-        "desired_position",
-        "desired_velocity",
-        "real_position",
-        "real_velocity",
-        "status",
-        "pwm_magnitude",
-        "sign",
-        "hi",
-    ),
-    *("index_position", "breakpoint", "mode", "writes_while_busy"),
-)
-_PARTS = {
-    "pid": ("kp", "ki", "kd", "il", "ds", "error_sum"),
-    "trajectory": ("target", "max_velocity", "acceleration"),
+SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle")
+_CHIP = {
+    "": "desired_position desired_velocity real_position real_velocity status pwm_magnitude sign hi"
+    " index_position breakpoint mode writes_while_busy",
+    "pid": "kp ki kd il ds error_sum",
+    "trajectory": "target max_velocity acceleration",
 }
-_REGISTERS: dict[str, Callable[[Any], int]] = {
-    "A": lambda cpu: cpu.a,
-    "B": lambda cpu: cpu.b,
-    "DPTR": lambda cpu: cpu.dptr,
-    "SP": lambda cpu: cpu.sp,
-    "PSW": lambda cpu: cpu.psw(),
-    "PC": lambda cpu: cpu.pc,
-}
-_IN_CPU: dict[str, Callable[[Any], int]] = {
-    "a": _REGISTERS["A"], "b": _REGISTERS["B"], "dpl": lambda cpu: cpu.dptr & 0xFF, "dph": lambda cpu: cpu.dptr >> 8,
-}  # fmt: skip
-
-
-class Stop(msgspec.Struct, frozen=True):
-    """Where a breakpoint on a line stands: `addresses`, and the `line` that has them."""
-
-    addresses: tuple[int, ...]
-    line: SourceLine | None = None
 
 
 class Symbols:
@@ -77,14 +47,12 @@ class Symbols:
         self.names = SymbolNames(image)
         self.unwinder = Unwinder(image, self.names)
         self.variables = variables_of(image)
-        self.blocks: Blocks = parse_blocks(read_text(image.path.with_suffix(".cdb")))
-        self.begins = dict(self.debug.lines)
-        self.starts = [address for address, _ in self.debug.lines]
-        self.instructions = instructions_of(
-            image.code,
-            image.used,
-            [*self.unwinder.heights, *self.starts, *(first for first, _ in self.names.functions)],
-        )
+        self.blocks = parse_blocks(read_text(image.path.with_suffix(".cdb")))
+        self.overlays = map_overlays(read_text(image.path.with_suffix(".map")))
+        self.line_begins = dict(self.debug.lines)
+        functions = [first for first, _ in self.names.functions]
+        known = [*self.unwinder.heights, *self.line_begins, *functions]
+        self.instructions = instructions_of(image.code, image.used, known)
 
     # Places
 
@@ -98,53 +66,40 @@ class Symbols:
     def place(self, address: int) -> str:
         """`failsafe.c:146 in failsafe_tick`, or the address and the symbol where no line is known."""
         line = self.line(address)
-        symbol = self.names.place(address)
-        return (
-            f"{_name(line.file)}:{line.line} in {self.function(address)}"
-            if line
-            else f"{address:#06x} in {symbol}"
-        )
+        if line is None:
+            return f"{address:#06x} in {self.names.place(address)}"
+        return f"{_name(line.file)}:{line.line} in {self.function(address)}"
 
-    def around(self, address: int) -> tuple[int, int]:
-        """(first, end) of the function that the instruction belongs to."""
+    def entry(self, address: int) -> int:
+        """Where the function of the instruction begins."""
         found = self.debug.function_at(address)
-        if found is not None:
-            return found.first, found.end
-        first = self.names.function(address)[0]
-        later = [place for place, _ in self.names.functions if place > first]
-        return first, min(later, default=0x10000)
+        return self.names.function(address)[0] if found is None else found.first
 
-    def files(self) -> list[str]:
-        return sorted({line.file for _, line in self.debug.lines})
+    def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
+        """Where the code of a line begins, in each function that has some, or that of the next line that has any.
 
-    def at_line(self, file: str, line: int) -> Stop:
-        """The code of a line, or of the next one that has any. Raises BadInput."""
-        name = _name(file)
-        own = [(one, address) for address, one in self.debug.lines if _name(one.file) == name]
+        Raises BadInput.
+        """
+        own = [(place, address) for address, place in self.debug.lines if _name(place.file) == _name(file)]
+        what = f"{_name(file)}:{line}"
         if not own:
-            known = (
-                ", ".join(map(_name, self.files())) or "none: the image has no debug files, give an address"
-            )
-            raise BadInput("", f"{name}:{line}", "no code is of this file", f"the files are {known}")
-        nearest = min((one.line for one, _ in own if one.line >= line), default=None)
-        if nearest is None:
-            last = max(one.line for one, _ in own)
-            raise BadInput("", f"{name}:{line}", "no line has code from there on", f"the last one is {last}")
-        first_of: dict[int, int] = {}
-        for one, address in own:
-            if one.line == nearest:
-                entry = self.around(address)[0]
-                first_of[entry] = min(first_of.get(entry, address), address)
-        place = next(one for one, _ in own if one.line == nearest)
-        return Stop(tuple(sorted(first_of.values())), place)
+            files = sorted({_name(place.file) for place in self.line_begins.values()})
+            known = ", ".join(files) or "none: the image has no debug files, give an address"
+            raise BadInput("", what, "no code is of this file", f"the files are {known}")
+        place = min((place for place, _ in own if place.line >= line), default=None, key=lambda one: one.line)
+        if place is None:
+            last = max(place.line for place, _ in own)
+            raise BadInput("", what, "no line has code from there on", f"the last one is {last}")
+        addresses = sorted((address for one, address in own if one.line == place.line), reverse=True)
+        return sorted({self.entry(address): address for address in addresses}.values()), place
 
-    def at(self, text: str) -> Stop:
-        """What `FILE:LINE`, a symbol or an address means. Raises BadInput."""
+    def at(self, text: str) -> tuple[list[int], SourceLine | None]:
+        """What `FILE:LINE`, a symbol or an address means, and its line. Raises BadInput."""
         file, colon, line = text.rpartition(":")
         if colon and line.isdecimal() and len(line) < 8:
             return self.at_line(file, int(line))
         address = address_of(text, self.image, str(self.image.path), "")
-        return Stop((address,), self.line(address))
+        return [address], self.line(address)
 
     # Names
 
@@ -155,93 +110,107 @@ class Symbols:
 
     def known_names(self) -> list[str]:
         """For completion and remedies."""
-        return [*self.variables.by_name, *_REGISTERS, *SFRS, *BITS, "lm629", "pins", "tick", "cycle", *SIZES]
+        return [*self.variables.by_name, *SPECIAL, *SFRS, *BITS, *SIZES]
 
 
 class Moment:
-    """What names mean for a processor that stands at `frame`. `innermost`: the registers are this function's."""
+    """What names mean where a processor stands, in one of the functions under way; 0 is the innermost one."""
 
-    def __init__(
-        self, symbols: Symbols, core: Core, frame: StackFrame | None = None, innermost: bool = True
-    ) -> None:
+    def __init__(self, symbols: Symbols, core: Core, frame: int = 0) -> None:
         self.symbols = symbols
         self.core = core
-        self.pc = core.cpu.pc if frame is None else frame.pc
-        self.innermost = innermost
+        self.frame = frame
+        self.pc = self.frames()[frame].pc if frame else core.cpu.pc
+
+    def frames(self) -> list[StackFrame]:
+        return self.symbols.unwinder.frames(self.core.cpu)
 
     def find(self, name: str, module: str) -> Value:
         """See `Scope`."""
-        if not module:
-            for local, value in self.locals():
-                if local == name:
-                    return value() if callable(value) else value
+        local = None if module else dict(self.locals()).get(name)
+        if local is not None:
+            return local()
         variable = self._variable(name, module)
         if variable is not None:
             return self.placed(variable)
-        special = self._find_special(name) if not module else None
+        special = None if module else self._special(name)
         if special is not None:
             return special
         symbol = self.symbols.image.symbols.find(name)
-        if symbol is not None and symbol.space == "code":
+        if symbol is None:
+            raise NoValue(f"there is no {name} here", did_you_mean(name, self.symbols.known_names()))
+        if symbol.space == "code":
             return Value(number=symbol.address, note="an address of code")
-        if symbol is not None:
-            return Value(
-                _BIT if symbol.space == "bit" else _BYTE, symbol.space, symbol.address, note="of unknown type"
-            )
-        raise NoValue(f"there is no {name} here", did_you_mean(name, self.symbols.known_names()))
+        if symbol.space == "iram":
+            self._refuse_shared(name, symbol.address, name.removeprefix("_").rpartition("_PARM_")[0])
+        kind = _BIT if symbol.space == "bit" else _BYTE
+        return Value(kind, symbol.space, symbol.address, note="of unknown type")
 
     def _variable(self, name: str, module: str) -> Variable | None:
-        there = self.symbols.variables.by_name.get(name, ())
-        if module:
-            there = tuple(one for one in there if module in (one.scope, one.module))
+        """The one of this file before that of all files. Raises NoValue where several others have it."""
         line = self.symbols.line(self.pc)
         own = _name(line.file).partition(".")[0] if line else ""
-        ranked = sorted(there, key=lambda one: (one.scope != own, one.scope != ""))
-        if len(ranked) > 1 and ranked[0].scope not in ("", own):
-            places = ", ".join(f"{one.scope}:{name}" for one in ranked)
+        there = self.symbols.variables.by_name.get(name, ())
+        fitting = [one for one in there if not module or module in (one.scope, one.module)]
+        near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
+        if len(fitting) > 1 and not near:
+            places = ", ".join(f"{one.scope}:{name}" for one in fitting)
             raise NoValue(f"there are several {name}", f"give one of {places}")
-        return ranked[0] if ranked else None
+        return next(iter(near or fitting), None)
 
     def placed(self, variable: Variable) -> Value:
-        """What a variable with a place means."""
+        """What a variable with a place means. Raises NoValue where others use the place."""
+        if variable.space == "iram" and variable.scope:
+            self._refuse_shared(variable.name, variable.address, variable.scope)
         fields = self.symbols.variables.fields(variable)
         return Value(variable.type, variable.space, variable.address, fields=fields)
 
-    def locals(self) -> Iterator[tuple[str, Value | Callable[[], Value]]]:
-        """Of the function that it stands in; one that is not live raises NoValue when it is asked for."""
+    def _refuse_shared(self, name: str, address: int, function: str) -> None:
+        """Raises NoValue for memory that several functions use, while this one is not under way."""
+        if any(first <= address < end for first, end in self.symbols.overlays):
+            under_way = {self.symbols.function(frame.pc).lstrip("_") for frame in self.frames()}
+            if function.lstrip("_") not in under_way:
+                why = f"its memory is shared, and {function or 'its function'} is not under way"
+                raise NoValue(f"{name} is not live: {why}")
+
+    def locals(self) -> Iterator[tuple[str, Callable[[], Value]]]:
+        """Of the function that it stands in; what is not live raises NoValue when it is asked for. Inner ones last."""
         function = self.symbols.debug.function_at(self.pc)
-        if function is None:
-            return
-        name = function.name.removeprefix("_")
-        for one in self.symbols.blocks.visible(name, function.first, self.pc):
-            yield one.name, partial(self._in_registers, one)
-        for variable in self.symbols.variables_in(name):
-            yield variable.name, self.placed(variable)
+        if function is not None:
+            name = function.name.removeprefix("_")
+            for variable in self.symbols.variables_in(name):
+                yield variable.name, partial(self.placed, variable)
+            for one in reversed(self.symbols.blocks.visible(name, function.first, self.pc)):
+                yield one.name, partial(self._in_registers, one)
 
     def _in_registers(self, one: RegisterVariable) -> Value:
+        why = ""
         if one.on_stack:
-            raise NoValue(f"{one.name} is not live: it is on the stack, and no debug file says where")
-        if not one.registers:
-            raise NoValue(f"{one.name} is not live: it was optimised away")
-        if not self.innermost:
-            raise NoValue(f"{one.name} is not live: its registers belong to the function that is called")
-        cpu = self.core.cpu
-        found = [
-            cpu.peek_iram(cpu.bank + int(register[1])) if register[1:].isdecimal() else _IN_CPU[register](cpu)
-            for register in one.registers
-        ]
-        number = int.from_bytes(bytes(found), "little", signed=one.type.signed and one.type.kind == "int")
-        where = " ".join(register.upper() for register in reversed(one.registers))
+            why = "it is on the stack, and no debug file says where"
+        elif not one.registers:
+            why = "it was optimised away"
+        elif self.frame:
+            why = "its registers belong to the function that is called"
+        if why:
+            raise NoValue(f"{one.name} is not live: {why}")
+        data = bytes(self._register(name) for name in one.registers)
+        number = int.from_bytes(data, "little", signed=one.type.signed and one.type.kind == "int")
+        where = " ".join(one.registers[::-1]).upper()
         return Value(one.type, number=number, note=f"in {where}: theirs only while the compiler needs it")
 
-    def _find_special(self, name: str) -> Value | None:
+    def _register(self, name: str) -> int:
+        cpu = self.core.cpu
+        if name[1:].isdecimal():
+            return cpu.peek_iram(cpu.bank + int(name[1]))
+        return cpu.sfr(SFRS["ACC" if name == "a" else name.upper()])
+
+    def _special(self, name: str) -> Value | None:
+        """A register, a bit, a memory, the chips."""
         cpu, board = self.core.cpu, self.core.board
-        if name in _REGISTERS:
-            return Value(number=_REGISTERS[name](cpu))
+        if name in SFRS or name == "A":
+            return Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name])
         if len(name) == 2 and name[0] == "R" and name[1] in "01234567":
             return Value(_BYTE, "iram", cpu.bank + int(name[1]))
-        if name in SFRS:
-            return Value(_BYTE, "sfr", SFRS[name])
         if name in BITS:
             return Value(_BIT, "bit", BITS[name])
         if name in SIZES and (name != "xram" or board is None):
@@ -249,17 +218,10 @@ class Moment:
         if name == "pins":
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
         if name == "lm629" and board is not None:
+            board.sync(cpu.cycles * CYCLE_TICKS)
             return Value(members={"left": lambda: _chip(board.left), "right": lambda: _chip(board.right)})
-        if name in ("cycle", "tick"):
-            return Value(number=cpu.cycles * (CYCLE_TICKS if name == "tick" else 1))
-        return None
-
-    def special(self, name: str) -> Value:
-        """A register, a bit, a memory, the chips. Raises NoValue."""
-        found = self._find_special(name)
-        if found is None:
-            raise NoValue(f"there is no {name} here")
-        return found
+        numbers = {"PC": cpu.pc, "DPTR": cpu.dptr, "cycle": cpu.cycles, "tick": cpu.cycles * CYCLE_TICKS}
+        return Value(number=numbers[name]) if name in numbers else None
 
     def _pins(self, port: int) -> Value:
         tap = CpuTap(self.core.board, lambda: None)
@@ -276,20 +238,22 @@ class Moment:
             return bytes(cpu.bus.movx_read((address + at) & 0xFFFF, 0) for at in range(count))
         if space == "sfr" and address < 0x80:
             raise NoValue(f"{address:#04x} is no special function register", "they begin at sfr[0x80]")
-        variable = Variable("", "", address, space, CType("int", count), "")
-        return bytes_at(cpu, self.symbols.image, variable)
+        return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
 
 
 def _chip(chip: Lm629) -> Value:
-    members = {name: partial(_of, chip, name) for name in _CHIP}
-    for part, names in _PARTS.items():
-        group = {name: partial(_of, getattr(chip, part), name) for name in names}
-        members[part] = partial(Value, members=group)
-    return Value(members=members)
+    def group(part: str) -> Value:
+        names = _CHIP[part].split()
+        paths = [f"{part}.{name}".lstrip(".") for name in names]
+        members = {name: partial(_of, chip, path) for name, path in zip(names, paths, strict=True)}
+        inner = {} if part else {name: partial(group, name) for name in _CHIP if name}
+        return Value(members={**members, **inner})
+
+    return group("")
 
 
-def _of(part: Any, name: str) -> Value:
-    return Value(number=int(getattr(part, name)))
+def _of(chip: Lm629, path: str) -> Value:
+    return Value(number=int(attrgetter(path)(chip)))
 
 
 def _name(path: str) -> str:

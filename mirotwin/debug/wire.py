@@ -14,8 +14,17 @@ from miro_exact.bad_input import BadInput, shortened
 
 MOST_BYTES = 16 << 20
 _MOST_HEAD, _CHUNK_BYTES = 4096, 65536
-_LENGTH = re.compile(rb"^Content-Length:[ \t]*([0-9]{1,9})[ \t]*$", re.MULTILINE | re.IGNORECASE)
+_LENGTH = re.compile(rb"^Content-Length:[ \t]*([0-9]{1,9})[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
 Message = dict[str, Any]
+
+
+class Request(msgspec.Struct):
+    """What each message of a client has."""
+
+    seq: int
+    type: str
+    command: str
+    arguments: Message = {}
 
 
 class Wire:
@@ -27,7 +36,7 @@ class Wire:
         self.sequence = 0
         self.data = b""
         self.came: queue.SimpleQueue[Message | BadInput | None] = queue.SimpleQueue()
-        self.back: list[Message | BadInput | None] = []
+        self.back: list[Message | None] = []
         threading.Thread(target=self._read_all, daemon=True).start()
 
     def next(self, wait: bool = True) -> Message | None:
@@ -44,57 +53,50 @@ class Wire:
         return found
 
     def send(self, message: Message) -> None:
-        """Raises OSError where the client has gone."""
+        """Leaves out what is None. Raises OSError where the client has gone."""
         self.sequence += 1
-        data = msgspec.json.encode({"seq": self.sequence, **message})
+        data = msgspec.json.encode({"seq": self.sequence, **_given(message)})
         self.sink.write(b"Content-Length: %d\r\n\r\n%b" % (len(data), data))
         self.sink.flush()
 
     def _read_all(self) -> None:
-        try:
-            while (message := self._read()) is not None:
-                self.came.put(message)
-            self.came.put(None)
-        except BadInput as error:
-            self.came.put(error)
-        except (OSError, ValueError):  # it was closed
-            self.came.put(None)
-
-    def _more(self) -> bool:
-        """Takes what comes next; False at the end of input."""
-        data = self.receive(_CHUNK_BYTES)
-        self.data += data
-        return bool(data)
+        found: Message | BadInput | None = {}
+        while isinstance(found, dict):
+            try:
+                found = self._read()
+            except BadInput as error:
+                found = error
+            except (OSError, ValueError):  # it was closed
+                found = None
+            self.came.put(found)
 
     def _read(self) -> Message | None:
         while (end := self.data.find(b"\r\n\r\n")) < 0:
-            if len(self.data) > _MOST_HEAD or (not self._more() and self.data):
-                raise _garbage(f"the head {shortened(repr(self.data))} does not end")
-            if not self.data:
+            more = len(self.data) <= _MOST_HEAD and self.receive(_CHUNK_BYTES)
+            if not more and self.data:
+                raise _garbage(self.data, "a head that does not end")
+            if not more:
                 return None
-        head, begin = self.data[:end].replace(b"\r", b""), end + 4
-        found = _LENGTH.search(head)
+            self.data += more
+        found = _LENGTH.search(self.data, 0, end)
         if found is None or int(found[1]) > MOST_BYTES:
-            raise _garbage(
-                f"the head {shortened(repr(head))} has no Content-Length up to {MOST_BYTES >> 20} MiB"
-            )
-        end = begin + int(found[1])
-        while len(self.data) < end and self._more():
-            pass
+            raise _garbage(self.data[:end], f"a head without a Content-Length up to {MOST_BYTES >> 20} MiB")
+        begin, end = end + 4, end + 4 + int(found[1])
+        while len(self.data) < end and (more := self.receive(_CHUNK_BYTES)):
+            self.data += more
         data, self.data = self.data[begin:end], self.data[end:]
         try:
-            message = msgspec.json.decode(data, type=dict[str, Any])
-        except msgspec.MsgspecError:
-            raise _garbage(f"{shortened(repr(data))} is no JSON object") from None
-        wanted = {"seq": int, "command": str, "type": str}
-        if any(not isinstance(message.get(key), kind) for key, kind in wanted.items()):
-            raise _garbage(f"{shortened(repr(data))} is no request")
-        if not isinstance(message.setdefault("arguments", {}), dict):
-            raise _garbage(f"{shortened(repr(data))} has arguments that are no object")
-        return message
+            return msgspec.structs.asdict(msgspec.json.decode(data, type=Request))
+        except msgspec.MsgspecError as error:
+            raise _garbage(data, f"no request: {error}") from None
 
 
-def _garbage(what: str) -> BadInput:
-    return BadInput(
-        "--dap", "", f"the client sends no message of the protocol: {what}", "check what is connected"
-    )
+def _given(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _given(one) for key, one in value.items() if one is not None}
+    return [_given(one) for one in value] if isinstance(value, list) else value
+
+
+def _garbage(data: bytes, what: str) -> BadInput:
+    said = f"the client sends no message of the protocol: {shortened(repr(data))} is {what}"
+    return BadInput("--dap", "", said, "check what is connected")

@@ -164,12 +164,17 @@ def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
     return images
 
 
-def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
-    """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
+def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, list[Path]]:
+    """The image with its debug files, those beside one of `images` or the robot's own, and where C files may be."""
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
     folder = source_folder()
     own = [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]
-    return AnnotatedImage(known, [*own, *map(Path, sources)])
+    return known, [*own, *map(Path, sources)]
+
+
+def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
+    """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
+    return AnnotatedImage(*debugged_image(image, images, sources))
 
 
 def firmwares_apart(

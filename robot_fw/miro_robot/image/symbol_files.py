@@ -129,7 +129,10 @@ def _map_space(area: str, attributes: list[str]) -> str:
 
 
 _MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
-_MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
+_MAP_CONSTANTS, _MAP_OVERLAYS = (
+    re.compile(rf"^(?:{areas})\s+([0-9A-F]{{8}})\s+([0-9A-F]{{8}}) =", re.MULTILINE)
+    for areas in ("CONST|XINIT", "OSEG")
+)
 
 
 def map_modules(text: str) -> list[str]:
@@ -139,8 +142,17 @@ def map_modules(text: str) -> list[str]:
 
 def map_constants(text: str) -> list[tuple[int, int]]:
     """(first, end) of the areas of constants."""
-    areas = dict.fromkeys(_MAP_CONSTANTS.findall(text))
-    return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in areas if int(size, 16)]
+    return _extents(_MAP_CONSTANTS, text)
+
+
+def map_overlays(text: str) -> list[tuple[int, int]]:
+    """(first, end) of what functions share that are not under way at a time."""
+    return _extents(_MAP_OVERLAYS, text)
+
+
+def _extents(areas: re.Pattern[str], text: str) -> list[tuple[int, int]]:
+    found = dict.fromkeys(areas.findall(text))
+    return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in found if int(size, 16)]
 
 
 CDB_SPACES = {

@@ -7,6 +7,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import msgspec
 
 from miro_robot.image import Image
@@ -87,6 +89,14 @@ class Unwinder:
                 break
             pc, sp = back, base - 2
         return found
+
+    def places(self, frames: list[StackFrame]) -> list[int]:
+        """What each of the frames executes: the innermost its next instruction, others the call under way."""
+        outer = [
+            frame.pc if inner.by_interrupt else self.call_before(frame.pc)
+            for inner, frame in pairwise(frames)
+        ]
+        return [frames[0].pc, *outer]
 
     def call_before(self, address: int) -> int:
         """Where the call stands that returns to `address`; -1 where none does."""

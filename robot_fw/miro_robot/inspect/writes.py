@@ -27,9 +27,9 @@ class Bytes:
         self.first = first
         self.end = first + count
 
-    def writers(self, code: bytes, instructions: Iterable[int]) -> set[int]:
-        """Those of the `instructions` that may write one of them."""
-        return {address for address in instructions if self._may(code, address)}
+    def writers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
+        """Those of the `instructions` that may write one of them. `on_stack`: the stack may reach them."""
+        return {address for address in instructions if self._may(code, address, on_stack)}
 
     def are_written(self, cpu: Cpu) -> bool:
         """Whether the instruction that `cpu` executes next writes one of them."""
@@ -56,7 +56,7 @@ class Bytes:
     def _holds(self, space: str, address: int) -> bool:
         return space == self.space and self.first <= address < self.end
 
-    def _may(self, code: bytes, address: int) -> bool:
+    def _may(self, code: bytes, address: int, on_stack: bool) -> bool:
         opcode, first, second = code[address], code[(address + 1) & 0xFFFF], code[(address + 2) & 0xFFFF]
         row = ROW[opcode]
         direct = _direct(row, first, second)
@@ -64,7 +64,7 @@ class Bytes:
             return self._holds("iram" if direct < _FIRST_SFR else "sfr", direct)
         if row in _REGISTER:
             return self.space == "iram" and self.first < _BANKS
-        if row in _INDIRECT or row == _PUSH or is_call(opcode):
+        if row in _INDIRECT or (on_stack and (row == _PUSH or is_call(opcode))):
             return self.space == "iram"
         return row in (_MOVX_DPTR, _MOVX_PAGE) and self.space == "xram"
 

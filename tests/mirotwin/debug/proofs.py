@@ -79,7 +79,7 @@ def wrong_writers(begin_tick, end_tick, count, seed=0):
         before = [cycle for cycle, written in writes[:at] if not written.isdisjoint(places)]
         debugger.timeline.go_to(writes[at][0] * CYCLE_TICKS)
         found = debugger.last_writer(debugger.bytes_of(variable.name))
-        cycle = None if found is None else found.tick // CYCLE_TICKS
+        cycle = None if found is None else found[0] // CYCLE_TICKS
         asked += bool(before)
         if (before and cycle != before[-1]) or (not before and cycle is not None and cycle >= writes[0][0]):
             wrong.append((variable.name, writes[at][0], cycle))

@@ -22,7 +22,7 @@ def test_each_key_of_the_extension_is_one_that_a_launch_takes():
     keys = EXTENSION["contributes"]["debuggers"][0]["configurationAttributes"]["launch"]["properties"]
     for key, about in keys.items():
         if key != "stopOnEntry":  # the adapter's own
-            assert launched(DebugSubject(), {key: VALUES[about["type"]]}) != DebugSubject()
+            assert launched({key: VALUES[about["type"]]}) != DebugSubject()
 
 
 @pytest.mark.parametrize("configuration", LAUNCH["configurations"], ids=lambda one: one["name"])

@@ -1,13 +1,17 @@
 """Expressions mean what C means by them."""
 
+import shutil
 from contextlib import suppress
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_robot.bare.machine import BareMachine
+from miro_robot.image import load_hex
 from mirotwin.debug.expression import NoValue, Value, content, expression
-from mirotwin.debug.symbols import Moment
+from mirotwin.rerun.inspected_run import BareRun
+from tests import children
 from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
 
 
@@ -70,7 +74,7 @@ def test_what_has_no_value_is_refused(text):
 @pytest.fixture(scope="module")
 def debugger():
     debugger = debugger_of(robot_run())
-    debugger.add("take_body", debugger.symbols.at("take_body").addresses)
+    debugger.add("take_body", debugger.symbols.at("take_body")[0])
     debugger.go_to(SECOND // 2)
     debugger.go_on()
     return debugger
@@ -101,14 +105,39 @@ def test_names_mean_variables_registers_bits_chips_and_memories(debugger, text, 
     assert shown(debugger, text) == shown(debugger, same)
 
 
-def test_what_is_not_live_says_so(debugger):
+@pytest.mark.parametrize(
+    ("function", "name", "frame", "why"),
+    [
+        ("failsafe_look", "behind", 0, "behind is not live: it was optimised away"),
+        ("wait_for", "opcode", 2, "its registers belong to the function that is called"),
+    ],
+)
+def test_what_is_not_live_says_so(function, name, frame, why):
     look = debugger_of(robot_run())
-    look.add("look", look.symbols.at("failsafe_look").addresses)
+    look.add("look", look.symbols.at(function)[0])
     look.go_on()
-    with pytest.raises(NoValue, match="behind is not live: it was optimised away"):
-        shown(look, "behind")
-    with pytest.raises(NoValue, match="its registers belong to the function that is called"):
-        expression("from")(Moment(debugger.symbols, debugger.core, debugger.frames()[0], innermost=False))
+    with pytest.raises(NoValue, match=why):
+        shown(look, name, frame)
+
+
+OVERLAID = """
+unsigned char sum;
+unsigned char twice(unsigned char one, unsigned char other) { return one + other + sum; }
+unsigned char less(unsigned char one, unsigned char other) { return one - other - sum; }
+void main(void) { while (1) { sum = twice(sum, 3); sum = less(sum, 1); } }
+"""
+
+
+@pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
+def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp_path):
+    (tmp_path / "two.c").write_text(OVERLAID)
+    children.run(["sdcc", "-mmcs51", "--debug", "two.c"], cwd=tmp_path, check=True)
+    debugger = debugger_of(BareRun(BareMachine(load_hex(tmp_path / "two.ihx")), None, None))
+    debugger.add("less", debugger.symbols.at("less")[0])
+    debugger.go_on()
+    assert shown(debugger, "less_PARM_2") == 1
+    with pytest.raises(NoValue, match="is not live: its memory is shared, and twice is not under way"):
+        shown(debugger, "twice_PARM_2")
 
 
 @pytest.mark.parametrize(

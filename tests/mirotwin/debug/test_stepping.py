@@ -43,7 +43,7 @@ def test_stacks_are_those_of_the_calls_that_were_made(moments, debugger):
 
 
 def test_next_stops_where_another_line_of_the_function_or_its_caller_begins(moments, debugger):
-    starts, line = set(debugger.symbols.starts), debugger.symbols.line
+    starts, line = set(debugger.symbols.line_begins), debugger.symbols.line
     on_lines = [at for at in some(moments, 300, 2) if moments[at].pc in starts and line(moments[at].pc)][:30]
     for at in on_lines:
         stand(debugger, moments[at])
@@ -107,10 +107,10 @@ def test_the_last_writer_is_the_last_instruction_that_changed_it_or_a_later_one_
         found = debugger.last_writer(debugger.bytes_of(variable.name))
         changed = last_change(moments, at, variable.address, variable.type.size)
         assert debugger.cpu.cycles == moments[at].cycle
-        assert changed is None or (found is not None and found.tick >= changed.cycle * CYCLE_TICKS)
+        assert changed is None or (found is not None and found[0] >= changed.cycle * CYCLE_TICKS)
         if found is not None:
-            writer = next(one for one in moments if one.cycle * CYCLE_TICKS == found.tick)
-            assert found.frames[0].pc == writer.pc
+            writer = next(one for one in moments if one.cycle * CYCLE_TICKS == found[0])
+            assert found[1][0].pc == writer.pc
 
 
 def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
@@ -133,7 +133,7 @@ def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
 
 
 def test_hits_are_counted_from_the_begin_of_the_run_in_both_directions(debugger):
-    place = debugger.symbols.at("failsafe_tick").addresses
+    place = debugger.symbols.at("failsafe_tick")[0]
     debugger.add("each", place)
     cycles = []
     for _ in range(7):
@@ -150,9 +150,9 @@ def test_hits_are_counted_from_the_begin_of_the_run_in_both_directions(debugger)
 
 
 def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
-    one = debugger.add("log", debugger.symbols.at("failsafe_tick").addresses)
+    one = debugger.add("log", debugger.symbols.at("failsafe_tick")[0])
     one.log = lambda moment: "tick"
-    debugger.add("stop", debugger.symbols.at("failsafe_fresh").addresses)
+    debugger.add("stop", debugger.symbols.at("failsafe_fresh")[0])
     console = Console(debugger)
     console.run("continue")
     lines = capsys.readouterr().out.splitlines()

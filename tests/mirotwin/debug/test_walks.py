@@ -33,7 +33,7 @@ def test_checkpoints_stay_within_their_budget_and_any_moment_can_be_gone_to(monk
     stops = []
     for tick in (20 * SECOND // 21, SECOND // 3, 0, SECOND // 2):
         timeline.go_to(tick)
-        stops.append((timeline.tick, timeline.machine.save()))
+        stops.append((timeline.tick, timeline.state()))
     assert differences(stops, robot_run()) == []
 
 
@@ -63,5 +63,5 @@ def test_steps_leave_chips_and_encoders_where_a_straight_run_has_them():
     stops = []
     for _ in range(400):
         timeline.step()
-        stops.append((timeline.tick, timeline.machine.save()))
+        stops.append((timeline.tick, timeline.state()))
     assert differences(stops, robot_run()) == []

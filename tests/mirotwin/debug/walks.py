@@ -17,7 +17,7 @@ MOVES = ("go", "back", "into", "over", "out", "instruction", "goto", "near", "br
 def walk(debugger, steps, end_tick, seed):
     """(tick, state) of each stop of a walk forward and back, with breakpoints that come and go."""
     chance = random.Random(seed)
-    timeline, places = debugger.timeline, sorted(debugger.symbols.starts)
+    timeline, places = debugger.timeline, sorted(debugger.symbols.line_begins)
     for _ in range(steps):
         move, back = chance.choice(MOVES), chance.random() < 0.6 or timeline.tick >= end_tick
         if move == "break":
@@ -37,7 +37,7 @@ def walk(debugger, steps, end_tick, seed):
             debugger.step(chance.choice(["into", "over"]), back, by_instruction=True)
         elif move != "out" or len(debugger.frames()) > 1:
             debugger.step(move, back)
-        yield timeline.tick, timeline.machine.save()
+        yield timeline.tick, timeline.state()
 
 
 RESET_ENDS = range(35_280, 35_592)
@@ -49,7 +49,7 @@ def differences(stops, unbroken):
     found = []
     for tick, state in sorted(stop for stop in stops if stop[0] not in RESET_ENDS):
         unbroken.to(tick)
-        if unbroken.world.save() != state:
+        if unbroken.world.state.save() != state:
             found.append(tick)
     return found
 
