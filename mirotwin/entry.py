@@ -10,6 +10,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
+from _thread import start_new_thread
 from types import FrameType
 
 INTERRUPTED = 130
@@ -25,6 +27,19 @@ def _on_interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
 
+def _again(ignored: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C within a callback of the interpreter's, as importing has them, ends nothing: it is sent again after it."""
+    if ignored.exc_type is KeyboardInterrupt:
+        start_new_thread(_send, ())
+    else:
+        sys.__unraisablehook__(ignored)
+
+
+def _send() -> None:
+    time.sleep(0.01)
+    signal.raise_signal(signal.SIGINT)
+
+
 def _leave() -> None:
     """Ends the process: no clean-up, which is for what was opened, and no exception, which importing code may catch."""
     try:  # noqa: SIM105 (contextlib would have to be imported)
@@ -36,6 +51,7 @@ def _leave() -> None:
 
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored, as under nohup
     signal.signal(signal.SIGINT, _on_interrupt)
+    sys.unraisablehook = _again
 
 
 def main() -> None:

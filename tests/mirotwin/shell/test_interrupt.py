@@ -62,6 +62,33 @@ def test_ctrl_c_while_modules_are_loaded_ends_the_program_at_once():
     assert interrupted(0.0, "info") == (130, b"", b"mirotwin: interrupted\n")
 
 
+IN_A_CALLBACK = """
+import signal, time, weakref
+import mirotwin.commands, mirotwin.entry
+
+class Module: pass
+
+def command():
+    module = Module()
+    lock = weakref.ref(module, lambda _: signal.raise_signal(signal.SIGINT))
+    del module
+    time.sleep(20)
+    print("went on")
+
+mirotwin.commands.main = command
+mirotwin.entry.main()
+"""
+
+
+def test_ctrl_c_in_a_callback_of_the_interpreter_ends_the_program_after_it():
+    found = subprocess.run(
+        [sys.executable, "-c", IN_A_CALLBACK],
+        capture_output=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert (found.returncode, found.stdout, found.stderr) == (130, b"", b"mirotwin: interrupted\n")
+
+
 def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it():
     program = ["-c", f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}", "--version"]
     with children.start(
