@@ -9,35 +9,31 @@ A child with a `preexec_fn` writes no bytecode: a limit on the length of files w
 is left for a whole module's.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
-from collections.abc import Callable
-from typing import Any
 
 SIGNALS = ("SIGINT", "SIGHUP", "SIGTERM", "SIGQUIT")
 
 
-def reset_signals() -> None:
+def reset_signals():
     """Gives this process the default action of the signals that a user or a shell sends."""
     for name in SIGNALS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 
-def run(command: Any, **named: Any) -> subprocess.CompletedProcess[Any]:
+def run(command, **named):
     """`subprocess.run`, with default signals."""
     return subprocess.run(command, **_with_reset(named))
 
 
-def start(command: Any, **named: Any) -> subprocess.Popen[Any]:
+def start(command, **named):
     """`subprocess.Popen`, with default signals."""
     return subprocess.Popen(command, **_with_reset(named))
 
 
-def fork() -> int:
+def fork():
     """`os.fork`, with default signals in the child."""
     process = os.fork()
     if process == 0:
@@ -45,12 +41,12 @@ def fork() -> int:
     return process
 
 
-def _with_reset(named: dict[str, Any]) -> dict[str, Any]:
+def _with_reset(named):
     if os.name != "posix":
         return named  # no preexec_fn there, and none of the shells in question
-    before: Callable[[], None] | None = named.get("preexec_fn")
+    before = named.get("preexec_fn")
 
-    def prepare() -> None:
+    def prepare():
         reset_signals()
         if before is not None:
             before()

@@ -12,6 +12,6 @@ import os
 VARIABLE = "MIROTWIN_ATTACK_TIMES"
 
 
-def times(quick: int) -> int:
+def times(quick):
     """How often an attack that chance chooses is tried: `quick` in a normal run."""
     return quick * int(os.environ.get(VARIABLE, "1"))

@@ -19,12 +19,11 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from markdown_it import MarkdownIt
-from sybil import Document, Example, Region
+from sybil import Region
 
 from tests.docs import running
 
@@ -64,7 +63,7 @@ class Block(NamedTuple):
     slow: str = ""
 
 
-def blocks_of(text: str, document: str = "") -> Iterator[Block]:
+def blocks_of(text, document=""):
     """All blocks of a document, those that are no code too."""
     for block in _blocks(text):
         not_run = block.not_run or _reason(ELSEWHERE, document, block.text)
@@ -73,12 +72,12 @@ def blocks_of(text: str, document: str = "") -> Iterator[Block]:
         )
 
 
-def _reason(table: dict[tuple[str, str], str], document: str, text: str) -> str:
+def _reason(table, document, text):
     found = (why for (where, start), why in table.items() if where == document and text.startswith(start))
     return next(found, "")
 
 
-def _blocks(text: str) -> Iterator[Block]:
+def _blocks(text):
     not_run, file, slow = "", "", ""
     for token in MarkdownIt().parse(text):
         if token.type == "html_block":
@@ -98,7 +97,7 @@ def _blocks(text: str) -> Iterator[Block]:
             not_run, file, slow = "", "", ""
 
 
-def parser(document: Document) -> Iterator[Region]:
+def parser(document):
     """Sybil's regions: one a block."""
     starts = [0]
     for line in document.text.splitlines(keepends=True):
@@ -108,7 +107,7 @@ def parser(document: Document) -> Iterator[Region]:
         yield Region(start, start + 1, block, evaluator_of(block))
 
 
-def evaluator_of(block: Block) -> Callable[[Example], str | None]:
+def evaluator_of(block):
     """Who runs it."""
     if block.not_run or block.slow or block.language == "text":
         return nothing
@@ -117,15 +116,15 @@ def evaluator_of(block: Block) -> Callable[[Example], str | None]:
     return {"python": running.python, "toml": running.toml, "c": running.c}.get(block.language, unknown)
 
 
-def nothing(example: Example) -> None:
+def nothing(example):
     """For what is not run."""
 
 
-def unknown(example: Example) -> str:
+def unknown(example):
     return f"a block of {example.parsed.language!r}; say what it is: {', '.join(filter(None, LANGUAGES))}"
 
 
-def write_files(document: Document, folder: Path) -> None:
+def write_files(document, folder):
     """Writes the blocks that have a file's name."""
     for example in document.examples():
         if example.parsed.file:

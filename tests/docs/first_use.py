@@ -15,7 +15,6 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.docs import blocks, running, sandbox
@@ -30,16 +29,16 @@ EXTRAS = re.compile(r"pip install '\.(\[[\w,]+\])'")
 class Count:
     """Lines of one way through the pages. `refused`: page and line, with what was printed."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.run = 0
         self.left_out = 0
         self.refused: list[str] = []
 
-    def __str__(self) -> str:
+    def __str__(self):
         return f"{self.run} lines run, {self.left_out} not run, {len(self.refused)} refused"
 
 
-def install(folder: Path, smoke: bool) -> Clean:
+def install(folder, smoke):
     """A new environment, with the extras that the page for beginners names."""
     page = (sandbox.ROOT / "docs/start.md").read_text("utf-8")
     extras = found[1] if (found := EXTRAS.search(page)) else ""
@@ -51,7 +50,7 @@ def install(folder: Path, smoke: bool) -> Clean:
     return clean
 
 
-def follow(document: str, shell: Literal, count: Count) -> None:
+def follow(document, shell, count):
     """One page, in the folder that the process stands in."""
     python = ""
     for block in blocks.blocks_of((sandbox.ROOT / document).read_text("utf-8"), document):
@@ -73,7 +72,7 @@ def follow(document: str, shell: Literal, count: Count) -> None:
         count.refused += [f"{document}, line {block.line}: {what}" for what in found]
 
 
-def said(shell: Literal, source: str) -> Iterator[str]:
+def said(shell, source):
     """What is wrong with the Python of a page so far."""
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "page.py"
@@ -83,7 +82,7 @@ def said(shell: Literal, source: str) -> Iterator[str]:
         yield printed
 
 
-def each_alone(documents: Sequence[str], clean: Clean, folder: Path) -> Count:
+def each_alone(documents, clean, folder):
     """Every page in an empty folder of its own."""
     count = Count()
     for document in documents:
@@ -96,7 +95,7 @@ def each_alone(documents: Sequence[str], clean: Clean, folder: Path) -> Count:
     return count
 
 
-def one_after_the_other(documents: Sequence[str], clean: Clean, folder: Path) -> Count:
+def one_after_the_other(documents, clean, folder):
     """All pages in one folder."""
     count = Count()
     folder.mkdir()
@@ -106,7 +105,7 @@ def one_after_the_other(documents: Sequence[str], clean: Clean, folder: Path) ->
     return count
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--smoke", action="store_true", help="take the compiled modules of this tree")
     parser.add_argument("documents", nargs="*", metavar="PAGE", help="instead of all")

@@ -1,21 +1,15 @@
 """What runs a block of each language, in the folder that the process stands in."""
 
-from __future__ import annotations
-
 import re
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-
-from sybil import Example
 
 from miro_robot.wiring import load_wiring
 from miro_sim.scenario.file import load
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.steps.reading import steps_of
 from tests import children
-from tests.docs.shell import Shell, commands_of, fits
+from tests.docs.shell import commands_of, fits
 
 TEST = re.compile(r"^def (test_\w+)\(", re.MULTILINE)
 GROUPS = ("laws", "estimators", "references", "checks", "protocols", "bare_checks")
@@ -23,12 +17,12 @@ GROUPS = ("laws", "estimators", "references", "checks", "protocols", "bare_check
 EXIT_CODE = re.compile(r"exit code (\d+)")
 
 
-def shell(example: Example) -> str | None:
+def shell(example):
     """The first command that is refused, or prints something else."""
     return next(refused(example.namespace["__shell__"], example.parsed.text), None)
 
 
-def refused(where: Shell, text: str) -> Iterator[str]:
+def refused(where, text):
     """Every command of a block; in one with `$ `, what it prints has to be what stands below it.
 
     A command whose output is not shown ends with exit code 0, or with the one that a comment after it names.
@@ -47,7 +41,7 @@ def refused(where: Shell, text: str) -> Iterator[str]:
             yield f"{command.line}\nended with exit code {where.code}, not {wanted}:\n{printed}"
 
 
-def python(example: Example) -> str | None:
+def python(example):
     """Executed in the names of the document; tests are collected by pytest."""
     source = example.parsed.text
     names = example.namespace
@@ -68,7 +62,7 @@ def python(example: Example) -> str | None:
     return None
 
 
-def toml(example: Example) -> str | None:
+def toml(example):
     """Read by the reader of such files."""
     text = example.parsed.text
     found = tomllib.loads(text)
@@ -89,7 +83,7 @@ def toml(example: Example) -> str | None:
     return None
 
 
-def _load_scenario(text: str) -> None:
+def _load_scenario(text):
     name = "block.scenario.toml"
     Path(name).write_text(text, "utf-8")
     read = load(name)
@@ -97,7 +91,7 @@ def _load_scenario(text: str) -> None:
     steps_of(read.scenario, name)
 
 
-def _leaves(table: dict[str, Any], inside: str = "") -> list[tuple[str, Any]]:
+def _leaves(table, inside=""):
     """(path, value) of what holds no further table; a part that is chosen by a key is one value."""
     found = []
     for key, value in table.items():
@@ -108,7 +102,7 @@ def _leaves(table: dict[str, Any], inside: str = "") -> list[tuple[str, Any]]:
     return found
 
 
-def _inline(value: Any) -> str:
+def _inline(value):
     import tomli_w
 
     if isinstance(value, dict):
@@ -116,7 +110,7 @@ def _inline(value: Any) -> str:
     return tomli_w.dumps({"x": value}).partition("=")[2].strip()
 
 
-def c(example: Example) -> str | None:
+def c(example):
     """Compiled for the 8051."""
     name = example.parsed.file or "block.c"
     Path(name).write_text(example.parsed.text, "utf-8")

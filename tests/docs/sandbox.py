@@ -1,12 +1,9 @@
 """The folder that a document's blocks run in: what a reader has who comes to that page."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from miro_robot.firmware import image_path, source_folder
@@ -30,14 +27,14 @@ FIRST_USE = (
 """What a newcomer follows from the first line, in an empty folder; in this order, in one folder, too."""
 
 
-def documents() -> list[str]:
+def documents():
     """Every document of the tree, by its path."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
     done = children.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     return sorted(name for name in done.stdout.split("\0") if name and (ROOT / name).is_file())
 
 
-def prepare(folder: Path, document: str) -> tuple[Path, Path]:
+def prepare(folder, document):
     """Fills `folder` for a document, unless it is one for newcomers; returns the folders of programs and of what is
     installed.
     """
@@ -53,22 +50,22 @@ def prepare(folder: Path, document: str) -> tuple[Path, Path]:
     return programs(folder.parent / "programs", hidden), hidden
 
 
-def copy_image(image: Path, target: Path) -> None:
+def copy_image(image, target):
     target.parent.mkdir(parents=True, exist_ok=True)
     for suffix in DEBUG_FILES:
         if image.with_suffix(suffix).exists():
             shutil.copy(image.with_suffix(suffix), target.with_suffix(suffix))
 
 
-def copy_examples(folder: Path) -> None:
+def copy_examples(folder):
     for name in starter.EXAMPLES:
         starter.write(folder, starter.example_files(name), "", force=True)
 
 
-def put_parts(hidden: Path) -> None:
+def put_parts(hidden):
     """The distributions of `examples/`, as pip leaves them, and the law that host/README.md writes."""
 
-    def text(path: str) -> str:
+    def text(path):
         return (ROOT / "examples" / path).read_text("utf-8")
 
     laws = {"samson": "samson_law:Parameters", "pursuit": "pursuit_law:Parameters"}
@@ -86,7 +83,7 @@ def put_parts(hidden: Path) -> None:
     install(hidden, "mine", "1.0", {"smooth": "my_module:Parameters"}, my_module=law)
 
 
-def programs(folder: Path, hidden: Path) -> Path:
+def programs(folder, hidden):
     """`mirotwin`, `python` and `pytest` for commands that bash runs, with the packages of this tree; `pip` installs
     nothing, but wants the folder that it is told.
     """
@@ -105,7 +102,7 @@ def programs(folder: Path, hidden: Path) -> Path:
 # What single pages need
 
 
-def late(folder: Path) -> None:
+def late(folder):
     """A firmware whose failsafe comes after 125 ms, with its sources."""
     planted = PLANTED[LATE]
     sources = source_folder()
@@ -119,7 +116,7 @@ def late(folder: Path) -> None:
     copy_image(built.image, folder / "late.ihx")
 
 
-def late_case(folder: Path) -> None:
+def late_case(folder):
     """The case that the page's own block in Python writes, of that firmware."""
     late(folder)
     copy_image(folder / "late.ihx", folder / "build" / "miro.ihx")
@@ -127,7 +124,7 @@ def late_case(folder: Path) -> None:
     exec(page.split("```python\n")[1].partition("```")[0], {})
 
 
-def dimmer(folder: Path) -> None:
+def dimmer(folder):
     """The firmware of examples/fuzz-slip, with its cases beside it; `mine.ihx` is the one that is right."""
     example = folder / "fuzz-slip"
     children.run(["make", "-s"], cwd=example, check=True, capture_output=True)
@@ -137,10 +134,10 @@ def dimmer(folder: Path) -> None:
     copy_image(folder / "build" / "mended.ihx", folder / "mine.ihx")
 
 
-def regression(target: str) -> Callable[[Path], None]:
+def regression(target):
     """A folder with a case that the shipped firmware passes."""
 
-    def put(folder: Path) -> None:
+    def put(folder):
         late_case(folder)
         copy_image(image_path(), folder / "build" / "miro.ihx")
         (folder / target).mkdir(parents=True)
@@ -149,13 +146,13 @@ def regression(target: str) -> Callable[[Path], None]:
     return put
 
 
-def question(folder: Path) -> None:
+def question(folder):
     """An input for the fuzzer, and bytes of a network of three."""
     for name in ("INPUT", "bytes.bin"):
         (folder / name).write_bytes(bytes.fromhex("5555555555ff2dd4"))
 
 
-FUNCTIONS: dict[str, Callable[[Path], None]] = {
+FUNCTIONS = {
     "docs/conformance.md": late,
     "mirotwin/replay/README.md": late,
     "mirotwin/verify/steps/README.md": late,
@@ -173,7 +170,7 @@ COMPILED = {*(name for name, put in FUNCTIONS.items() if put is not question), "
 _SHORT = "mirotwin run fig6 --set duration_s=0.2 --no-figure -q --out"
 _CAMPAIGN = "mirotwin campaign run campaign.toml --seeds 0-19 --set duration_s=0.1 -q --out"
 
-COMMANDS: dict[str, tuple[str, ...]] = {
+COMMANDS = {
     "docs/formats/parquet.md": (f"{_CAMPAIGN} runs/short.parquet || true",),
     "docs/formats/stream.md": (f"{_SHORT} runs/fig6-0",),
     "docs/reference/fixtures.md": ("mirotwin init mine",),

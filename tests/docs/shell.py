@@ -15,11 +15,10 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import click
 
@@ -42,7 +41,7 @@ class Command(NamedTuple):
     asked: bool = False
 
 
-def commands_of(text: str) -> Iterator[Command]:
+def commands_of(text):
     """The commands of a block, comment lines left out."""
     lines = text.replace("\\\n", " ").splitlines()
     if not any(line.startswith("$ ") for line in lines):
@@ -56,7 +55,7 @@ def commands_of(text: str) -> Iterator[Command]:
         yield Command(lines[index][2:].strip(), "\n".join(lines[index + 1 : after]), asked)
 
 
-def fits(wanted: str, printed: str) -> bool:
+def fits(wanted, printed):
     """Whether this is what a document shows: `..` stands for anything, on a line of its own for any lines."""
     pattern = r"\n".join(
         ".*" if line.strip() == ".." else ".*".join(re.escape(part) for part in line.rstrip().split(".."))
@@ -69,7 +68,7 @@ def fits(wanted: str, printed: str) -> bool:
 class Shell:
     """Runs commands one after the other. `code`: exit code of the last one. `python`: an interpreter with this tree."""
 
-    def __init__(self, programs: Path) -> None:
+    def __init__(self, programs):
         self.code = 0
         self.python = [str(programs / "python")]
         self.environment = {
@@ -79,7 +78,7 @@ class Shell:
             "PYTHONDONTWRITEBYTECODE": "1",
         }
 
-    def run(self, line: str) -> str:
+    def run(self, line):
         """What the command printed, on stdout and stderr."""
         with tempfile.TemporaryFile() as out:
             words = plain(line)
@@ -98,7 +97,7 @@ class Shell:
             out.seek(0)
             return out.read().decode("utf-8", "replace")
 
-    def _by_bash(self, line: str, out: IO[bytes], may_take_s: float = MAY_TAKE_S) -> int:
+    def _by_bash(self, line, out, may_take_s=MAY_TAKE_S):
         bash = children.start(
             ["bash", "-c", line],
             stdin=subprocess.DEVNULL,
@@ -114,7 +113,7 @@ class Shell:
             bash.wait()
             raise
 
-    def _forked(self, arguments: list[str], out: int) -> int:
+    def _forked(self, arguments, out):
         load_modules()
         sys.stdout.flush()
         sys.stderr.flush()
@@ -127,11 +126,11 @@ class Shell:
 class Literal(Shell):
     """Gives every line to bash, with the programs of an environment that something was installed in."""
 
-    def __init__(self, environment: Mapping[str, str]) -> None:
+    def __init__(self, environment):
         self.code = 0
         self.environment = {**environment, "COLUMNS": "200"}
 
-    def run(self, line: str) -> str:
+    def run(self, line):
         with tempfile.TemporaryFile() as out:
             self.code = self._by_bash(line, out, SLOW_MAY_TAKE_S)
             out.seek(0)
@@ -139,7 +138,7 @@ class Literal(Shell):
 
 
 @cache
-def load_modules() -> None:
+def load_modules():
     """Loads what the forks would load, each for itself."""
     context = click.Context(main)
     for name in main.list_commands(context):
@@ -147,7 +146,7 @@ def load_modules() -> None:
     import_module("mirotwin.report.figure")
 
 
-def plain(line: str) -> list[str] | None:
+def plain(line):
     """The words of a command, None for one that needs a shell."""
     lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
     lexer.commenters = "#"
@@ -155,7 +154,7 @@ def plain(line: str) -> list[str] | None:
     return None if any(set(word) <= set("();<>|&") or set(word) & set("*?$`") for word in words) else words
 
 
-def _become(arguments: list[str], out: int, environment: dict[str, str]) -> None:
+def _become(arguments, out, environment):
     """The rest of a forked process: the program, with its output where it belongs."""
     code = 70
     try:

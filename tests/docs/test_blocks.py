@@ -3,8 +3,6 @@
 A document is one test, because its blocks build on each other and the tests of a file may run in several processes.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections import Counter
@@ -95,7 +93,7 @@ NOT_RUN = {
 all of README.md have."""
 
 
-def blocks_in(document: str) -> list[blocks.Block]:
+def blocks_in(document):
     return list(blocks.blocks_of((sandbox.ROOT / document).read_text("utf-8"), document))
 
 

@@ -1,7 +1,5 @@
 """Commands in running text and in tables have options that exist."""
 
-from __future__ import annotations
-
 import re
 
 import click
@@ -14,15 +12,15 @@ COMMAND = re.compile(r"`(?:\.\. \\?\| )?mirotwin ([a-z][^`\n]*)`")
 OPTION = re.compile(r"(?<![\w-])--?[a-z][a-z0-9-]*")
 
 
-def commands(document: str) -> list[str]:
+def commands(document):
     text = (sandbox.ROOT / document).read_text("utf-8")
     return COMMAND.findall(re.sub(r"```.*?```", "", text, flags=re.DOTALL))
 
 
-def command_of(line: str) -> tuple[click.Command, set[str]]:
+def command_of(line):
     """The command that a line begins with, and the options that it takes."""
     context = click.Context(main)
-    command: click.Command = main
+    command = main
     options = {"--help", "-h", "--version"}
     for word in line.split():
         found = command.get_command(context, word) if isinstance(command, click.Group) else None

@@ -1,15 +1,11 @@
 """The documentation site builds without a warning, has all commands and public names, needs no network, no server."""
 
-from __future__ import annotations
-
 import html
 import os
 import re
 import sys
 import tarfile
 import tomllib
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -44,7 +40,7 @@ def site(tmp_path_factory):
     return folder
 
 
-def pages(site: Path) -> Iterator[tuple[str, str]]:
+def pages(site):
     for path in sorted(site.rglob("*.html")):
         yield path.relative_to(site).as_posix(), path.read_text("utf-8")
 
@@ -111,7 +107,7 @@ def test_links_lead_to_files_of_the_tree(document):
     assert not [target for target in LINK.findall(text) if not (folder / target).exists()]
 
 
-def words(markup: str) -> str:
+def words(markup):
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", markup)).split())
 
 

@@ -4,7 +4,6 @@ import importlib.util
 import math
 import random
 from pathlib import Path
-from types import ModuleType
 
 import mpmath
 import pytest
@@ -19,7 +18,7 @@ ANGLES = st.floats(-1.59e6, 1.59e6)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-def load_source() -> ModuleType:
+def load_source():
     path = Path(miro_exact.__file__).with_name("dmath.py")
     spec = importlib.util.spec_from_file_location("dmath_source", path)
     assert spec is not None

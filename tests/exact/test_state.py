@@ -17,7 +17,7 @@ from miro_robot.mcs51.line import Line
 class Wheel:
     STATE = {"angle": ("d", -10.0, 10.0), "turns": "i"}
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.angle = 0.5
         self.turns = -1
 
@@ -40,7 +40,7 @@ class Cart:
         "edges": Items("q", 3, 0, 100, ordered=True),
     }
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.tick = 7
         self.moving = 1
         self.levels = [1, 2, 3]
@@ -58,10 +58,10 @@ class Cart:
         self.settled = 0
         self.doubled = 14
 
-    def before_save(self) -> None:
+    def before_save(self):
         self.settled += 1
 
-    def after_load(self) -> None:
+    def after_load(self):
         if self.tick == 99:
             raise ValueError("tick 99 contradicts the rest")
         self.doubled = 2 * self.tick
@@ -115,7 +115,7 @@ def test_bytes_behind_the_end_are_refused():
         Flat(Cart()).load(LAYOUT + b"\0")
 
 
-def changed(place: int, form: str, *values: object) -> bytes:
+def changed(place, form, *values):
     return LAYOUT[:place] + struct.pack(form, *values) + LAYOUT[place + struct.calcsize(form) :]
 
 

@@ -23,7 +23,7 @@ def site(tmp_path_factory):
     return folder / "installed"
 
 
-def run(site: Path | str, out: Path, *options: str) -> tuple[int, str]:
+def run(site, out, *options):
     paths = [str(site), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
     command = [

@@ -1,7 +1,5 @@
 """`python -m tests.fuzz [TARGET ..] [--time 60s]`: fuzzes our own code, guided by what it executes."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
@@ -11,14 +9,14 @@ from tests.fuzz import campaign, corpus
 from tests.fuzz.catalogue import TARGETS
 
 
-def _seconds(text: str) -> float:
+def _seconds(text):
     match = re.fullmatch(r"([0-9]{1,6}(?:\.[0-9]+)?)(s|m|h|)", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"{text!r} is no time; give 60s, 10m or 1h")
     return float(match[1]) * {"s": 1, "": 1, "m": 60, "h": 3600}[match[2]]
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser():
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description="Fuzzes Mirotwin's own code.")
     parser.add_argument("targets", nargs="*", metavar="TARGET", help="default: all, one after the other")
     parser.add_argument("--list", action="store_true", help="names and what they are")
@@ -37,7 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main() -> int:
+def main():
     """0 when nothing was found, 1 for a finding, 2 for a wrong command line or a missing tool."""
     options = _parser().parse_args()
     unknown = [name for name in options.targets if name not in TARGETS]

@@ -42,7 +42,7 @@ class Result(NamedTuple):
     finding: Path | None = None
     what: str = ""
 
-    def line(self, name: str) -> str:
+    def line(self, name):
         rate = f"{self.executions:8d} inputs, {self.per_s:7.0f}/s, {self.reached}"
         if self.finding is None:
             return f"{name:16} {rate}"
@@ -58,10 +58,10 @@ class Engine(NamedTuple):
     about: str
     fixed: str = ""
 
-    def describe(self) -> str:
+    def describe(self):
         return self.about
 
-    def run(self, name: str, limit_s: float, seed: int) -> Result:
+    def run(self, name, limit_s, seed):
         findings, found = (WORK / part / name for part in ("findings", "found"))
         for path in (findings, found):
             path.mkdir(parents=True, exist_ok=True)
@@ -88,7 +88,7 @@ class Engine(NamedTuple):
         return _result(child, limit_s, findings)
 
 
-def prepared(plain: bool, sanitize: bool) -> Engine:
+def prepared(plain, sanitize):
     """What a campaign runs with. Raises MissingError for tools that are asked for and are not there."""
     installed = importlib.util.find_spec("atheris") is not None
     atheris = installed and not plain
@@ -101,7 +101,7 @@ def prepared(plain: bool, sanitize: bool) -> Engine:
     return Engine(atheris, build.environment, f"{about}; {build.about}", "compiled")
 
 
-def child_environment(more: dict[str, str]) -> dict[str, str]:
+def child_environment(more):
     """Of this process, with our packages from this checkout unless `more` says from where."""
     own = os.pathsep.join(str(ROOT / part) for part in _LIBRARY)
     paths = [str(ROOT), more.get("PYTHONPATH", own), os.environ.get("PYTHONPATH", "")]
@@ -109,7 +109,7 @@ def child_environment(more: dict[str, str]) -> dict[str, str]:
     return {**named, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
 
 
-def _write_seeds(name: str, folder: Path) -> None:
+def _write_seeds(name, folder):
     """Kept inputs, and the target's own seeds: these are made by a process of ours, which is quicker uninstrumented."""
     folder.mkdir(parents=True, exist_ok=True)
     for path in folder.glob("*"):
@@ -118,7 +118,7 @@ def _write_seeds(name: str, folder: Path) -> None:
         (folder / corpus.file_name(data)).write_bytes(data)
 
 
-def _words(name: str, limit_s: float, seed: int, findings: Path, hangs_s: int) -> list[str]:
+def _words(name, limit_s, seed, findings, hangs_s):
     target = TARGETS[name]
     words = [
         f"-max_total_time={max(1, int(limit_s))}",
@@ -139,7 +139,7 @@ def _words(name: str, limit_s: float, seed: int, findings: Path, hangs_s: int) -
     return words
 
 
-def _result(child: subprocess.CompletedProcess[str], limit_s: float, findings: Path) -> Result:
+def _result(child, limit_s, findings):
     text = child.stdout
     executed = _EXECUTED.search(text)
     coverage = _COVERAGE.findall(text)
@@ -158,7 +158,7 @@ def _result(child: subprocess.CompletedProcess[str], limit_s: float, findings: P
     return Result(executions, per_s, reached, path, errors[0] if errors else text.strip()[-200:])
 
 
-def once(name: str, path: Path, sanitize: bool) -> int:
+def once(name, path, sanitize):
     """One input in this process, or in one with the sanitizers; its exit code."""
     environment = prepared(False, True).environment if sanitize else {}
     engine = "compiled" if sanitize else TARGETS[name].engine
@@ -166,7 +166,7 @@ def once(name: str, path: Path, sanitize: bool) -> int:
     return children.run(command, cwd=Path.cwd(), env=child_environment(environment)).returncode
 
 
-def keep(name: str) -> int:
+def keep(name):
     """Chooses the kept inputs again from those kept, seeds and found ones, in a process of its own; how many."""
     folders = [str(WORK / part / name) for part in ("found", "seeds")]
     command = [sys.executable, "-m", "tests.fuzz.choose", name, TARGETS[name].engine, *folders]

@@ -3,8 +3,6 @@
 python -m tests.fuzz.chance TARGET ENGINE SECONDS SEED FINDINGS SEEDS
 """
 
-from __future__ import annotations
-
 import faulthandler
 import sys
 import traceback
@@ -13,7 +11,7 @@ from pathlib import Path
 HANGS_S = 200  # the sanitizers may be there
 
 
-def main() -> int:
+def main():
     """0, or 1 after a finding."""
     name, engine, limit_s, seed, findings, seeds = sys.argv[1:]
     from miro_exact.engine import select
@@ -27,7 +25,7 @@ def main() -> int:
     inputs = [path.read_bytes() for path in sorted(Path(seeds).glob("*"))]
     with open(Path(findings) / "last", "wb", buffering=0) as last:
 
-        def run(data: bytes) -> str:
+        def run(data):
             last.seek(0)
             last.truncate()
             last.write(data)

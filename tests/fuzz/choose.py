@@ -3,15 +3,13 @@
 Of a folder with very many, an even part of all sizes is looked at: to look at one takes ten times as long as to run it.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
 MOST_OF_FOLDER = 200
 
 
-def main() -> int:
+def main():
     name, engine, *folders = sys.argv[1:]
     from miro_exact.engine import select
 

@@ -4,17 +4,10 @@ Inputs are chosen by what they reach: the lines of our Python code, one after th
 the same function), and the outcome. The smallest input that reaches something new is kept first.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
 import time
-from collections.abc import Iterable, Sequence
 from pathlib import Path
-from types import FrameType
-from typing import Any
-
-from tests.fuzz.target import Run
 
 FOLDER = Path(__file__).parent / "corpus"
 MOST_FILES = 20
@@ -27,26 +20,26 @@ _OURS = ("/exact/", "/protocol/", "/robot_fw/", "/host/", "/sim/")
 Feature = tuple[str, int, int]
 
 
-def kept(name: str) -> list[tuple[str, bytes]]:
+def kept(name):
     """Names and contents, in the order of names."""
     return [(path.name, path.read_bytes()) for path in sorted((FOLDER / name).glob("*"))]
 
 
-def file_name(data: bytes) -> str:
+def file_name(data):
     return hashlib.sha256(data).hexdigest()[:12]
 
 
-def reached(run: Run, data: bytes) -> set[Feature]:
+def reached(run, data):
     """What an input reaches; an input that breaks the promise reaches nothing."""
-    found: set[Feature] = set()
+    found = set()
 
-    def trace(frame: FrameType, event: str, argument: Any) -> Any:
+    def trace(frame, event, argument):
         path = frame.f_code.co_filename
         if event != "call" or not any(part in path for part in _OURS):
             return None
         last = 0
 
-        def line(frame: FrameType, event: str, argument: Any) -> Any:
+        def line(frame, event, argument):
             nonlocal last
             if event == "line":
                 found.add((path, last, frame.f_lineno))
@@ -66,13 +59,13 @@ def reached(run: Run, data: bytes) -> set[Feature]:
     return {*found, (outcome, 0, 0)}
 
 
-def chosen(run: Run, inputs: Iterable[bytes], most_bytes: int = MOST_BYTES) -> list[bytes]:
+def chosen(run, inputs, most_bytes=MOST_BYTES):
     """At most `MOST_FILES` of the inputs up to `most_bytes`: each time the smallest of those that add most."""
     small = sorted({data for data in inputs if len(data) <= most_bytes}, key=lambda data: (len(data), data))
     run(b"")  # what is read and kept once must not count for the first input
     candidates = [(data, reached(run, data)) for data in small]
-    covered: set[Feature] = set()
-    found: list[bytes] = []
+    covered = set()
+    found = []
     while len(found) < MOST_FILES:
         data, features = max(candidates, key=lambda one: len(one[1] - covered), default=(b"", set()))
         if not features - covered:
@@ -82,7 +75,7 @@ def chosen(run: Run, inputs: Iterable[bytes], most_bytes: int = MOST_BYTES) -> l
     return _within(run, found)
 
 
-def _within(run: Run, inputs: Sequence[bytes]) -> list[bytes]:
+def _within(run, inputs):
     """As many of the inputs, from the front, as can be run in `MOST_S`."""
     end_s = time.process_time() + MOST_S
     found = []
@@ -94,7 +87,7 @@ def _within(run: Run, inputs: Sequence[bytes]) -> list[bytes]:
     return found
 
 
-def keep(name: str, inputs: Sequence[bytes]) -> None:
+def keep(name, inputs):
     """Makes these the kept inputs."""
     folder = FOLDER / name
     folder.mkdir(parents=True, exist_ok=True)

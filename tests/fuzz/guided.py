@@ -4,15 +4,13 @@ Python code of ours, and what it reads with, is instrumented when the target imp
 are what the build made of them: without the sanitizers' build coverage does not see into them.
 """
 
-from __future__ import annotations
-
 import sys
 
 SEEN = ["miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin"]
 SEEN += ["serial.rfc2217", "mcap", "PIL.PngImagePlugin", "PIL.PpmImagePlugin", "PIL.ImageFile", "tomllib"]
 
 
-def main() -> None:
+def main():
     """Never returns: libFuzzer ends the process."""
     name, engine, *words = sys.argv[1:]
     import atheris
@@ -26,7 +24,7 @@ def main() -> None:
         run = TARGETS[name].make()
         run(b"")  # what is imported late
 
-    def one(data: bytes) -> None:
+    def one(data):
         run(data)
 
     atheris.Setup([sys.argv[0], *words], one)

@@ -3,14 +3,9 @@
 Input `number` is a pure function of (target, seed, number).
 """
 
-from __future__ import annotations
-
 import random
 import time
 from collections import Counter
-from collections.abc import Sequence
-
-from tests.fuzz.target import Run, Target
 
 _BYTES = (0, 1, 2, 0x20, 0x55, 0x7F, 0x80, 0xFE, 0xFF)
 
@@ -18,13 +13,13 @@ _BYTES = (0, 1, 2, 0x20, 0x55, 0x7F, 0x80, 0xFE, 0xFF)
 class Broken(Exception):
     """An input that breaks the promise."""
 
-    def __init__(self, data: bytes, number: int) -> None:
+    def __init__(self, data, number):
         super().__init__(f"input {number}, {len(data)} bytes")
         self.data = data
         self.number = number
 
 
-def changed(data: bytes, target: Target, others: Sequence[bytes], draw: random.Random) -> bytes:
+def changed(data, target, others, draw):
     """`data` with one to six changes, no longer than the target takes."""
     found = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 3, 6))):
@@ -54,11 +49,9 @@ def changed(data: bytes, target: Target, others: Sequence[bytes], draw: random.R
     return bytes(found[: target.most_bytes])
 
 
-def campaign(
-    name: str, target: Target, run: Run, inputs: Sequence[bytes], seed: int, limit_s: float, most: int
-) -> Counter[str]:
+def campaign(name, target, run, inputs, seed, limit_s, most):
     """How often came what: of the inputs, and of changed ones for `limit_s` or up to `most` of all. Raises Broken."""
-    outcomes: Counter[str] = Counter()
+    outcomes = Counter()
     end_s = time.monotonic() + limit_s
     for number in range(most):
         if number < len(inputs):

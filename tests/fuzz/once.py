@@ -1,12 +1,10 @@
 """One input of one target: `python -m tests.fuzz.once TARGET ENGINE FILE`; what came of it, or the traceback."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
 
-def main() -> int:
+def main():
     name, engine, path = sys.argv[1:]
     from miro_exact.engine import select
 

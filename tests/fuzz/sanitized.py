@@ -46,7 +46,7 @@ class Build(NamedTuple):
     about: str
 
 
-def built(folder: Path, guided: bool) -> Build:
+def built(folder, guided):
     """The build in `folder`, made again when the sources have changed. Raises MissingError."""
     guided = guided and shutil.which("clang") is not None
     compiler = "clang" if guided else "gcc" if shutil.which("gcc") else "clang"
@@ -70,7 +70,7 @@ def built(folder: Path, guided: bool) -> Build:
     return Build(environment, f"modules compiled by {compiler} with -fsanitize={_CHECKS}{coverage}")
 
 
-def _hash() -> str:
+def _hash():
     found = hashlib.sha256(_FLAGS.encode())
     for package in _PACKAGES:
         for path in sorted((ROOT / package).rglob("*")):
@@ -79,7 +79,7 @@ def _hash() -> str:
     return found.hexdigest()
 
 
-def _build(folder: Path, compiler: str, guided: bool) -> None:
+def _build(folder, compiler, guided):
     """Minutes, the first time; what has not changed is not compiled again."""
     print(
         f"building the sanitized modules in {os.path.relpath(folder)}, which takes minutes", file=sys.stderr
@@ -108,7 +108,7 @@ def _build(folder: Path, compiler: str, guided: bool) -> None:
         )
 
 
-def _runtime(compiler: str, guided: bool) -> str:
+def _runtime(compiler, guided):
     if guided:
         spec = importlib.util.find_spec("atheris")
         assert spec is not None
@@ -119,6 +119,6 @@ def _runtime(compiler: str, guided: bool) -> str:
     return _file_of("clang", "libclang_rt.asan-x86_64.so")
 
 
-def _file_of(compiler: str, name: str) -> str:
+def _file_of(compiler, name):
     found = children.run([compiler, f"-print-file-name={name}"], capture_output=True, text=True, check=True)
     return found.stdout.strip()

@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -41,7 +41,7 @@ class Target(NamedTuple):
     words: tuple[bytes, ...] = ()
 
 
-def refused(error: Exception) -> str:
+def refused(error):
     """The outcome of a documented refusal. AssertionError unless it is one line that a person can read."""
     text = str(error)
     assert text, f"{type(error).__name__} says nothing"
@@ -51,7 +51,7 @@ def refused(error: Exception) -> str:
 
 
 @cache
-def folder() -> Path:
+def folder():
     """A folder of this process, in memory where there is such a place."""
     above = _IN_MEMORY if os.access(_IN_MEMORY, os.W_OK) else None
     path = Path(tempfile.mkdtemp(prefix="mirotwin-fuzz-", dir=above))
@@ -62,35 +62,35 @@ def folder() -> Path:
 class Draws:
     """Decisions taken from bytes, from the front; all are 0 where none are left."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data):
         self.data = data
         self.place = 0
 
     @property
-    def left(self) -> int:
+    def left(self):
         return len(self.data) - self.place
 
-    def take(self, count: int) -> bytes:
+    def take(self, count):
         """Up to `count` bytes."""
         found = self.data[self.place : self.place + count]
         self.place += len(found)
         return found
 
-    def below(self, end: int) -> int:
+    def below(self, end):
         """0..end-1, of as many bytes as that needs."""
         size = max(1, ((end - 1).bit_length() + 7) // 8)
         return int.from_bytes(self.take(size), "little") % end
 
-    def signed(self, size: int) -> int:
+    def signed(self, size):
         return int.from_bytes(self.take(size).ljust(size, b"\0"), "little", signed=True)
 
 
-def pieces(data: bytes, size: int) -> Iterator[bytes]:
+def pieces(data, size):
     """`data` cut every `size` bytes."""
     return (data[at : at + size] for at in range(0, len(data), size))
 
 
-def with_sums(records: bytes) -> bytes:
+def with_sums(records):
     """Intel HEX with lengths and sums put right, so that damage gets past them."""
     lines = []
     for line in records.split(b"\n"):

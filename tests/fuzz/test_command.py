@@ -13,7 +13,7 @@ from tests.fuzz.catalogue import TARGETS
 ROOT = Path(__file__).parents[2]
 
 
-def command(*words: str) -> tuple[int, str, str]:
+def command(*words):
     called = [sys.executable, "-m", "tests.fuzz", *words]
     environment = campaign.child_environment({})
     found = children.run(called, cwd=ROOT, env=environment, capture_output=True, text=True)

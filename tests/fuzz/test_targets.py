@@ -4,7 +4,7 @@ import pytest
 
 from tests.fuzz import corpus, mutation
 from tests.fuzz.catalogue import TARGETS
-from tests.fuzz.target import Draws, Run, Target, pieces, refused
+from tests.fuzz.target import Draws, Target, pieces, refused
 
 MOMENT_S = 0.1
 MOST = 40
@@ -33,8 +33,8 @@ def test_each_target_runs_on_one_of_the_two_engines():
     assert {target.engine for target in TARGETS.values()} == {"compiled", "python"}
 
 
-def _breaks_on(wanted: bytes) -> Run:
-    def run(data: bytes) -> str:
+def _breaks_on(wanted):
+    def run(data):
         if wanted in data:
             raise IndexError(wanted)
         return f"{len(data)}"
@@ -76,7 +76,7 @@ def test_refusals_of_one_kind_are_one_outcome():
 
 
 def test_inputs_are_chosen_by_what_they_reach_the_smaller_first():
-    def run(data: bytes) -> str:
+    def run(data):
         return "taken" if data.startswith(b"T") else "refused: " + "x" * min(len(data), 2)
 
     found = corpus.chosen(run, [b"Tlonger", b"T", b"a", b"b", b"cc", b"ddd", b"x" * 5000])

@@ -1,6 +1,6 @@
 """Laws for tests: one that remembers, and ones that do what a law must not."""
 
-from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters, Velocities
+from miro_host.laws.interface import Accelerations, Law, LawParameters, Velocities
 
 
 class LeakyParameters(LawParameters, frozen=True, kw_only=True, tag="leaky"):
@@ -23,7 +23,7 @@ class Leaky(Law[LeakyParameters]):
         self.begun = False
         self.headings_rad = [0.0, 0.0]
 
-    def step(self, given: LawInput) -> Velocities:
+    def step(self, given):
         error_m = given.reference.posture.x_m - given.posture.x_m
         self.error_m += 0.3 * (error_m - self.error_m)
         self.periods += 1
@@ -51,7 +51,7 @@ class Wrong(Law[WrongParameters]):
         self.memory = 0.0
         self.periods = 0
 
-    def step(self, given: LawInput):
+    def step(self, given):
         self.periods += 1
         if self.periods == 1:
             return Velocities(0.1, 0.0, {"a": 1.0})

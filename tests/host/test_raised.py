@@ -3,7 +3,7 @@
 from miro_host.raised import raised_at
 
 
-def error_in(module: str) -> BaseException:
+def error_in(module):
     """What a line in this module raises."""
     try:
         exec(

@@ -1,7 +1,5 @@
 """What the tests of the commands share: a short scenario, and a way to call the program in this process."""
 
-from pathlib import Path
-
 import pytest
 from click.testing import CliRunner
 
@@ -33,7 +31,7 @@ Result = tuple[int, str, str]
 def mirotwin():
     """Calls the command; gives exit code, stdout and stderr. Anything but a clean exit fails the test."""
 
-    def call(*arguments: object) -> Result:
+    def call(*arguments):
         result = CliRunner().invoke(main, [str(argument) for argument in arguments])
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
@@ -59,7 +57,7 @@ def finished(mirotwin, short):
     return folder
 
 
-def hex_file(path: Path, code: bytes) -> Path:
+def hex_file(path, code):
     """An Intel HEX file with `code` (at most 16 bytes) at address 0."""
     record = bytes([len(code), 0, 0, 0]) + code
     checksum = -sum(record) & 0xFF

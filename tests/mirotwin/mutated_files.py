@@ -19,7 +19,6 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 from click.testing import CliRunner
@@ -120,7 +119,7 @@ RESUMMED = "image, sums put right"
 Commands = list[list[str]]
 
 
-def hex_records(code: bytes) -> bytes:
+def hex_records(code):
     """Intel HEX."""
     lines = []
     for place in range(0, len(code), 16):
@@ -139,7 +138,7 @@ class Seeds:
     files to take pieces of.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder = folder
         self.kinds: dict[str, tuple[str, bytes, Commands]] = {}
         image = image_path()
@@ -172,7 +171,7 @@ class Seeds:
         )
         self.kinds["hex text"] = ("a.txt", raw.hex(" ").encode() + b" # end\n", [["decode", "@"]])
 
-    def _add_pictures(self) -> None:
+    def _add_pictures(self):
         """What `calibrate` and `track` read. Two pictures are enough: one is searched, in one a robot is followed."""
         brief = ["--set", "duration_s=0.04", "--no-figure", "-q", "--frames", "frames"]
         self._run("run", "short.toml", "--out", "seen", *brief, "--record-frames")
@@ -191,7 +190,7 @@ class Seeds:
         recording = without_sums((self.folder / "seen" / "run.mcap").read_bytes())
         self.kinds["recorded pictures"] = ("b.mcap", recording, [["camera", "track", "@", *track]])
 
-    def _add_texts(self, image: Path) -> None:
+    def _add_texts(self, image):
         steps = ["--max-cycles", "300"]
         watch = [["fw", "trace", "named.ihx", *steps], ["fw", "profile", "named.ihx", *steps, "--json"]]
         self.kinds["scenario"] = (
@@ -227,13 +226,13 @@ class Seeds:
             [["fw", "run", "echo.ihx", "--stdin", "@", "--max-cycles", "20000"]],
         )
 
-    def _run(self, *arguments: str) -> None:
+    def _run(self, *arguments):
         with contextlib.chdir(self.folder):
             result = CliRunner().invoke(main, list(arguments))
         assert result.exit_code in (0, 42), (arguments, result.output, result.exception)
 
 
-def without_sums(recording: bytes) -> bytes:
+def without_sums(recording):
     """The same with sums of 0, which say nothing: so damage gets past them."""
     data = bytearray(recording)
     place = 8
@@ -248,7 +247,7 @@ def without_sums(recording: bytes) -> bytes:
     return bytes(data)
 
 
-def resummed(image: bytes) -> bytes:
+def resummed(image):
     """Intel HEX with lengths and sums put right, so that damage gets past them."""
     lines = []
     for line in image.split(b"\n"):
@@ -262,14 +261,14 @@ def resummed(image: bytes) -> bytes:
     return b"\n".join(lines)
 
 
-def mutate(data: bytes, draw: random.Random, other: bytes) -> bytes:
+def mutate(data, draw, other):
     """`data` with one to four damages; `other` is a file to take a piece of."""
     for _ in range(draw.choice((1, 1, 2, 4))):
         data = _damage(bytearray(data), draw, other)
     return data[:MOST_BYTES]
 
 
-def _damage(data: bytearray, draw: random.Random, other: bytes) -> bytes:
+def _damage(data, draw, other):
     at = draw.randrange(len(data) + 1)
     length = min(len(data) - at, draw.choice((1, 1, 2, 8, 100, 2000)))
     kind = draw.randrange(10)
@@ -313,14 +312,14 @@ class Slow(BaseException):
     """A case that takes too long."""
 
 
-def _slow(number: int, frame: object) -> None:
+def _slow(number, frame):
     raise Slow
 
 
 class Case:
     """Case `number` of a campaign: which kind, which content, which command."""
 
-    def __init__(self, seeds: Seeds, seed: int, number: int) -> None:
+    def __init__(self, seeds, seed, number):
         names = list(seeds.kinds)
         draw = random.Random(f"{seed}/{number}")
         self.kind = names[number % len(names)]
@@ -332,7 +331,7 @@ class Case:
             self.content = resummed(self.content)
         self.arguments = [self.name if word == "@" else word for word in draw.choice(commands)]
 
-    def run(self, folder: Path) -> tuple[object, float]:
+    def run(self, folder):
         """Exit code (or what was raised) and seconds of CPU time. The good file is put back."""
         path = folder / self.name
         path.write_bytes(self.content)
@@ -356,13 +355,11 @@ class Case:
         return result.exit_code, took_s
 
 
-def _fit_for_people(err: str) -> bool:
+def _fit_for_people(err):
     return all(line.isprintable() and len(line) < 2000 for line in err.splitlines())
 
 
-def campaign(
-    folder: Path, seed: int, numbers: range | list[int]
-) -> Iterator[tuple[int, Case, object, float]]:
+def campaign(folder, seed, numbers):
     """(number, case, exit code or what went wrong, seconds) of each case; good files are made in `folder` first."""
     seeds = Seeds(folder)
     for number in numbers:
@@ -373,7 +370,7 @@ def campaign(
         yield number, case, outcome, took_s
 
 
-def _main() -> int:
+def _main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--first", type=int, default=0)
@@ -383,7 +380,7 @@ def _main() -> int:
     numbers = range(options.first, options.first + options.count)
     if options.only is not None:
         numbers = range(options.only, options.only + 1)
-    counts: Counter[tuple[str, int]] = Counter()
+    counts = Counter()
     slowest_s, bad = 0.0, 0
     with tempfile.TemporaryDirectory() as name, contextlib.suppress(KeyboardInterrupt):  # counts so far
         for number, case, outcome, took_s in campaign(Path(name), options.seed, numbers):

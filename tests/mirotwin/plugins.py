@@ -1,9 +1,5 @@
 """Plug-ins that tests install: one of each kind that goes wrong in one way, and checks that do what they should."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from tests.host.distribution import install
 
 CHECKS = '''
@@ -193,7 +189,7 @@ _LAWS = {"law_raises": "Raises", "law_none": "Nothing", "law_nan": "NoNumber", "
 _REFERENCES = {"reference_raises": "Raises", "reference_none": "Nothing"}
 
 
-def install_all(site: Path) -> None:
+def install_all(site):
     """All of them in a folder, which then has to be on the path."""
     checks = {name: f"plugged_checks:{value}" for name, value in _CHECKS.items()}
     checks["syntax"] = "plugged_syntax:Anything"
@@ -206,6 +202,6 @@ def install_all(site: Path) -> None:
     install(site, "plugged-estimators", "1.0", estimators, "estimators", plugged_estimators=ESTIMATORS)
 
 
-def line_of(source: str, text: str) -> int:
+def line_of(source, text):
     """The number of the first line that holds this."""
     return 1 + next(at for at, line in enumerate(source.splitlines()) if text in line)

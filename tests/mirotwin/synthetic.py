@@ -3,10 +3,7 @@
 For tests of what reads periods (recording, summary, figure, command line); the world has tests of its own.
 """
 
-from __future__ import annotations
-
 import hashlib
-from collections.abc import Iterator, Sequence
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.posture import Posture
@@ -14,7 +11,7 @@ from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 
 
-def axis(index: int, side: int) -> Axis:
+def axis(index, side):
     commands = ((index * CONTROL_PERIOD_TICKS + 5 + side, 0x1F, "1800002a"),) if index % 2 else ()
     return Axis(
         desired_position=100 * index + side,
@@ -27,7 +24,7 @@ def axis(index: int, side: int) -> Axis:
     )
 
 
-def robot(index: int, slot: int = 0, network: int = 0, error: Posture | None = None) -> RobotPeriod:
+def robot(index, slot=0, network=0, error=None):
     """A robot on the line along +X at 0.2 m/s, off by `error`."""
     at = Posture(0.2 * index * CONTROL_PERIOD_TICKS / 24e6, 0.0, 0.0)
     off = error if error is not None else Posture(0.07 * 0.9**index, 0.017 * 0.9**index, -0.38 * 0.9**index)
@@ -51,7 +48,7 @@ def robot(index: int, slot: int = 0, network: int = 0, error: Posture | None = N
     )
 
 
-def periods(count: int, robots: Sequence[tuple[int, int]] = ((0, 0),)) -> Iterator[Period]:
+def periods(count, robots=((0, 0),)):
     """`count` periods of the robots given as (network, slot)."""
     chain = b""
     for index in range(count):

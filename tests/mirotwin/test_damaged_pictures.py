@@ -30,7 +30,7 @@ KINDS = (
 )
 
 
-def with_chunk(kind: bytes, data: bytes, at: int) -> bytes:
+def with_chunk(kind, data, at):
     """The picture with a chunk more, whose sum is right."""
     body = kind + data
     chunk = struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))

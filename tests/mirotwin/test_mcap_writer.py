@@ -35,7 +35,7 @@ def short_chunks():
         yield
 
 
-def of_the_library(steps: list[Step]) -> bytes:
+def of_the_library(steps):
     stream = io.BytesIO()
     writer = Writer(stream, CHUNK, CompressionType.NONE, enable_data_crcs=True)
     writer.start("profile", "library")
@@ -48,18 +48,18 @@ def of_the_library(steps: list[Step]) -> bytes:
             writer.register_channel(f"/topic{number}", "json", number)
         elif what == "message":
             writer.add_message(number, time_ns, data, time_ns)
-    writer.finish()  # type: ignore[no-untyped-call]
+    writer.finish()
     return stream.getvalue()
 
 
-def begun(stream: io.BytesIO) -> McapWriter:
+def begun(stream):
     writer = McapWriter(stream, "profile", "library")
     writer.add_metadata("mine", {"key": "ä", "empty": ""})
     writer.add_attachment("name.txt", "text/plain", b"content")
     return writer
 
 
-def put(writer: McapWriter, step: Step) -> None:
+def put(writer, step):
     what, number, time_ns, data = step
     if what == "schema":
         writer.add_schema(f"schema{number}", "jsonschema", data)
@@ -71,7 +71,7 @@ def put(writer: McapWriter, step: Step) -> None:
         writer.flush()
 
 
-def written(steps: list[Step]) -> bytes:
+def written(steps):
     stream = io.BytesIO()
     writer = begun(stream)
     for step in steps:
@@ -86,7 +86,7 @@ def test_a_file_is_the_bytes_of_the_librarys_writer_whenever_it_was_flushed(step
     assert written(steps) == of_the_library(steps)
 
 
-ROWS: list[Step] = [("schema", 1, 0, b"{}"), ("channel", 1, 0, b"")]
+ROWS = [("schema", 1, 0, b"{}"), ("channel", 1, 0, b"")]
 ROWS += [("message", 1, index, bytes([index]) * (7 * index)) for index in range(100)]
 
 
@@ -108,22 +108,22 @@ def test_the_librarys_readers_find_all_messages():
 class Journal(io.BytesIO):
     """Keeps what the file is after each write, as a process killed right then leaves it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.states: list[bytes] = []
 
-    def write(self, data: "bytes | memoryview", /) -> int:  # type: ignore[override]
+    def write(self, data, /):
         piece = bytes(data[:300])  # a raw file may take less than it is given
         done = super().write(piece)
         self.states.append(self.getvalue())
         return done
 
 
-def readable(data: bytes) -> list[int]:
+def readable(data):
     """Times of the messages in a file without an end."""
-    times: list[int] = []
+    times = []
 
-    def read() -> None:
+    def read():
         for _, record in records(io.BytesIO(data), "x"):
             if isinstance(record, Message):
                 times.append(record.log_time)
@@ -159,7 +159,7 @@ def test_after_a_full_disk_nothing_more_is_written():
     class Full(io.BytesIO):
         room = 2500
 
-        def write(self, data: "bytes | memoryview", /) -> int:  # type: ignore[override]
+        def write(self, data, /):
             self.room -= len(data)
             if self.room < 0:
                 raise OSError(28, "No space left on device")
@@ -169,7 +169,7 @@ def test_after_a_full_disk_nothing_more_is_written():
     writer = begun(full)
     added = 0
 
-    def fill() -> None:
+    def fill():
         nonlocal added
         for step in ROWS:
             put(writer, step)

@@ -10,7 +10,7 @@ import pytest
 from mirotwin.shell.outputs import OutputError, OutputFolder, check_file, check_new, whole_file
 
 
-def write_run(folder: OutputFolder, text: str = "new") -> None:
+def write_run(folder, text="new"):
     for name in ("run.mcap", "summary.json"):
         folder.part(name).write_text(text)
 
@@ -55,7 +55,7 @@ def test_a_run_that_breaks_off_leaves_things_as_they_were(tmp_path, kind):
     target.mkdir()
     (target / "run.mcap").write_text("old")
 
-    def broken_off() -> None:
+    def broken_off():
         with OutputFolder(target, force=True) as staging:
             write_run(staging)
             raise kind

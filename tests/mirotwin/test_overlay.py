@@ -1,7 +1,5 @@
 """The overlay: what a reader of the picture may rely on, and that labels keep clear of each other."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -35,7 +33,7 @@ def drawn(robots, numbers=(0, 1, 2), frames=2, known=False):
     return np.asarray(draw(picture, one, one.notes, "painted")), picture, one
 
 
-def count(pixels, colour) -> int:
+def count(pixels, colour):
     return int((pixels == np.array(colour)).all(axis=-1).sum())
 
 

@@ -35,7 +35,7 @@ SOURCE = RunSource(
 )
 
 
-def recorded(count: int = 3, source: RunSource = SOURCE) -> bytes:
+def recorded(count=3, source=SOURCE):
     stream = io.BytesIO()
     with Recorder(stream, source) as recorder:
         for period in periods(count, [(0, 0), (0, 2), (1, 0)]):
@@ -73,7 +73,7 @@ def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
 
 
 def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed():
-    def with_frames(flushed: int) -> bytes:
+    def with_frames(flushed):
         stream = io.BytesIO()
         with Recorder(stream, SOURCE) as recorder:
             for period in periods(12):
@@ -132,7 +132,7 @@ def test_inner_values_of_different_laws_have_schemas_that_name_them():
     assert parse(stream.getvalue(), "run.mcap").periods[1].robots[1].control == other
 
 
-def message_type_of(topic: str) -> type[msgspec.Struct] | None:
+def message_type_of(topic):
     place = topics.topic_of(topic)
     return None if place is None else channels.message_type(place)
 
@@ -185,7 +185,7 @@ def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods():
     assert parse(stream.getvalue(), "run.mcap").periods == tuple(periods(2))
 
 
-def broken_off(recorder: Recorder) -> None:
+def broken_off(recorder):
     recorder.write(next(periods(1)))
     raise ZeroDivisionError
 
@@ -220,7 +220,7 @@ def test_an_mcap_file_of_another_program_is_not_read_as_a_recording():
         parse(stream.getvalue(), "run.mcap")
 
 
-def blown_up(compression: CompressionType) -> bytes:
+def blown_up(compression):
     """A file of some KB that unpacks to 64 MB."""
     stream = io.BytesIO()
     writer = Writer(stream, compression=compression)
@@ -228,7 +228,7 @@ def blown_up(compression: CompressionType) -> bytes:
     channel = writer.register_channel("/period", "json", 0)
     for _ in range(4):
         writer.add_message(channel, 0, bytes(16 << 20), 0)
-    writer.finish()  # type: ignore[no-untyped-call]
+    writer.finish()
     return stream.getvalue()
 
 
@@ -250,14 +250,14 @@ def test_a_compressed_chunk_is_refused_and_not_unpacked(compression, name):
         tracemalloc.stop()
 
 
-def chunk(data: bytes, size: int | None = None, data_size: int | None = None) -> bytes:
+def chunk(data, size=None, data_size=None):
     """An uncompressed chunk of `data` that may say something else about its length."""
     sizes = (len(data) if size is None else size, len(data) if data_size is None else data_size)
     body = struct.pack("<QQQIIQ", 0, 0, sizes[0], 0, 0, sizes[1]) + data
     return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
 
 
-def nested(depth: int) -> bytes:
+def nested(depth):
     found = b""
     for _ in range(depth):
         found = chunk(found)
@@ -306,7 +306,7 @@ def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size
     assert re.fullmatch(COMPLAINT, recording.broken_off)
 
 
-def sections(data: bytes) -> dict[str, tuple[int, int]]:
+def sections(data):
     """First and last byte of the first record of each kind in a file, and of the magic at both ends."""
     found = {"magic": (0, len(MAGIC) - 1), "magic at the end": (len(data) - len(MAGIC), len(data) - 1)}
     place = len(MAGIC)
@@ -326,7 +326,7 @@ def test_a_recording_has_records_of_all_these_kinds():
     assert kinds | summary < SECTIONS.keys()
 
 
-def refused_with_bit_turned(at: int, bit: int) -> None:
+def refused_with_bit_turned(at, bit):
     data = bytearray(RECORDED)
     data[at] ^= 1 << bit
     with pytest.raises(RecordingError, match=r"run\.mcap: offset \d+: (damaged record|not an MCAP file)"):
@@ -356,5 +356,5 @@ def test_checksums_of_zero_say_nothing_as_other_programs_write_them():
     stream = io.BytesIO()
     writer = Writer(stream, enable_crcs=False, enable_data_crcs=False)
     writer.start()
-    writer.finish()  # type: ignore[no-untyped-call]
+    writer.finish()
     assert list(records(io.BytesIO(stream.getvalue()), "x.mcap")) == []

@@ -1,7 +1,5 @@
 """Replay without a world: scripts, the comparison of periods, and streams as scenarios."""
 
-from typing import Any
-
 import msgspec
 import pytest
 from hypothesis import given
@@ -12,23 +10,22 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
-from miro_sim.periods import Axis, Period
+from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.frame_list import frame_lines
 from mirotwin.recording.compare import differences
-from mirotwin.recording.difference import Difference
 from mirotwin.rerun.script import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
 *BEFORE, PERIOD = periods(4, [(0, 0), (1, 2)])
 
 
-def compare(recorded: Period, replayed: Period) -> Difference | None:
+def compare(recorded, replayed):
     """The first difference, with the period in the place of the last of four."""
     return next(iter(differences([*BEFORE, recorded], [*BEFORE, replayed])), None)
 
 
-def changed(side: str | None = None, **fields: Any) -> Period:
+def changed(side=None, **fields):
     """The period with something else about its second robot."""
     first, second = PERIOD.robots
     if side is None:
@@ -39,7 +36,7 @@ def changed(side: str | None = None, **fields: Any) -> Period:
     return msgspec.structs.replace(PERIOD, robots=(first, second))
 
 
-def team(robots: int, seq: int = 3) -> bytes:
+def team(robots, seq=3):
     return encode(TeamFrame(0, seq, tuple((10 * slot, -slot) for slot in range(robots))), robots)
 
 

@@ -11,11 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from mirotwin.recording.track import ErrorSample, Tracks, error_of, wrapped
 from mirotwin.report.summary import (
-    Summary,
     off_pitch_text,
     rms_name,
     settling_text,
@@ -46,7 +44,7 @@ KEYS = {
 }
 
 
-def summary_of(run: list[Period]) -> Summary:
+def summary_of(run):
     world = SimpleNamespace(
         scenario=load("fig6").scenario,
         seed=7,
@@ -57,7 +55,7 @@ def summary_of(run: list[Period]) -> Summary:
     return summarise(world, Tracks(run), "compiled", 0.5)
 
 
-def samples(*errors: tuple[float, float, float]) -> list[ErrorSample]:
+def samples(*errors):
     return [ErrorSample(index * CONTROL_PERIOD_TICKS, *error) for index, error in enumerate(errors)]
 
 

@@ -15,14 +15,14 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.posture import Posture
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.periods import Control, RobotPeriod
+from miro_sim.periods import Control
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.theory_track import TheoryTrack
 from mirotwin.recording.track import Tracks
-from mirotwin.report.theory import SlidingGains, Theory, authority, gains_of, theory_of, theory_text
+from mirotwin.report.theory import SlidingGains, authority, gains_of, theory_of, theory_text
 from mirotwin.rerun import runner
 from tests.mirotwin.mutated_files import without_sums
 from tests.mirotwin.synthetic import periods, robot
@@ -41,12 +41,7 @@ ORIGIN, HERE = Posture(0.0, 0.0, 0.0), Posture(0.5, 0.0, 0.0)
 NO_GAINS = SlidingGains()
 
 
-def period(
-    truth: Posture,
-    z: tuple[float, float] = (0.0, 0.0),
-    control: Control | None = None,
-    reference: Posture = HERE,
-) -> RobotPeriod:
+def period(truth, z=(0.0, 0.0), control=None, reference=HERE):
     changed = {"truth": truth, "v_m_s": z[0], "w_rad_s": z[1], "control": control, "reference": reference}
     return msgspec.structs.replace(robot(0), **changed)
 
@@ -54,20 +49,20 @@ def period(
 STEPS = st.lists(st.builds(period, PLACES, SPEEDS, COMMANDS), min_size=2, max_size=30)
 
 
-def track_of(run: list[RobotPeriod]) -> TheoryTrack:
+def track_of(run):
     track = TheoryTrack()
     for index, one in enumerate(run):
         track.add(one, index * CONTROL_PERIOD_TICKS)
     return track
 
 
-def theory(run: list[RobotPeriod], gains: SlidingGains = NO_GAINS) -> Theory:
+def theory(run, gains=NO_GAINS):
     found = theory_of(track_of(run), gains)
     assert found is not None
     return found
 
 
-def commanded(v: float, w: float = 0.0, **inner: float) -> Control:
+def commanded(v, w=0.0, **inner):
     return Control(v, w, round(11392.75 * v), round(11392.75 * v), inner)
 
 
@@ -157,7 +152,7 @@ def test_a_period_without_a_command_has_no_f():
 # The assumptions.
 
 
-def on_the_seam(angles: list[float]) -> bool:
+def on_the_seam(angles):
     """Whether a rounding decides on which side of pi an angle, or a change of it, is."""
     changes = [after - before for before, after in pairwise(angles)]
     return any(abs(abs(value) - math.pi) < 1e-9 for value in (*angles, *changes))
@@ -265,7 +260,7 @@ def test_the_gains_are_those_of_each_robots_law():
 SOURCE = RunSource("fig6", "name = 'fig6'\n", 1, b":00000001FF\r\n", "ab" * 32)
 
 
-def recorded(count: int, with_theory: bool) -> bytes:
+def recorded(count, with_theory):
     stream, tracks = io.BytesIO(), Tracks()
     with Recorder(stream, SOURCE) as recorder:
         for one in periods(count, [(0, 0), (1, 2)]):

@@ -12,7 +12,6 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -35,16 +34,16 @@ class Built(NamedTuple):
     error: str = ""
 
     @property
-    def image(self) -> Path:
+    def image(self):
         return self.folder / IMAGE
 
     @property
-    def is_shipped(self) -> bool:
+    def is_shipped(self):
         """Whether the image has the bytes of the shipped sources' one."""
         return not self.error and self.image.read_bytes() == shipped().image.read_bytes()
 
 
-def compiler() -> str:
+def compiler():
     """What SDCC says of itself; empty where it or make is absent, or of another version than the firmware's."""
     if shutil.which("sdcc") is None or shutil.which("make") is None:
         return ""
@@ -53,12 +52,12 @@ def compiler() -> str:
 
 
 @cache
-def shipped() -> Built:
+def shipped():
     """The sources as they are."""
     return build({})
 
 
-def build(changed: Mapping[str, str], cache_folder: Path = CACHE) -> Built:
+def build(changed, cache_folder=CACHE):
     """The firmware in which these files (by name) have these texts."""
     sources = source_files()
     if unknown := sorted(set(changed) - set(sources)):
@@ -74,7 +73,7 @@ def build(changed: Mapping[str, str], cache_folder: Path = CACHE) -> Built:
     return Built(place, error.read_text("utf-8") if error.exists() else "")
 
 
-def _key(texts: Mapping[str, str]) -> str:
+def _key(texts):
     whole = hashlib.sha256(_version().encode())
     for name, text in sorted(texts.items()):
         whole.update(f"{name} {len(text)}\n{text}".encode())
@@ -82,7 +81,7 @@ def _key(texts: Mapping[str, str]) -> str:
 
 
 @cache
-def _version() -> str:
+def _version():
     said = compiler()
     if not said:
         raise RuntimeError(
@@ -91,9 +90,7 @@ def _version() -> str:
     return said
 
 
-def _make(
-    changed: Mapping[str, str], objects: Path | None, place: Path, keep_objects: Path | None = None
-) -> None:
+def _make(changed, objects, place, keep_objects=None):
     """Runs make in a temporary folder; leaves its result at `place`, whole or not at all."""
     place.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=place.parent, prefix="making-") as name:
@@ -117,12 +114,12 @@ def _make(
         _move(made if keep_objects else out, place)
 
 
-def _set_times(folder: Path, later: int) -> None:
+def _set_times(folder, later):
     for path in folder.iterdir():
         os.utime(path, (_LONG_AGO + later, _LONG_AGO + later))
 
 
-def _move(made: Path, place: Path) -> None:
+def _move(made, place):
     """Another process may have been faster: then its result stays."""
     try:
         made.rename(place)
@@ -131,7 +128,7 @@ def _move(made: Path, place: Path) -> None:
             raise
 
 
-def _first_error(said: str) -> str:
+def _first_error(said):
     """The first error line of the compiler, without the folder in which it was called."""
     lines = [line.strip() for line in said.splitlines() if re.search(r"error", line)] or ["make failed"]
     return re.sub(r"\S*/", "", lines[0])

@@ -8,7 +8,6 @@ say `macro`, so that constants with names can be changed where they are defined.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import NamedTuple
 
 _KINDS = (
@@ -36,11 +35,11 @@ class Token(NamedTuple):
     macro: bool
 
     @property
-    def end(self) -> int:
+    def end(self):
         return self.start + len(self.text)
 
 
-def tokens(source: str) -> Iterator[Token]:
+def tokens(source):
     """All of `source`, blanks and comments too: the texts in their order are the source again."""
     macro = False
     for found in _TOKEN.finditer(source):
@@ -52,7 +51,7 @@ def tokens(source: str) -> Iterator[Token]:
         yield Token(kind, found[0], found.start(), macro and kind != "directive")
 
 
-def words(source: str) -> list[Token]:
+def words(source):
     """The tokens that mean something. Raises ValueError for a character that no C source has."""
     found = [token for token in tokens(source) if token.kind not in _BLANK]
     for token in found:

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
@@ -22,9 +20,8 @@ from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import UP, character_ticks
 from miro_robot.image import load_hex
 from miro_robot.lm629.commands import BY_OPCODE
-from miro_sim.periods import Period
 from miro_sim.scenario.file import parse
-from miro_sim.world.events import Cursor, Event
+from miro_sim.world.events import Cursor
 from miro_sim.world.world import World
 from tests.mutants.build import build, shipped
 from tests.mutants.draw import mutants_of, source_files
@@ -62,21 +59,21 @@ class Difference(NamedTuple):
     first: str
     late_us: float
 
-    def __str__(self) -> str:
+    def __str__(self):
         return self.first or (f"the same, up to {self.late_us:g} us apart" if self.late_us else "the same")
 
 
-def seen_of(image: Path, seconds: float, seed: int) -> list[list[Event]]:
+def seen_of(image, seconds, seed):
     """What each robot did, in the order of time."""
     scenario = parse(_SCENARIO.format(seconds=float(seconds)), "difference")
     end_tick = int(seconds * TICKS_PER_SECOND)
     hosts = [Host(seed, index, n, slot) for index, (n, slot) in enumerate(NETWORKS)]
     script = [sent for host in hosts for sent in host.transmissions(end_tick)]
     world = World(scenario, seed, load_hex(image), script)
-    seen: list[list[Event]] = [[] for _ in hosts]
+    seen = [[] for _ in hosts]
     cursors = [Cursor(world.robot(index, slot).log) for index, (_, slot) in enumerate(NETWORKS)]
 
-    def look(period: Period) -> None:
+    def look(period):
         for found, cursor in zip(seen, cursors, strict=True):
             found += [event for _, event in cursor.read() if _counts(event)]
 
@@ -86,7 +83,7 @@ def seen_of(image: Path, seconds: float, seed: int) -> list[list[Event]]:
     return [_without_positions(sorted(events, key=lambda event: event.tick)) for events in seen]
 
 
-def _without_positions(events: list[Event]) -> list[Event]:
+def _without_positions(events):
     """In answers, which begin after a pause, the characters of positions and CRC are 0."""
     place, last_tick, found = 0, 0, []
     for event in events:
@@ -99,7 +96,7 @@ def _without_positions(events: list[Event]) -> list[Event]:
     return found
 
 
-def difference(one: Sequence[Sequence[Event]], other: Sequence[Sequence[Event]]) -> Difference:
+def difference(one, other):
     """Between what two images did under the same stimulus."""
     late = 0
     for mine, theirs in zip(one, other, strict=True):
@@ -114,17 +111,17 @@ def difference(one: Sequence[Sequence[Event]], other: Sequence[Sequence[Event]])
     return Difference("", late / 24)
 
 
-def _counts(event: Event) -> bool:
+def _counts(event):
     command = BY_OPCODE.get(event.opcode)
     return event.what in SEEN and (command is None or not command.words_out)
 
 
-def _content(event: Event) -> tuple[object, ...]:
+def _content(event):
     """What has to be the same in an event of another firmware."""
     return event.what, event.value, event.side, event.opcode, event.data
 
 
-def image_of(name: str) -> Path:
+def image_of(name):
     """Of a mutant by its id, a planted one by its name, or `shipped`. ValueError for anything else."""
     sources = source_files()
     if name == "shipped":
@@ -142,7 +139,7 @@ def image_of(name: str) -> Path:
     return built.image
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("mutants", nargs="+", help="ids of mutants, or names of planted ones")
     parser.add_argument("--seconds", type=float, default=20.0)

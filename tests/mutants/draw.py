@@ -7,7 +7,6 @@ proportion to how many there are. So a small file is seen, and a table of consta
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
@@ -29,22 +28,22 @@ class Mutant(NamedTuple):
     change: Change
 
     @property
-    def id(self) -> str:
+    def id(self):
         return f"{self.file}:{self.line}:{self.column}:{self.change.operator}:{self.change.form}"
 
     @property
-    def diff(self) -> str:
+    def diff(self):
         """The change on one line; places of deleted text are empty."""
         old, new = (" ".join(text.split()) for text in (self.change.old, self.change.new))
         return f"{old} -> {new}"
 
 
-def source_files(folder: Path = SOURCE) -> dict[str, str]:
+def source_files(folder=SOURCE):
     """The C files of the firmware, in the order of their names."""
     return {path.name: path.read_text("utf-8") for path in sorted(folder.glob("*.[ch]"))}
 
 
-def mutants_of(sources: dict[str, str]) -> list[Mutant]:
+def mutants_of(sources):
     """All mutants, by file and place."""
     found = []
     for file, text in sources.items():
@@ -55,10 +54,10 @@ def mutants_of(sources: dict[str, str]) -> list[Mutant]:
     return found
 
 
-def drawn(mutants: Sequence[Mutant], count: int = COUNT, seed: int = SEED) -> list[Mutant]:
+def drawn(mutants, count=COUNT, seed=SEED):
     """`count` of them, or all; the first ones of a longer draw are those of a shorter one."""
     stream = Stream(seed, "mutants of the firmware")
-    groups: dict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
+    groups = defaultdict(list)
     for index, mutant in enumerate(mutants):
         groups[mutant.file, OPERATORS.index(mutant.change.operator)].append((stream.u64(index), index))
     order = []

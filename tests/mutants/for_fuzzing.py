@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 from tests.mutants.planted import PLANTED, Planted
@@ -17,16 +16,16 @@ class ForFuzzing(NamedTuple):
     breaks: str
     needs: str
 
-    def applied(self, sources: Mapping[str, str]) -> dict[str, str]:
+    def applied(self, sources):
         """The texts of the files that the mistake changes. ValueError as `Planted.applied`."""
-        changed: dict[str, str] = {}
+        changed = {}
         for file, right, wrong in self.changes:
             before = changed.get(file, sources[file])
             changed[file] = Planted(self.name, file, right, wrong, self.breaks).applied(before)
         return changed
 
 
-def _of_planted(name: str, check: str, needs: str) -> ForFuzzing:
+def _of_planted(name, check, needs):
     one = PLANTED[name]
     return ForFuzzing(name, check, ((one.file, one.right, one.wrong),), one.breaks, needs)
 

@@ -12,7 +12,6 @@ from miro_protocol.frames import seal
 from miro_protocol.table import TICKS_PER_MS, downlink
 from miro_protocol.transmission import DOWN, Transmission
 from miro_protocol.whitening import whiten
-from miro_robot.image import Image
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
@@ -51,42 +50,42 @@ Input = Sequence[ScriptItem]
 class Host:
     """Sends to the robot in slot 0 of 3. `tick` is when the next character begins; `heard` is what was said."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.tick = READY_TICK
         self.heard: list[ScriptItem] = []
 
-    def bytes(self, data: bytes) -> None:
+    def bytes(self, data):
         self.heard.append(Transmission(self.tick, DOWN, bytes(data)))
         self.tick += len(data) * HOST_CHARACTER_TICKS
 
-    def frame(self, kind: int, seq: int, payload: bytes, lead: int = LEAD) -> None:
+    def frame(self, kind, seq, payload, lead=LEAD):
         """`lead`: characters of the preamble that are sent."""
         self.bytes(sealed(kind, seq, payload)[LEAD - lead :])
 
-    def team(self, seq: int, left: int, right: int, ask: bool = False, lead: int = LEAD) -> None:
+    def team(self, seq, left, right, ask=False, lead=LEAD):
         self.frame(3 if ask else 0, seq, words(left, right), lead)
 
-    def service(self, seq: int, opcode: int, rest: bytes) -> None:
+    def service(self, seq, opcode, rest):
         self.frame(1, seq, bytes([0, opcode]) + rest)
 
-    def pause(self, ms: float) -> None:
+    def pause(self, ms):
         self.tick += round(ms * TICKS_PER_MS)
 
-    def reset(self) -> None:
+    def reset(self):
         self.heard += [Reset(self.tick, 0, 0, 1), Reset(self.tick + _US, 0, 0, 0)]
         self.pause(40)
 
 
-def sealed(kind: int, seq: int, payload: bytes) -> bytes:
+def sealed(kind, seq, payload):
     return seal(FORMAT, bytes([kind << 6 | seq]) + payload.ljust(FORMAT.payload_size, b"\0"))
 
 
-def words(left: int, right: int) -> bytes:
+def words(left, right):
     """Velocities of the robot in slot 0, others stand."""
     return (left & 0xFFFF).to_bytes(2, "little") + (right & 0xFFFF).to_bytes(2, "little")
 
 
-def verdicts(image: Image, heard: Input, busy_clocks: int = DEFAULT_OPTIONS.busy_clocks) -> dict[str, str]:
+def verdicts(image, heard, busy_clocks=DEFAULT_OPTIONS.busy_clocks):
     """By the name of the check, 600 ms after the last thing."""
     text = _SILENT.format(seconds=_length_s(heard), busy_clocks=busy_clocks)
     scenario = parse(text, "silent", (), expectations_of)
@@ -99,7 +98,7 @@ def verdicts(image: Image, heard: Input, busy_clocks: int = DEFAULT_OPTIONS.busy
 
 
 @cache
-def _half_right() -> bytes:
+def _half_right():
     """A damaged team frame whose CRC leaves the low half of the residue as a good one does."""
     sent = sealed(0, 2, words(100, 100))
     for bits in range(1, 1 << 16):
@@ -113,36 +112,36 @@ def _half_right() -> bytes:
     raise AssertionError("no damage leaves half of the residue right")
 
 
-def _length_s(heard: Input) -> float:
+def _length_s(heard):
     last = max(one.end_tick if isinstance(one, Transmission) else one.tick for one in heard)
     return seconds(-(-(last + 600 * TICKS_PER_MS) // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS)
 
 
-def _bad_crc(host: Host) -> None:
+def _bad_crc(host):
     host.team(1, 2000, 2000)
     damaged = bytearray(sealed(0, 2, words(3000, 3000)))
     damaged[10] ^= 4
     host.bytes(damaged)
 
 
-def _half_crc(host: Host) -> None:
+def _half_crc(host):
     host.team(1, 2000, 2000)
     host.bytes(_half_right())
 
 
-def _long_run(host: Host) -> None:
+def _long_run(host):
     host.bytes(bytes(240))
     host.team(1, 2000, 2000)
 
 
-def _at_once(host: Host) -> None:
+def _at_once(host):
     host.team(1, 2000, 2000)
     host.bytes(b"\0\0\0")
     host.pause(20)
     host.team(2, 1000, 1000)
 
 
-def _in_the_window(host: Host) -> None:
+def _in_the_window(host):
     host.team(1, 500, 500)
     host.tick += 133 * _UART_SAMPLE_TICKS
     host.bytes(b"\0")
@@ -150,7 +149,7 @@ def _in_the_window(host: Host) -> None:
     host.team(4, 1000, 1000)
 
 
-def _damaged_meanwhile(host: Host) -> None:
+def _damaged_meanwhile(host):
     host.team(1, 2000, 2000)
     host.pause(20)
     damaged = bytearray(sealed(0, 2, words(3000, 3000)))
@@ -158,50 +157,50 @@ def _damaged_meanwhile(host: Host) -> None:
     host.bytes(damaged)
 
 
-def _nine_on(host: Host) -> None:
+def _nine_on(host):
     host.team(1, 2000, 2000)
     host.team(10, 1000, 1000)
 
 
-def _old_number(host: Host) -> None:
+def _old_number(host):
     host.team(30, 2000, 2000)
     host.reset()
     host.team(10, 1000, 1000)
 
 
-def _full_speed_back(host: Host) -> None:
+def _full_speed_back(host):
     host.team(1, -16500, -16500)
 
 
-def _gains(host: Host) -> None:
+def _gains(host):
     host.service(1, 1, bytes(8) + bytes([10]))
     host.team(2, 2000, 2000)
 
 
-def _acceleration_in_motion(host: Host) -> None:
+def _acceleration_in_motion(host):
     host.team(1, 2000, 2000)
     host.service(2, 2, (9000).to_bytes(4, "little"))
 
 
-def _opcode(host: Host) -> None:
+def _opcode(host):
     host.service(1, 0x80, b"")
 
 
-def _deep(host: Host) -> None:
+def _deep(host):
     host.service(1, 0x2B, b"\xc8")
 
 
-def _load(host: Host) -> None:
+def _load(host):
     host.service(1, 0xB0, b"LOAD")
 
 
-def _stop_while_answering(host: Host) -> None:
+def _stop_while_answering(host):
     host.team(1, 50, 50)
     host.service(2, 2, (1 << 20).to_bytes(4, "little"))
     host.team(3, 0, 0, ask=True)
 
 
-def _in_phase_with_the_answer(host: Host) -> None:
+def _in_phase_with_the_answer(host):
     host.team(3, 2000, 2000, ask=True)
     host.tick += 130 * _UART_SAMPLE_TICKS
     host.team(4, 2000, 2000)
@@ -229,7 +228,7 @@ INPUTS = {
 }
 
 
-def input_for(name: str) -> Input:
+def input_for(name):
     """What shows the mistake of this name."""
     host = Host()
     INPUTS[name](host)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import msgspec
 
@@ -19,7 +18,7 @@ class Judged(msgspec.Struct, frozen=True):
     seconds: float
 
 
-def judged(image: Path, tried: tuple[str, ...] = ()) -> Judged:
+def judged(image, tried=()):
     """Tries these rules on an image, each by itself, whatever it presupposes; () is all of them."""
     rules = [rule for rule in RULES if not tried or rule.id in tried]
     begun = time.process_time()
@@ -29,6 +28,6 @@ def judged(image: Path, tried: tuple[str, ...] = ()) -> Judged:
     return Judged(broken, time.process_time() - begun)
 
 
-def all_rules() -> tuple[str, ...]:
+def all_rules():
     """Ids of the rules there are."""
     return tuple(rule.id for rule in RULES)

@@ -10,10 +10,9 @@ when its decision is negated.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
-from tests.mutants.c_tokens import Token, words
+from tests.mutants.c_tokens import words
 
 CLASSES = {
     "relational": ("<", "<=", ">", ">=", "==", "!="),
@@ -40,20 +39,20 @@ class Change(NamedTuple):
     operator: str
     form: str
 
-    def applied(self, source: str) -> str:
+    def applied(self, source):
         """The mutant's text."""
         assert source.startswith(self.old, self.start)
         return source[: self.start] + self.new + source[self.start + len(self.old) :]
 
 
-def changes(source: str) -> list[Change]:
+def changes(source):
     """All changes of a text that can be made, in the order of their places."""
     found = words(source)
     every = [*_of_tokens(found), *_of_decisions(source, found), *_of_statements(source, found)]
     return sorted(every, key=lambda change: (change.start, OPERATORS.index(change.operator)))
 
 
-def _of_tokens(found: list[Token]) -> Iterator[Change]:
+def _of_tokens(found):
     for place, token in enumerate(found):
         if token.kind == "number":
             for new in _constants(token.text):
@@ -68,7 +67,7 @@ def _of_tokens(found: list[Token]) -> Iterator[Change]:
                     yield Change(token.start, token.text, other, operator, other)
 
 
-def _constants(text: str) -> list[str]:
+def _constants(text):
     """Other values for a constant, written as it is written."""
     digits = text.rstrip("uUlL")
     suffix = text[len(digits) :]
@@ -79,7 +78,7 @@ def _constants(text: str) -> list[str]:
     return [f"(-1{suffix})" if other < 0 else form.format(other) + suffix for other in others]
 
 
-def _is_binary(found: list[Token], place: int) -> bool:
+def _is_binary(found, place):
     """Whether the mark there stands between two operands: before it ends one, and what ends is no cast."""
     before = found[place - 1] if place else None
     if before is None or before.macro != found[place].macro:
@@ -90,7 +89,7 @@ def _is_binary(found: list[Token], place: int) -> bool:
     return (before.kind in ("name", "number", "text") and before.text != "return") or before.text == "]"
 
 
-def _opening(found: list[Token], place: int) -> int:
+def _opening(found, place):
     """Where the parenthesis opens that closes at `place`."""
     depth = 0
     for at in range(place, -1, -1):
@@ -100,7 +99,7 @@ def _opening(found: list[Token], place: int) -> int:
     raise ValueError(f"a parenthesis closes at character {found[place].start} that was never opened")
 
 
-def _closing(found: list[Token], place: int) -> int:
+def _closing(found, place):
     """Where the parenthesis closes that opens at `place`."""
     depth = 0
     for at in range(place, len(found)):
@@ -110,7 +109,7 @@ def _closing(found: list[Token], place: int) -> int:
     raise ValueError(f"the parenthesis at character {found[place].start} is never closed")
 
 
-def _of_decisions(source: str, found: list[Token]) -> Iterator[Change]:
+def _of_decisions(source, found):
     for place, token in enumerate(found):
         if token.text in ("if", "while") and found[place + 1].text == "(":
             begin, end = found[place + 1], found[_closing(found, place + 1)]
@@ -118,7 +117,7 @@ def _of_decisions(source: str, found: list[Token]) -> Iterator[Change]:
             yield Change(begin.start, old, f"(!{old})", "condition", "not")
 
 
-def _of_statements(source: str, found: list[Token]) -> Iterator[Change]:
+def _of_statements(source, found):
     code = [token for token in found if not token.macro and token.kind != "directive"]
     place = 0
     while place < len(code):
@@ -127,7 +126,7 @@ def _of_statements(source: str, found: list[Token]) -> Iterator[Change]:
         place += 1
 
 
-def _of_body(source: str, code: list[Token], place: int) -> Iterator[Change]:
+def _of_body(source, code, place):
     """Statements of a function whose body opens at `place`; returns where it closes."""
     depth = 0
     while True:
@@ -155,5 +154,5 @@ def _of_body(source: str, code: list[Token], place: int) -> Iterator[Change]:
             place += 1
 
 
-def _is_declaration(two: list[Token]) -> bool:
+def _is_declaration(two):
     return two[0].text not in ("return", "goto") and two[0].kind == two[1].kind == "name"

@@ -14,7 +14,7 @@ class Planted(NamedTuple):
     wrong: str
     breaks: str
 
-    def applied(self, source: str) -> str:
+    def applied(self, source):
         """The file's text with the mistake. ValueError unless the right text stands there once."""
         count = source.count(self.right)
         if count != 1:

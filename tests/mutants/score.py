@@ -17,8 +17,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 import msgspec
 
@@ -26,7 +24,7 @@ from mirotwin.campaign.workers import cores, processes
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED
-from tests.mutants.survivors import Survivor, survivors
+from tests.mutants.survivors import survivors
 
 SCORE = CACHE / "score.json"
 LEAST_SHARE = 0.95
@@ -66,7 +64,7 @@ class Score(msgspec.Struct, frozen=True):
     fates: tuple[Fate, ...]
 
 
-def jobs_of(count: int, seed: int, tried: tuple[str, ...] = ()) -> list[Job]:
+def jobs_of(count, seed, tried=()):
     """The mutants of a draw, and the planted ones."""
     sources = source_files()
     found = [
@@ -78,7 +76,7 @@ def jobs_of(count: int, seed: int, tried: tuple[str, ...] = ()) -> list[Job]:
     return found
 
 
-def fate(job: Job) -> Fate:
+def fate(job):
     """Builds and judges one mutant in this process."""
     from tests.mutants.judge import judged  # a new process gets its engine first
 
@@ -93,13 +91,13 @@ def fate(job: Job) -> Fate:
     return msgspec.structs.replace(found, what=named, rules=what.rules, seconds=what.seconds)
 
 
-def fates(jobs: Iterable[Job], count: int) -> Iterator[Fate]:
+def fates(jobs, count):
     """What comes of each job, in their order, by so many processes."""
     with processes(count) as executor:
         yield from executor.map(fate, jobs)
 
 
-def merged(before: Fate, now: Fate, tried: tuple[str, ...], rules: tuple[str, ...]) -> Fate:
+def merged(before, now, tried, rules):
     """What came of a mutant before, with what the `tried` ones of `rules` make of it now."""
     broken = {rule for rule in before.rules if rule not in tried} | set(now.rules)
     kept = tuple(rule for rule in rules if rule in broken)
@@ -107,7 +105,7 @@ def merged(before: Fate, now: Fate, tried: tuple[str, ...], rules: tuple[str, ..
     return msgspec.structs.replace(before, what=what, rules=kept)
 
 
-def share(found: Iterable[Fate], known: dict[str, Survivor]) -> tuple[int, int]:
+def share(found, known):
     """(killed, all that could be killed) of those that were drawn."""
     drawn_ones = [one for one in found if not one.planted]
     killed = len([one for one in drawn_ones if one.what == "killed"])
@@ -115,7 +113,7 @@ def share(found: Iterable[Fate], known: dict[str, Survivor]) -> tuple[int, int]:
     return killed, killed + len([one for one in alive if not (one.id in known and known[one.id].conforms)])
 
 
-def problems(score: Score, known: dict[str, Survivor]) -> list[str]:
+def problems(score, known):
     """What is not as it has to be."""
     found = []
     killed, could = share(score.fates, known)
@@ -133,14 +131,14 @@ def problems(score: Score, known: dict[str, Survivor]) -> list[str]:
     return found
 
 
-def last_score() -> Score:
+def last_score():
     """The last whole one. `SystemExit` where there is none."""
     if not SCORE.exists():
         sys.exit(f"{SCORE}: there is no score yet; run `python -m tests.mutants.score` first")
     return msgspec.json.decode(SCORE.read_bytes(), type=Score)
 
 
-def chosen(asked: argparse.Namespace) -> list[Job]:
+def chosen(asked):
     """The jobs that the options ask for."""
     jobs = jobs_of(asked.count, asked.seed, tuple(asked.rules))
     if asked.planted:
@@ -151,7 +149,7 @@ def chosen(asked: argparse.Namespace) -> list[Job]:
     return [job for job in jobs if job.id in only] if only else jobs
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=COUNT, help="mutants that are drawn")
     parser.add_argument("--seed", type=int, default=SEED, help="of the draw")
@@ -170,7 +168,7 @@ def main() -> None:
     sys.exit(_score(jobs, asked, whole))
 
 
-def _score(jobs: list[Job], asked: argparse.Namespace, whole: bool) -> int:
+def _score(jobs, asked, whole):
     from tests.mutants.judge import all_rules, judged
 
     right = judged(shipped().image)
@@ -178,7 +176,7 @@ def _score(jobs: list[Job], asked: argparse.Namespace, whole: bool) -> int:
         sys.exit(f"the shipped firmware breaks {', '.join(right.rules)}")
     before = {one.id: one for one in last_score().fates} if asked.rules else {}
     jobs = [job if job.id in before else msgspec.structs.replace(job, tried=()) for job in jobs]
-    found: list[Fate] = []
+    found = []
     for one in fates(jobs, asked.jobs):
         found.append(
             merged(before[one.id], one, tuple(asked.rules), all_rules()) if one.id in before else one
@@ -200,7 +198,7 @@ def _score(jobs: list[Job], asked: argparse.Namespace, whole: bool) -> int:
     return 1 if against else 0
 
 
-def _write(path: Path, data: bytes) -> None:
+def _write(path, data):
     part = path.with_suffix(".part")
     part.write_bytes(data)
     os.replace(part, path)

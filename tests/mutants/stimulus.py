@@ -1,12 +1,8 @@
 """What a host with all kinds of faults sends for a while: the same characters for every firmware."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_exact.rng import Stream
-from miro_protocol.frames import Message, ServiceFrame, TeamFrame, encode
+from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.table import SYNC
 from miro_protocol.transmission import DOWN, Transmission
 
@@ -31,19 +27,19 @@ class Host:
 
     NOT_STATE = ("draw", "index", "n", "network", "seq", "slot", "tick")
 
-    def __init__(self, seed: int, network: int, n: int, slot: int) -> None:
+    def __init__(self, seed, network, n, slot):
         self.draw = Stream(seed, f"stimulus of net{network}")
         self.index = 0
         self.network, self.n, self.slot = network, n, slot
         self.seq = 0
         self.tick = 10 * MS
 
-    def pick(self, count: int) -> int:
+    def pick(self, count):
         """0 .. count - 1."""
         self.index += 1
         return self.draw.u32(self.index) % count
 
-    def transmissions(self, end_tick: int) -> Iterator[Transmission]:
+    def transmissions(self, end_tick):
         """Until the next one would begin after `end_tick`."""
         while self.tick < end_tick:
             begun = self.tick
@@ -56,7 +52,7 @@ class Host:
             else:
                 self.tick += self.pick(12) * MS
 
-    def sent(self, kind: int) -> Iterator[Transmission]:
+    def sent(self, kind):
         """One message, whole or with one fault, or no message at all."""
         if kind == 0:
             yield self.characters(bytes(self.pick(256) for _ in range(1 + self.pick(GARBAGE))))
@@ -78,12 +74,12 @@ class Host:
         else:
             yield self.characters(bytes(data))
 
-    def characters(self, data: bytes, bad_stop: tuple[int, ...] = ()) -> Transmission:
+    def characters(self, data, bad_stop=()):
         begun = self.tick
         self.tick += len(data) * HOST_CHARACTER_TICKS
         return Transmission(begun, DOWN, data, self.network, bad_stop)
 
-    def message(self) -> Message:
+    def message(self):
         """Mostly the next number; now and then the same, an old or a far one."""
         step = self.pick(16)
         self.seq = (self.seq + (step if step < 3 else self.pick(64) if step == 3 else 1)) & 63
@@ -96,7 +92,7 @@ class Host:
             pairs = ((0, 0),) * self.n
         return TeamFrame(3 if self.pick(2) else 0, self.seq, pairs)
 
-    def velocity(self) -> int:
+    def velocity(self):
         if self.pick(3):
             return VELOCITIES[self.pick(len(VELOCITIES))]
         return self.pick(65535) - 32767

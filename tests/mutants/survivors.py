@@ -23,11 +23,11 @@ class Survivor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     because: str
 
     @property
-    def conforms(self) -> bool:
+    def conforms(self):
         """Whether no right rule can kill it."""
         return self.verdict in ("equivalent", "allowed")
 
 
-def survivors(path: Path = TABLE) -> dict[str, Survivor]:
+def survivors(path=TABLE):
     """By id. Raises `msgspec.ValidationError` for an entry that is not one."""
     return msgspec.toml.decode(path.read_bytes(), type=dict[str, Survivor])

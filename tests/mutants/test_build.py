@@ -12,7 +12,7 @@ pytestmark = needs_sdcc
 SOURCES = source_files()
 
 
-def changed(file: str, right: str, wrong: str) -> dict[str, str]:
+def changed(file, right, wrong):
     assert right in SOURCES[file]
     return {file: SOURCES[file].replace(right, wrong)}
 

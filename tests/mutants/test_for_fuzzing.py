@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from tests.mutants.build import build, shipped
 from tests.mutants.draw import source_files
@@ -18,13 +18,13 @@ SOURCES = source_files()
 
 
 @cache
-def image_of(name: str) -> Image:
+def image_of(name):
     found = build(FOR_FUZZING[name].applied(SOURCES))
     assert not found.error, found.error
     return load_hex(found.image)
 
 
-def seen(image: Image, name: str) -> dict[str, str]:
+def seen(image, name):
     busy_clocks = SLOW_CHIPS.get(name, DEFAULT_OPTIONS.busy_clocks)
     return verdicts(image, input_for(name), busy_clocks)
 

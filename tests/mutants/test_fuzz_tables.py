@@ -11,14 +11,12 @@ from tests.mutants.for_fuzzing import FOR_FUZZING
 NAME = "takes a ninth step"
 
 
-def trial(
-    engine: str, seed: int, found_s: float | None, checks: tuple[str, ...] = (), seeded: bool = False
-) -> Trial:
+def trial(engine, seed, found_s, checks=(), seeded=False):
     wanted = Wanted("for fuzzing", NAME, FOR_FUZZING[NAME].check, engine, seed, 60.0, "folder")
     return Trial(wanted, found_s, 70.0, checks, seeded)
 
 
-def row(*trials: Trial) -> list[str]:
+def row(*trials):
     lines = [line for line in render(trials).splitlines() if line.startswith(f"| {NAME} ")]
     return [cell.strip() for cell in lines[0].split("|")[4:-1]]
 
@@ -64,7 +62,7 @@ def test_what_was_found_is_counted_seed_by_seed():
 
 
 def test_planted_mistakes_stand_beside_each_other_by_engine():
-    def planted(engine: str, seed: int, found_s: float | None) -> Trial:
+    def planted(engine, seed, found_s):
         checks = ("no_fault",) if found_s else ()
         return Trial(
             Wanted("planted", "swaps the wheels", "", engine, seed, 20.0, "folder"), found_s, 1.0, checks

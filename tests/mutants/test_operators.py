@@ -13,11 +13,11 @@ MUTANTS = mutants_of(SOURCES)
 OF_A_TOKEN = [one for one in MUTANTS if one.change.operator not in ("condition", "statement")]
 
 
-def texts(source: str) -> list[str]:
+def texts(source):
     return [token.text for token in words(source)]
 
 
-def made(source: str, operator: str) -> list[str]:
+def made(source, operator):
     return [change.applied(source) for change in changes(source) if change.operator == operator]
 
 

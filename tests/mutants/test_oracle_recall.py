@@ -41,14 +41,14 @@ def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(
         code = 0
         finding = None
 
-        def __init__(self, *arguments: object) -> None:
-            self.seeing = oracle_recall.RobotTarget(*arguments)  # type: ignore[arg-type]
+        def __init__(self, *arguments):
+            self.seeing = oracle_recall.RobotTarget(*arguments)
 
-        def run(self, data: bytes) -> int:
+        def run(self, data):
             self.seeing.run(data)
             return 0
 
-        def __getattr__(self, name: str) -> object:
+        def __getattr__(self, name):
             return getattr(self.seeing, name)
 
     one = PLANTED["never answers"]

@@ -13,11 +13,11 @@ EQUIVALENT = Survivor("equivalent", "It is the same.")
 MISSING = Survivor("missing", "No rule looks there.")
 
 
-def of_draw(number: int, what: str, *rules: str) -> Fate:
+def of_draw(number, what, *rules):
     return Fate(f"a.c:{number}:1:constant:0", "1 -> 0", False, what, rules, 2.0)
 
 
-def planted(what: str, *rules: str) -> Fate:
+def planted(what, *rules):
     return Fate("never stops", "", True, what, rules)
 
 
@@ -25,7 +25,7 @@ KILLED = [of_draw(number, "killed", "P01") for number in range(19)]
 OTHERS = [of_draw(90, "does not compile"), of_draw(91, "same bytes"), planted("killed", "P02")]
 
 
-def objected(*fates: Fate, known: dict[str, Survivor]) -> list[str]:
+def objected(*fates, known):
     return problems(Score(0, ("P01", "P02"), 2.0, (*KILLED, *OTHERS, *fates)), known)
 
 

@@ -12,13 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from miro_exact.dmath import sincos
-from miro_exact.rng import Stream, philox4x32
-from miro_host.eye.camera_parameters import CameraParameters
+from miro_exact.rng import philox4x32
 from miro_host.eye.lens import Lens
-from miro_host.eye.patterns import IDENTITIES, TEAMS, Pattern
+from miro_host.eye.patterns import IDENTITIES, TEAMS
 from miro_sim.pitch import sensor as ours
 from miro_sim.pitch.paints import BLACK_FLOOR, NUMBERS, PAINTS
-from miro_sim.pitch.picture_settings import PictureSettings
 
 Ints = Any  # numpy array of int64
 
@@ -35,16 +33,14 @@ class Body(NamedTuple):
     w_rad_s: float = 0.0
 
 
-def um(metres: float) -> int:
+def um(metres):
     return math.floor(metres * 1e6 + 0.5)
 
 
 class NaiveCamera:
     """The same arguments as the camera, and `bodies` and `ball` (x_m, y_m) for the scene."""
 
-    def __init__(
-        self, parameters: CameraParameters, settings: PictureSettings, pattern: Pattern, stream: Stream
-    ) -> None:
+    def __init__(self, parameters, settings, pattern, stream):
         self.parameters = parameters
         self.lens = Lens(parameters)
         self.settings = settings
@@ -53,7 +49,7 @@ class NaiveCamera:
         self.bodies: list[Body] = []
         self.ball: tuple[float, float] | None = None
 
-    def window(self, left: int, top: int, width: int, height: int, frame: int, tick: int) -> bytearray:
+    def window(self, left, top, width, height, frame, tick):
         """The bytes of a window."""
         reach = len(ours._taps(self.settings.chroma_bandwidth_hz)) - 1
         first, end = max(0, left - reach - 1), min(320, left + width + reach + 1)
@@ -69,7 +65,7 @@ class NaiveCamera:
         shown = self._shown(totals, self._light(slope_x, slope_y, first, top), tick, 16 * instants)
         return self._written(shown, first, left, top, width, height, frame, reach)
 
-    def _slopes(self, left: int, top: int, width: int, height: int) -> tuple[Ints, Ints]:
+    def _slopes(self, left, top, width, height):
         corners = np.zeros((2, height + 1, width + 1), np.int64)
         for j in range(height + 1):
             for i in range(width + 1):
@@ -79,17 +75,17 @@ class NaiveCamera:
         self.corners = corners
         return between(corners[0]), between(corners[1])
 
-    def _falls(self, slope_x: Ints, slope_y: Ints) -> tuple[Ints, Ints]:
+    def _falls(self, slope_x, slope_y):
         """From the tops to the floor, at the middle of each pixel."""
         c = self.corners
         summed = c[:, :-1, :-1] + c[:, :-1, 1:] + c[:, 1:, :-1] + c[:, 1:, 1:]
         falls = 75_000 * summed >> 24
         return falls[0][:, :, None, None], falls[1][:, :, None, None]
 
-    def _tops(self, corners: Ints, camera_um: int) -> Ints:
+    def _tops(self, corners, camera_um):
         return camera_um + ((um(self.parameters.height_m) - 75_000) * corners >> 22)
 
-    def _seen(self, slope_x: Ints, slope_y: Ints, falls: tuple[Ints, Ints], field: int, instant: int) -> Ints:
+    def _seen(self, slope_x, slope_y, falls, field, instant):
         """The paint of each sample: the highest thing that its ray hits."""
         rows = slice(0, 4) if self.settings.fields == 1 else slice(2 * field, 2 * field + 2)
         paint = self._still(slope_x, slope_y)
@@ -115,7 +111,7 @@ class NaiveCamera:
             height = np.where(on_top, 75_000, height)
         return paint
 
-    def _stands(self, body: Body, field: int, instant: int) -> tuple[int, int, int, int]:
+    def _stands(self, body, field, instant):
         instants = self.settings.sub_exposures
         share = (instant * 2 + 1) / (2.0 * instants) - 0.5
         field_s = (field - 0.5 * (self.settings.fields - 1)) * (1001.0 / 60000.0)
@@ -126,7 +122,7 @@ class NaiveCamera:
         sine, cosine = sincos(body.theta_rad + body.w_rad_s * after_s)
         return x, y, math.floor(cosine * 32768.0 + 0.5), math.floor(sine * 32768.0 + 0.5)
 
-    def _top(self, body: Body, u: Ints, v: Ints) -> Ints:
+    def _top(self, body, u, v):
         team_u, team_v = self.pattern.team_mm
         own_u, own_v = self.pattern.identity_mm
         team = np.maximum(abs(u - 1000 * team_u), abs(v - 1000 * team_v)) <= 17_500
@@ -134,10 +130,10 @@ class NaiveCamera:
         paint = np.where(own, NUMBERS[IDENTITIES[body.identity]], NUMBERS["top"])
         return np.where(team, NUMBERS[TEAMS[body.team]], paint)
 
-    def _at(self, slope: Ints, camera_um: int, height_um: int) -> Ints:
+    def _at(self, slope, camera_um, height_um):
         return camera_um + ((um(self.parameters.height_m) - height_um) * slope >> 22)
 
-    def _still(self, slope_x: Ints, slope_y: Ints) -> Ints:
+    def _still(self, slope_x, slope_y):
         """Walls and floor."""
         camera_x, camera_y = um(self.parameters.x_m), um(self.parameters.y_m)
         x, y = (
@@ -154,7 +150,7 @@ class NaiveCamera:
         paint = np.where(inside(x, y), paint, NUMBERS["wall face"])
         return np.where(over, paint, np.where(ring, NUMBERS["wall top"], NUMBERS["outside"]))
 
-    def _ball(self, slope_x: Ints, slope_y: Ints) -> tuple[Ints, Ints]:
+    def _ball(self, slope_x, slope_y):
         """Height at which it is seen, and its ring; -1 where it is not."""
         nowhere = np.full(slope_x.shape, -1, np.int64)
         if self.ball is None:
@@ -174,11 +170,11 @@ class NaiveCamera:
         height = radius - (along << 12) // stretch
         return np.where(hit, height, -1), np.where(hit, ring, -1)
 
-    def _colours(self) -> Ints:
+    def _colours(self):
         paints = {**PAINTS, "floor": BLACK_FLOOR} if self.settings.black_floor else PAINTS
         return np.array([[4095 * part // 1000 for part in paint] for paint in paints.values()], np.int64)
 
-    def _light(self, slope_x: Ints, slope_y: Ints, left: int, top: int) -> Ints:
+    def _light(self, slope_x, slope_y, left, top):
         """Of each pixel, times 4096."""
         far = 625e9
         falloff = math.floor(self.settings.light_falloff * 4096.0 * 4503599627370496.0 / far + 0.5)
@@ -188,7 +184,7 @@ class NaiveCamera:
         y = ((y[:-1, :-1] + y[:-1, 1:] + y[1:, :-1] + y[1:, 1:] + 2) >> 2) - 350_000
         return np.maximum(0, 4096 - ((x * x + y * y >> 20) * falloff >> 32))
 
-    def _shown(self, totals: Ints, light: Ints, tick: int, samples: int) -> Ints:
+    def _shown(self, totals, light, tick, samples):
         """Y, Cb, Cr with four fraction bits."""
         settings = self.settings
         turns = settings.exposure_s * 2 * settings.mains_hz
@@ -212,17 +208,7 @@ class NaiveCamera:
             2,
         )
 
-    def _written(
-        self,
-        shown: Ints,
-        first: int,
-        left: int,
-        top: int,
-        width: int,
-        height: int,
-        frame: int,
-        reach: int,
-    ) -> bytearray:
+    def _written(self, shown, first, left, top, width, height, frame, reach):
         settings = self.settings
         taps = ours._taps(settings.chroma_bandwidth_hz)
         normals = ours._normals()
@@ -251,14 +237,14 @@ class NaiveCamera:
                 out += bytes(quantised(value, settings.bits) for value in (y, cb, cr))
         return out
 
-    def _words(self, block: int) -> tuple[int, int, int, int]:
+    def _words(self, block):
         s = self.stream
         tag = hashlib.sha256(s.name.encode()).digest()
         names = int.from_bytes(tag[0:4], "little"), int.from_bytes(tag[4:8], "little")
         return philox4x32(block & 0xFFFFFFFF, block >> 32, *names, s.seed & 0xFFFFFFFF, s.seed >> 32)
 
 
-def between(corners: Ints) -> Ints:
+def between(corners):
     """The samples of all pixels between their corners: [row, column, sample row, sample column]."""
     p = np.array([1, 3, 5, 7], np.int64)[None, None, None, :]
     q = np.array([1, 3, 5, 7], np.int64)[None, None, :, None]
@@ -266,11 +252,11 @@ def between(corners: Ints) -> Ints:
         part[:, :, None, None]
         for part in (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
     )
-    found: Ints = ((a * (8 - q) + c * q) * (8 - p) + (b * (8 - q) + d * q) * p) >> 6
+    found = ((a * (8 - q) + c * q) * (8 - p) + (b * (8 - q) + d * q) * p) >> 6
     return found
 
 
-def meets(u: Ints, v: Ints, fall_u: Ints, fall_v: Ints) -> Ints:
+def meets(u, v, fall_u, fall_v):
     """Whether the line from (u, v) on by the fall meets the robot's square."""
     half = 37_500
     middle_u, middle_v = 2 * u + fall_u, 2 * v + fall_v
@@ -281,7 +267,7 @@ def meets(u: Ints, v: Ints, fall_u: Ints, fall_v: Ints) -> Ints:
     )
 
 
-def entries(u: Ints, v: Ints, fall_u: Ints, fall_v: Ints) -> Ints:
+def entries(u, v, fall_u, fall_v):
     """The height at which it enters the square, where it does."""
     t_u = np.where(
         (abs(u) > 37_500) & (fall_u != 0), (abs(u) - 37_500 << 16) // np.maximum(abs(fall_u), 1), 0
@@ -292,13 +278,13 @@ def entries(u: Ints, v: Ints, fall_u: Ints, fall_v: Ints) -> Ints:
     return 75_000 - (75_000 * np.maximum(t_u, t_v) >> 16)
 
 
-def inside(x: Ints, y: Ints) -> Ints:
+def inside(x, y):
     """Between the walls or in a goal; distances from the middle of the pitch."""
     field = (x <= 650_000) & (y <= 450_000) & (x + y <= 650_000 + 450_000 - 70_000)
     return field | ((y <= 200_000) & (x <= 800_000))
 
 
-def on_line(x: Ints, y: Ints) -> Ints:
+def on_line(x, y):
     """Middle line, circle, goal line and goal area."""
     square = x * x + y * y
     circle = (square >= 248_500**2) & (square <= 251_500**2)
@@ -309,7 +295,7 @@ def on_line(x: Ints, y: Ints) -> Ints:
     return (x <= 1_500) | circle | goal | front | flank
 
 
-def gamma_table(settings: PictureSettings) -> list[int]:
+def gamma_table(settings):
     """What each of 4096 brightnesses is shown as, with four fraction bits."""
     from miro_exact.dmath import exp, log
 
@@ -318,14 +304,14 @@ def gamma_table(settings: PictureSettings) -> list[int]:
     ]
 
 
-def moved(line: dict[int, int], by: int) -> dict[int, int]:
+def moved(line, by):
     """A line moved by `by`/256 pixels: each value becomes that from so far to its right."""
     if by >= 0:
         return {k: v + ((line.get(k + 1, v) - v) * by >> 8) for k, v in line.items()}
     return {k: v + ((line.get(k - 1, v) - v) * -by >> 8) for k, v in line.items()}
 
 
-def filtered(line: dict[int, int], column: int, taps: list[int]) -> int:
+def filtered(line, column, taps):
     """The low-pass; beyond the picture the line goes on as at its border."""
     total = line[column] * taps[0]
     for step, tap in enumerate(taps[1:], 1):
@@ -333,7 +319,7 @@ def filtered(line: dict[int, int], column: int, taps: list[int]) -> int:
     return total >> 16
 
 
-def quantised(value: int, bits: int) -> int:
+def quantised(value, bits):
     value = min(max((value + 8) >> 4, 0), 255)
     lost = 8 - bits
     return (value >> lost << lost) + ((1 << lost) >> 1)

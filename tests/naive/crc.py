@@ -1,7 +1,7 @@
 """CRC-16 5935h reflected, one bit at a time, and PN9 by its recurrence over a plain list: nothing clever."""
 
 
-def crc16(data: bytes) -> int:
+def crc16(data):
     register = 0xFFFF
     for byte in data:
         for bit in range(8):
@@ -12,7 +12,7 @@ def crc16(data: bytes) -> int:
     return register ^ 0xFFFF
 
 
-def pn9(length: int) -> bytes:
+def pn9(length):
     bits = [1] * 9
     while len(bits) < 8 * length:
         bits.append(bits[-9] ^ bits[-4])

@@ -6,10 +6,9 @@ Commands are generators that wait for their words; it shares nothing with the pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from fractions import Fraction
 
-from miro_robot.lm629.options import Lm629Options
 from tests.naive.lm629_encoder import NaiveEncoder
 from tests.naive.lm629_parts import HIGH_WORD_READS, LSB, NaivePid, between, modular, profile_speed
 
@@ -20,7 +19,7 @@ INTERRUPTS = range(1, 7)
 class NaiveLm629:
     """Same inputs as the chip. `run_to(tick)` does what is due by then; outputs are asked for by tick."""
 
-    def __init__(self, options: Lm629Options) -> None:
+    def __init__(self, options):
         self.options = options
         self.encoder = NaiveEncoder(options.filter_clocks, options.double_step, hurry=True)
         self.pins = {"cs": 1, "rd": 1, "wr": 1, "ps": 1, "data": 0xFF}
@@ -35,7 +34,7 @@ class NaiveLm629:
         self.index_position = 0
         self.clear("hard")
 
-    def clear(self, reset: str) -> None:
+    def clear(self, reset):
         self.reset: str | None = reset
         self.pid = NaivePid(self.options.pid_saturates, self.options.sum_rounding == "down")
         self.excess = False
@@ -66,7 +65,7 @@ class NaiveLm629:
         self.strobe_counts = "no"
         self.drop_counts()
 
-    def drop_counts(self) -> None:
+    def drop_counts(self):
         """In a reset; a wait for an index may go on (R6), but what was caught is lost."""
         armed = self.encoder.armed
         self.encoder.drop()
@@ -77,7 +76,7 @@ class NaiveLm629:
 
     # -------------------------------------------------------------------------------------- time
 
-    def run_to(self, tick: int) -> None:
+    def run_to(self, tick):
         while self.alive_at is not None:
             if self.reset and self.alive_at <= tick:
                 self.reset = None
@@ -92,7 +91,7 @@ class NaiveLm629:
             else:
                 return
 
-    def clear_after_reset(self) -> None:
+    def clear_after_reset(self):
         self.drop_counts()
         self.mask = {1, 2, 3, 4, 5} if self.options.reset_interrupts else set()
         self.signals |= {8, 7}
@@ -101,17 +100,17 @@ class NaiveLm629:
         if not self.options.reset_disarms_breakpoint:
             self.breakpoint = (0, 0)
 
-    def flag(self, bit: int) -> None:
+    def flag(self, bit):
         if bit not in self.signals and bit in self.mask:
             self.signals.add(15)
         self.signals.add(bit)
 
-    def complain(self, about: bool) -> None:
+    def complain(self, about):
         if about:
             self.flag(1)
 
-    def sample(self, tick: int) -> None:
-        events: set[int] = set()
+    def sample(self, tick):
+        events = set()
         counts, index = self.encoder.take(tick)
         if index is not None:
             self.index_position = modular(self.real + index, 31)
@@ -166,12 +165,12 @@ class NaiveLm629:
         for bit in sorted(events):
             self.flag(bit)
 
-    def stand_at_real(self) -> None:
+    def stand_at_real(self):
         self.desired = Fraction(self.real)
         self.speed = 0
         self.activity = "none"
 
-    def begin_motion(self, events: set[int]) -> None:
+    def begin_motion(self, events):
         assert self.start is not None
         if self.options.start_takes == "sample":
             self.take()
@@ -200,14 +199,14 @@ class NaiveLm629:
         else:
             self.activity = "stop" if control & 0x0400 else "velocity" if control & 0x0800 else "position"
 
-    def arrive(self, events: set[int]) -> None:
+    def arrive(self, events):
         self.desired = Fraction(self.target)
         self.speed = 0
         self.activity = "none"
         self.signals.add(10)
         events.add(2)
 
-    def move(self, speed: int, events: set[int]) -> None:
+    def move(self, speed, events):
         self.speed = speed
         self.desired += speed * LSB
         wrapped = modular(math.floor(self.desired), 31)
@@ -215,7 +214,7 @@ class NaiveLm629:
             events.add(4)
             self.desired += wrapped - math.floor(self.desired)
 
-    def profile(self, events: set[int]) -> None:
+    def profile(self, events):
         if self.activity in ("velocity", "stop"):
             goal = 0 if self.activity == "stop" else self.limit * (1 if self.mode_bits & 0x1000 else -1)
             self.move(between(self.speed - self.a, goal, self.speed + self.a), events)
@@ -237,7 +236,7 @@ class NaiveLm629:
                 self.move(s * profile_speed(v, self.a, self.limit, distance), events)
 
     # -------------------------------------------------------------------------------------- pins
-    def set_reset(self, tick: int, level: int) -> None:
+    def set_reset(self, tick, level):
         self.run_to(tick)
         if self.rst and not level:
             self.rst_fell = tick
@@ -249,13 +248,13 @@ class NaiveLm629:
             self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
         self.rst = level
 
-    def set_encoder(self, tick: int, a: int, b: int) -> None:
+    def set_encoder(self, tick, a, b):
         self.encoder.set_phases(tick, a, b)
 
-    def set_index(self, tick: int, level: int) -> None:
+    def set_index(self, tick, level):
         self.encoder.set_index(tick, level)
 
-    def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
+    def set_bus(self, tick, cs, rd, wr, ps, data):
         self.run_to(tick)
         flags = self.status_at(tick) & 0xFE
         new = "write" if not cs and not wr else "read" if not cs and not rd else ""
@@ -270,7 +269,7 @@ class NaiveLm629:
         if late is not None:
             late()
 
-    def strobe_begins(self, tick: int, kind: str, flags: int) -> None:
+    def strobe_begins(self, tick, kind, flags):
         busy = tick < self.busy_until or self.reset is not None
         if kind == "write":
             self.strobe_counts = "no" if busy else "yes"
@@ -286,7 +285,7 @@ class NaiveLm629:
             self.strobe_counts = "no" if busy else "yes" if self.answer else "error" if flagged else "no"
             self.driven = self.answer[0] if self.answer and not busy else self.port_byte
 
-    def strobe_ends(self, tick: int, kind: str, pins: dict[str, int]) -> Callable[[], None]:
+    def strobe_ends(self, tick, kind, pins):
         """What the end of a strobe does to the port at once; returns what it does to the chip."""
         if self.strobe_counts == "we will see":
             self.strobe_counts = "no" if tick < self.busy_until else "yes"
@@ -320,29 +319,29 @@ class NaiveLm629:
         self.busy_until = tick + 4 * self.options.busy_clocks
         return lambda: self.give(word)
 
-    def give(self, word: int) -> None:
+    def give(self, word):
         assert self.words is not None
         try:
             self.words.send(word)
         except StopIteration:
             self.words = None
 
-    def data_out(self, tick: int) -> int:
+    def data_out(self, tick):
         reading = not self.pins["cs"] and not self.pins["rd"] and self.pins["wr"]
         return self.driven if reading else -1
 
-    def status_at(self, tick: int) -> int:
+    def status_at(self, tick):
         if self.reset:
             return int(self.reset == "soft" and self.options.software_reset_busy)
         return sum(1 << bit for bit in self.signals if 0 < bit < 8) | (tick < self.busy_until)
 
-    def signals_word(self) -> int:
+    def signals_word(self):
         word = sum(1 << bit for bit in self.signals - {15})
         if self.options.interrupt == "level":
             return word | (0x8000 if self.signals & self.mask else 0)
         return word | (0x8000 if 15 in self.signals else 0)
 
-    def pwm_at(self, tick: int) -> int:
+    def pwm_at(self, tick):
         if self.reset or self.alive_at is None:
             return 0
         place = (tick - self.next_sample) % 2048
@@ -352,9 +351,9 @@ class NaiveLm629:
 
     # -------------------------------------------------------------------------------------- commands
 
-    def command(self, tick: int, opcode: int, unfinished: bool) -> None:
+    def command(self, tick, opcode, unfinished):
         self.complain(unfinished and self.options.unfinished_flags)
-        words: dict[int, Callable[[], Words]] = {
+        words = {
             0x1A: lambda: self.load_threshold(stop=True),
             0x1B: lambda: self.load_threshold(stop=False),
             0x1C: self.mask_interrupts,
@@ -396,11 +395,11 @@ class NaiveLm629:
         else:
             self.complain(self.options.unknown_opcode_flags)
 
-    def home(self, position: Fraction) -> Fraction:
+    def home(self, position):
         moved = position - self.real
         return moved + modular(math.floor(moved), 31) - math.floor(moved)
 
-    def reading(self, tick: int, opcode: int) -> int:
+    def reading(self, tick, opcode):
         limited_sum = between(-self.pid.il, self.pid.top(), self.pid.il)
         real = self.real
         if self.options.read_position == "live":
@@ -416,7 +415,7 @@ class NaiveLm629:
             0x0D: self.pid.integral if self.options.sum_reading == "term" else limited_sum,
         }[opcode]
 
-    def start_motion(self) -> None:
+    def start_motion(self):
         in_motion = not self.signals & {7, 10}
         stopping = self.buffer["control"] & 0x0700 and self.options.stop_lifts_refusal
         if 14 in self.signals and in_motion and not stopping:
@@ -427,41 +426,41 @@ class NaiveLm629:
             self.take()
         self.signals.discard(14)
 
-    def take(self) -> None:
+    def take(self):
         self.start = dict(self.buffer)
         self.start_relative = self.relative
         self.buffer["control"] &= 0x1F00 if self.options.stop_bits_stay else 0x1800
         self.newer_position = False
 
-    def fitted(self, value: int, bits: int) -> int:
+    def fitted(self, value, bits):
         """A parameter without sign."""
         if value < 1 << bits:
             return value
         self.complain(self.options.range_flags)
         return (1 << bits) - 1 if self.options.out_of_range == "clamped" else value % (1 << bits)
 
-    def load_threshold(self, stop: bool) -> Words:
+    def load_threshold(self, stop):
         self.threshold = self.fitted((yield), 15)
         self.signals.discard(9)
         if stop:
             self.signals.add(9)
 
-    def mask_interrupts(self) -> Words:
+    def mask_interrupts(self):
         word = yield
         self.mask = {bit for bit in INTERRUPTS if word >> bit & 1}
 
-    def reset_interrupts(self) -> Words:
+    def reset_interrupts(self):
         word = yield
         self.signals -= {15} | {bit for bit in INTERRUPTS if not word >> bit & 1}
 
-    def load_filter(self) -> Words:
+    def load_filter(self):
         control = yield
         self.filter["ds"] = control >> 8
         for bit, name in ((3, "kp"), (2, "ki"), (1, "kd"), (0, "il")):
             if control >> bit & 1:
                 self.filter[name] = self.fitted((yield), 15)
 
-    def load_trajectory(self) -> Words:
+    def load_trajectory(self):
         control = yield
         self.buffer["control"] = control & 0x1F00
         if self.options.unsent == "working":
@@ -491,7 +490,7 @@ class NaiveLm629:
             if name == "a":
                 self.signals.add(14)
 
-    def set_breakpoint(self, base: int) -> Words:
+    def set_breakpoint(self, base):
         high = yield
         low = yield
         place = modular(base + (high << 16 | low), 31)

@@ -20,16 +20,16 @@ NEEDED_NS = {
 Pins = tuple[int, int, int, int, int]  # cs, rd, wr, ps, data
 
 
-def strobe(pins: Pins) -> str:
+def strobe(pins):
     cs, rd, wr, _, _ = pins
     return "" if cs else "write" if not wr else "read" if not rd else ""
 
 
 class NaiveBusTiming:
-    def __init__(self) -> None:
+    def __init__(self):
         self.history: list[tuple[int, Pins]] = [(-(10**9), (1, 1, 1, 1, 0xFF))]
 
-    def since(self, tick: int, change: str) -> Fraction:
+    def since(self, tick, change):
         """How long ago `change` last happened, edges on `tick` itself not counted."""
         for (_, before), (at, after) in reversed(list(zip(self.history, self.history[1:], strict=False))):
             moved = strobe(before) != strobe(after)
@@ -44,12 +44,12 @@ class NaiveBusTiming:
                 return (tick - at) * TICK_NS
         return Fraction(10**12)
 
-    def pins(self, tick: int, pins: Pins) -> list[str]:
+    def pins(self, tick, pins):
         """Every limit that these levels break, in the order of the checks."""
         before = self.history[-1][1]
         moved = strobe(before) != strobe(pins)
         ends, begins = moved and strobe(before) != "", moved and strobe(pins) != ""
-        times: list[tuple[str, Fraction]] = []
+        times = []
         if ends and strobe(before) == "write":
             times.append(("/WR pulse", self.since(tick, "begin")))
             times.append(("write data set-up", self.since(tick, "data")))

@@ -12,7 +12,7 @@ class NaiveEncoder:
     `hurry`, clocks at which all three inputs have rested for long are passed over.
     """
 
-    def __init__(self, filter_clocks: int, double_step: int = 0, hurry: bool = False) -> None:
+    def __init__(self, filter_clocks, double_step=0, hurry=False):
         self.double_step = double_step
         self.hurry = hurry
         self.filter_clocks = filter_clocks
@@ -25,12 +25,12 @@ class NaiveEncoder:
         self.clock = 0
         self.drop()
 
-    def drop(self) -> None:
+    def drop(self):
         self.counts = 0
         self.armed = False
         self.caught: int | None = None
 
-    def set_phases(self, tick: int, a: int, b: int) -> None:
+    def set_phases(self, tick, a, b):
         if self.accepted is None:
             self.accepted = (a, b)
             self.phases = [(-1, (a, b))]
@@ -39,13 +39,13 @@ class NaiveEncoder:
         else:
             self.phases.append((tick, (a, b)))
 
-    def set_index(self, tick: int, level: int) -> None:
+    def set_index(self, tick, level):
         if self.filter_clocks == 0:
             self.accept(self.accepted or (0, 0), level)
         else:
             self.index_levels.append((tick, level))
 
-    def accept(self, phases: tuple[int, int], index: int) -> None:
+    def accept(self, phases, index):
         before = FORWARD.index(self.accepted or (0, 0))
         step = (FORWARD.index(phases) - before) % 4
         self.counts += {0: 0, 1: 1, 2: self.double_step, 3: -1}[step]
@@ -54,18 +54,18 @@ class NaiveEncoder:
         self.accepted_index = index
         self.look()
 
-    def look(self) -> None:
+    def look(self):
         if self.armed and (self.accepted or (0, 0)) == (0, 0) and self.accepted_index == 0:
             self.armed = False
             self.caught = self.counts
 
-    def arm(self, tick: int) -> None:
+    def arm(self, tick):
         self.run_to(tick)
         self.armed = True
         self.caught = None
         self.look()
 
-    def run_to(self, tick: int) -> None:
+    def run_to(self, tick):
         """All clocks up to and including `tick`."""
         if self.filter_clocks == 0:
             return
@@ -90,7 +90,7 @@ class NaiveEncoder:
             if (phases, index) != (self.accepted or (0, 0), self.accepted_index):
                 self.accept(phases, index)
 
-    def rests(self) -> bool:
+    def rests(self):
         return (
             len(self.phases) < 2
             and len(self.index_levels) == 1
@@ -100,7 +100,7 @@ class NaiveEncoder:
             and (not self.phases or self.phases[0][1] == self.phase_run[-1])
         )
 
-    def take(self, tick: int) -> tuple[int, int | None]:
+    def take(self, tick):
         """Counts since the last call, and the counts at which an index was caught."""
         self.run_to(tick)
         counts, caught = self.counts, self.caught

@@ -1,20 +1,15 @@
 """Interrupts of a timer that its own routine reloads, by the rules of 4316E section 2.16 alone: no CPU."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from itertools import cycle as repeated
 
 
-def answers(
-    loop: Sequence[int], routine: Sequence[int], reload_after: int, counts: int, first: int, number: int
-) -> list[tuple[int, int]]:
+def answers(loop, routine, reload_after, counts, first, number):
     """(cycle of the overflow, full cycles from it to the routine), `number` of them.
 
     The loop's first instruction begins in cycle 0 and `first` is the cycle of the first overflow. The routine
     reloads the timer at the end of its cycle `reload_after` (1 is its first): it overflows `counts` cycles later.
     """
-    found: list[tuple[int, int]] = []
+    found = []
     now, overflow = 0, first
     for length in repeated(loop):
         now += length

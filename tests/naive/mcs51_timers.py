@@ -11,7 +11,7 @@ from __future__ import annotations
 class NaiveTimers:
     """Registers are plain attributes; `pulses1` and `pulses2` list what the serial port would be clocked by."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.tmod = self.tcon = 0
         self.tl0 = self.th0 = self.tl1 = self.th1 = 0
         self.t2con = self.t2mod = 0
@@ -22,13 +22,13 @@ class NaiveTimers:
         self.overflowed2: list[int] = []  # timer 2: ticks within the last cycle
 
     @staticmethod
-    def _pins(int0: int, int1: int, t0: int, t1: int, t2: int, t2ex: int) -> dict[str, int]:
+    def _pins(int0, int1, t0, t1, t2, t2ex):
         return {"int0": int0, "int1": int1, "t0": t0, "t1": t1, "t2": t2, "t2ex": t2ex}
 
-    def fell(self, pin: str) -> bool:
+    def fell(self, pin):
         return self.samples[0][pin] == 1 and self.samples[1][pin] == 0
 
-    def cycle(self, pins: dict[str, int]) -> None:
+    def cycle(self, pins):
         """One machine cycle; `pins` are the levels at its S5P2."""
         self.overflowed1 = False
         self.overflowed2 = []
@@ -39,20 +39,20 @@ class NaiveTimers:
 
     # Timers 0 and 1
 
-    def _mode(self, timer: int) -> int:
+    def _mode(self, timer):
         return self.tmod >> (4 * timer) & 3
 
-    def _runs(self, timer: int) -> bool:
+    def _runs(self, timer):
         tr = self.tcon >> (4 + 2 * timer) & 1
         gate = self.tmod >> (4 * timer) & 8
         return bool(tr and (not gate or self.samples[1][f"int{timer}"]))
 
-    def _event(self, timer: int) -> bool:
+    def _event(self, timer):
         if self.tmod >> (4 * timer) & 4:
             return self.fell(f"t{timer}")
         return True
 
-    def _timer0(self) -> None:
+    def _timer0(self):
         if self._mode(0) == 3 and self.tcon & 0x40:
             self.th0 = (self.th0 + 1) & 0xFF
             if self.th0 == 0:
@@ -67,7 +67,7 @@ class NaiveTimers:
         if overflow:
             self.tcon |= 0x20
 
-    def _timer1(self) -> None:
+    def _timer1(self):
         split = self._mode(0) == 3
         if self._mode(1) == 3 or not (split or self._runs(1)) or not self._event(1):
             return
@@ -78,7 +78,7 @@ class NaiveTimers:
                 self.tcon |= 0x80
 
     @staticmethod
-    def _count(mode: int, tl: int, th: int) -> tuple[int, int, bool]:
+    def _count(mode, tl, th):
         if mode == 0:
             low = (tl & 0x1F) + 1
             carry = low >> 5
@@ -94,7 +94,7 @@ class NaiveTimers:
 
     # Timer 2
 
-    def _timer2(self) -> None:
+    def _timer2(self):
         baud = bool(self.t2con & 0x30)
         counter = bool(self.t2con & 0x02)
         clock_out = bool(self.t2mod & 0x02) and not counter
@@ -125,7 +125,7 @@ class NaiveTimers:
                 if up_down:
                     self.t2con ^= 0x40
 
-    def _count_up(self, captures: bool) -> bool:
+    def _count_up(self, captures):
         value = (self.th2 << 8 | self.tl2) + 1
         if value > 0xFFFF:
             value = 0 if captures else self.rcap2h << 8 | self.rcap2l
@@ -134,7 +134,7 @@ class NaiveTimers:
         self.th2, self.tl2 = value >> 8, value & 0xFF
         return False
 
-    def _count_down(self) -> bool:
+    def _count_down(self):
         value = self.th2 << 8 | self.tl2
         underflow = value == self.rcap2h << 8 | self.rcap2l
         value = 0xFFFF if underflow else (value - 1) & 0xFFFF

@@ -10,7 +10,7 @@ from __future__ import annotations
 class NaiveUart:
     """Two divide-by-16 counters with their shift registers."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.scon = 0
         self.sbuf = 0  # receive side
         self.txd = [(0, 1)]  # edges
@@ -28,23 +28,23 @@ class NaiveUart:
         self.delivery: tuple[int, list[int]] | None = None
 
     @property
-    def nine(self) -> bool:
+    def nine(self):
         return bool(self.scon & 0x80)
 
-    def write_sbuf(self, value: int) -> None:
+    def write_sbuf(self, value):
         bits = [0, *(value >> number & 1 for number in range(8))]
         if self.nine:
             bits.append(self.scon >> 3 & 1)
         self.pending = [*bits, 1]
         self.delay = 0
 
-    def write_scon(self, value: int, now: int) -> None:
+    def write_scon(self, value, now):
         if (value ^ self.scon) & 0xC0:
             self.pending, self.due, self.state, self.delivery = None, [], None, None
             self._put(now, 1)
         self.scon = value
 
-    def clock_tx(self, now: int) -> None:
+    def clock_tx(self, now):
         self.divider += 1
         if self.divider < 16:
             return
@@ -55,7 +55,7 @@ class NaiveUart:
             level = self.pending.pop(0)
             self.due.append((now + self.delay, level, not self.pending))
 
-    def clock_rx(self, now: int, rxd: int) -> None:
+    def clock_rx(self, now, rxd):
         fell = self.previous == 1 and rxd == 0
         self.previous = rxd
         if self.state is None:
@@ -80,7 +80,7 @@ class NaiveUart:
             elif len(self.bits) == 11:
                 self.state = None
 
-    def tick(self, now: int) -> None:
+    def tick(self, now):
         """What shows at this tick."""
         if self.due and self.due[0][0] == now:
             _, level, last = self.due.pop(0)
@@ -94,6 +94,6 @@ class NaiveUart:
                 self.sbuf = sum(bit << number for number, bit in enumerate(bits[:8]))
                 self.scon = self.scon & 0xFB | bits[8] << 2 | 0x01
 
-    def _put(self, now: int, level: int) -> None:
+    def _put(self, now, level):
         if self.txd[-1][1] != level:
             self.txd.append((now, level))

@@ -18,9 +18,7 @@ from miro_host.eye.patterns import (
     PATTERNS,
     ROBOT_HALF_MM,
     ROBOT_HEIGHT_M,
-    PatternName,
 )
-from miro_host.posture import Posture
 
 SAMPLES = 4
 PAINTS = {
@@ -40,14 +38,14 @@ REACH = 4  # pixels: the chroma filter's half length
 _NOISE = np.random.default_rng(1997).normal(size=(2 * HEIGHT, 2 * WIDTH, 3)) * (2.0, 4.0, 4.0)
 
 
-def ycbcr(rgb: Sequence[float]) -> np.ndarray:
+def ycbcr(rgb):
     """ITU-R BT.601, full range."""
     r, g, b = rgb
     y = 0.299 * r + 0.587 * g + 0.114 * b
     return np.array([y, 128.0 + 0.564 * (b - y), 128.0 + 0.713 * (r - y)])
 
 
-def low_pass() -> np.ndarray:
+def low_pass():
     """0.6 MHz at 320 pixels in 52.6 us: a sinc under a Hamming window."""
     place = np.arange(-REACH, REACH + 1)
     taps = np.sinc(2 * 0.6 / 6.08 * place) * (0.54 + 0.46 * np.cos(np.pi * place / (REACH + 1)))
@@ -55,7 +53,7 @@ def low_pass() -> np.ndarray:
 
 
 @cache
-def samples_of(camera: CameraParameters) -> tuple[np.ndarray, np.ndarray]:
+def samples_of(camera):
     """x and y in m, at the tops' height, of every sample of the picture with REACH more columns at each side."""
     lens = Lens(camera)
     shape = (HEIGHT * SAMPLES, (WIDTH + 2 * REACH) * SAMPLES)
@@ -70,15 +68,13 @@ def samples_of(camera: CameraParameters) -> tuple[np.ndarray, np.ndarray]:
 class PaintedRobot:
     """A top: posture, team's colour, number, pattern."""
 
-    def __init__(
-        self, posture: Posture, team: str = "yellow", number: int = 0, pattern: PatternName = "diagonal"
-    ):
+    def __init__(self, posture, team="yellow", number=0, pattern="diagonal"):
         self.posture = posture
         self.team = team
         self.identity = IDENTITIES[number]
         self.pattern = PATTERNS[pattern]
 
-    def paint(self, x: np.ndarray, y: np.ndarray, picture: np.ndarray) -> None:
+    def paint(self, x, y, picture):
         cos, sin = np.cos(self.posture.theta_rad), np.sin(self.posture.theta_rad)
         dx, dy = 1000.0 * (x - self.posture.x_m), 1000.0 * (y - self.posture.y_m)
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -112,7 +108,7 @@ class PaintedFrame:
         self.light = light
         self.windows = 0
 
-    def window(self, left: int, top: int, width: int, height: int) -> bytearray:
+    def window(self, left, top, width, height):
         assert 0 <= left < left + width <= WIDTH
         assert 0 <= top < top + height <= HEIGHT
         self.windows += 1
@@ -137,7 +133,7 @@ class PaintedFrame:
         return bytearray(np.clip(np.rint(found), 0, 255).astype(np.uint8).tobytes())
 
 
-def sampled(count: int = 60, noise: bool = True) -> dict[str, list[tuple[int, int, int]]]:
+def sampled(count=60, noise=True):
     """Pixels inside patches of each colour, and of the floor."""
     found = {}
     for place, (name, rgb) in enumerate(list(PAINTS.items())[:9]):

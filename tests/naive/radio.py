@@ -7,12 +7,10 @@ evaluated from the beginning at every call.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
 from miro_sim.radio.probability import margin_table
 from tests.naive import rng
 
@@ -20,16 +18,16 @@ Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
 """(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
 Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
-NO_OTHERS: list[tuple[Radio, str, Sent]] = []
+NO_OTHERS = []
 
 
-def wire_bits(data: bytes) -> list[int]:
+def wire_bits(data):
     """8N1, least significant bit first."""
     return [bit for byte in data for bit in (0, *(byte >> i & 1 for i in range(8)), 1)]
 
 
 @cache
-def chain_states(params: Bursts | Dropouts, seed: int, name: str, slots: int) -> list[bool]:
+def chain_states(params, seed, name, slots):
     """Bad or good in slots 0 .. slots-1, by the book: step by step from a good start."""
     bad, states = False, []
     for slot in range(slots):
@@ -39,7 +37,7 @@ def chain_states(params: Bursts | Dropouts, seed: int, name: str, slots: int) ->
     return states
 
 
-def chain_bad(params: Bursts | Dropouts | None, seed: int, name: str, slot: int) -> bool:
+def chain_bad(params, seed, name, slot):
     return params is not None and chain_states(params, seed, name, slot - slot % 256 + 256)[slot]
 
 
@@ -59,7 +57,7 @@ class OnAir(NamedTuple):
 class Sender:
     """Everything that a transmitter ever sends, as it arrives at robots with the crystal of `listener`."""
 
-    def __init__(self, params: Radio, listener: Radio, seed: int, name: str, sent: Sent) -> None:
+    def __init__(self, params, listener, seed, name, sent):
         self.params = params
         own = Fraction(2500 * (10**6 + params.crystal_offset_ppm), 10**6 + params.baud_offset_ppm)
         self.bit_ticks = Fraction(
@@ -82,7 +80,7 @@ class Sender:
                 self.arrivals.append((arrival, bits, begins, backs))
             over = arrival + max(25_000 * len(data), int(10 * len(data) * own))
 
-    def on_air(self, tick: int) -> OnAir | None:
+    def on_air(self, tick):
         for arrival, bits, begins, backs in self.arrivals:
             if begins[0] <= tick < begins[-1]:
                 number = bisect_right(begins, tick) - 1
@@ -92,7 +90,7 @@ class Sender:
         keyed = any(0 < arrival - tick <= self.params.keyup_ticks for arrival, *_ in self.arrivals)
         return OnAir(1, tick - tick % 2500) if keyed or self.params.carrier == "on" else None
 
-    def event_ticks(self) -> set[int]:
+    def event_ticks(self):
         ticks = set()
         for arrival, _, begins, backs in self.arrivals:
             ticks |= {arrival - self.params.keyup_ticks, *begins, *backs.values()}
@@ -102,12 +100,12 @@ class Sender:
 class Slicer:
     """Its threshold as the mean of what came in, in steps of at most a bit time."""
 
-    def __init__(self, params: SlicerParams | None, eb_n0_db: float | None) -> None:
+    def __init__(self, params, eb_n0_db):
         self.params = params
         self.thresholds = () if eb_n0_db is None else margin_table(eb_n0_db)
         self.mean = self.signal = self.tick = 0
 
-    def hear(self, tick: int, signal: int) -> None:
+    def hear(self, tick, signal):
         if self.params is None:
             return
         target = self.signal * 65536 + self.params.offset_units if self.signal else 0
@@ -115,27 +113,19 @@ class Slicer:
             self.mean += ((target - self.mean) * (self.params.gain * step // 2500)) // 65536
         self.tick, self.signal = tick, signal
 
-    def chance(self, level: int) -> int:
+    def chance(self, level):
         assert self.params is not None
         margin = 65536 - (2 * level - 1) * (self.mean - self.params.offset_units)
         return self.thresholds[min(max((margin + 65536) // 512, 0), 512)]
 
 
-def downlink_edges(
-    until: int,
-    params: Radio,
-    seed: int,
-    name: str,
-    robot: str,
-    sent: Sent,
-    others: list[tuple[Radio, str, Sent]] = NO_OTHERS,
-) -> Edges:
+def downlink_edges(until, params, seed, name, robot, sent, others=NO_OTHERS):
     """Every change of the level on a robot's RXD wire before `until`, the wire being at mark before tick 0."""
     senders = [Sender(params, params, seed, name, sent)]
     senders += [Sender(its, params, seed, its_name, its_sent) for its, its_name, its_sent in others]
     ticks = set(range(0, until, 2500)).union(*(sender.event_ticks() for sender in senders))
     slicer = Slicer(params.slicer, params.eb_n0_db)
-    decided: dict[object, int] = {}
+    decided = {}
     levels = {}
     for tick in sorted(tick for tick in ticks if 0 <= tick < until):
         rank, on_air = next(
@@ -153,19 +143,10 @@ def downlink_edges(
     return changes(levels.__getitem__, levels)
 
 
-def decide(
-    tick: int,
-    rank: int,
-    on_air: OnAir | None,
-    senders: list[Sender],
-    params: Radio,
-    slicer: Slicer,
-    seed: int,
-    robot: str,
-) -> int:
+def decide(tick, rank, on_air, senders, params, slicer, seed, robot):
     """What a receiver puts out from `tick` on for a bit, or for a slot of idle carrier or of none."""
 
-    def silence(tick: int, slot: int) -> int:
+    def silence(tick, slot):
         if slicer.signal:
             slicer.hear(tick, 0)
         return 1 if params.squelch else rng.bit(seed, f"{robot}/noise", slot)
@@ -197,7 +178,7 @@ def decide(
     return 1 if lost else level
 
 
-def uplink_level(tick: int, params: Radio, seed: int, name: str, wires: list[Edges]) -> int:
+def uplink_level(tick, params, seed, name, wires):
     """The level at the PC's receiver; `wires` are the TXD edges of robots 0, 1, .."""
     u = tick - params.latency_ticks
     levels = []
@@ -215,7 +196,7 @@ def uplink_level(tick: int, params: Radio, seed: int, name: str, wires: list[Edg
     return min(levels) ^ wrong
 
 
-def uplink_edges(until: int, params: Radio, seed: int, name: str, wires: list[Edges]) -> Edges:
+def uplink_edges(until, params, seed, name, wires):
     """Every change of the level before `until`."""
     latency = params.latency_ticks
     ticks = {slot + latency for slot in range(0, until, 2500)}
@@ -226,7 +207,7 @@ def uplink_edges(until: int, params: Radio, seed: int, name: str, wires: list[Ed
     )
 
 
-def changes(level: Callable[[int], int], ticks: Iterable[int]) -> Edges:
+def changes(level, ticks):
     edges = [(-1, 1)]
     for tick in sorted(ticks):
         if level(tick) != edges[-1][1]:
@@ -234,11 +215,11 @@ def changes(level: Callable[[int], int], ticks: Iterable[int]) -> Edges:
     return edges[1:]
 
 
-def level_at(edges: Edges, tick: int) -> int:
+def level_at(edges, tick):
     return ([1] + [level for edge, level in edges if edge <= tick])[-1]
 
 
-def receive(edges: Edges, until: int, bit_ticks: Fraction = Fraction(2500)) -> list[Symbol]:
+def receive(edges, until, bit_ticks=Fraction(2500)):
     """What a UART makes of a level: every symbol whose stop bit is sampled before `until`."""
     symbols = []
     free = 0

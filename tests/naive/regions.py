@@ -1,11 +1,9 @@
 """Regions of one class by flood fill over a dictionary of pixels: slow and obvious."""
 
-from __future__ import annotations
-
 from miro_host.eye.regions import Region
 
 
-def regions(table: bytes, pixels: bytes, width: int, height: int) -> list[Region]:
+def regions(table, pixels, width, height):
     """The regions of a window, in the order of their first pixels."""
     kinds = {}
     for row in range(height):
@@ -13,7 +11,7 @@ def regions(table: bytes, pixels: bytes, width: int, height: int) -> list[Region
             y, cb, cr = pixels[3 * (row * width + column) :][:3]
             kinds[row, column] = table[y // 16 * 4096 + cb // 4 * 64 + cr // 4]
     found = []
-    seen: set[tuple[int, int]] = set()
+    seen = set()
     for first, kind in kinds.items():
         if kind == 0 or first in seen:
             continue
@@ -30,7 +28,7 @@ def regions(table: bytes, pixels: bytes, width: int, height: int) -> list[Region
     return found
 
 
-def described(kind: int, members: set[tuple[int, int]], width: int, height: int) -> Region:
+def described(kind, members, width, height):
     rows = [row for row, _ in members]
     columns = [column for _, column in members]
     return Region(

@@ -5,8 +5,6 @@ The Gaussian looks its cell up by walking a table that mpmath makes; it shares n
 checks.
 """
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 
@@ -15,7 +13,7 @@ import mpmath
 Words = tuple[int, int, int, int]
 
 
-def philox4x32_10(counter: Words, key: tuple[int, int]) -> Words:
+def philox4x32_10(counter, key):
     a, b, c, d = counter
     for step in range(10):
         k0 = (key[0] + step * 0x9E3779B9) % 2**32
@@ -26,7 +24,7 @@ def philox4x32_10(counter: Words, key: tuple[int, int]) -> Words:
     return a, b, c, d
 
 
-def bits(seed: int, name: str, kind: int, number: int) -> int:
+def bits(seed, name, kind, number):
     """One block as a 128-bit integer, word 0 lowest."""
     tag = hashlib.sha256(name.encode("utf-8")).digest()[:8]
     counter = number.to_bytes(7, "little") + bytes([kind]) + tag
@@ -36,30 +34,30 @@ def bits(seed: int, name: str, kind: int, number: int) -> int:
     return sum(word << 32 * place for place, word in enumerate(out))
 
 
-def u32(seed: int, name: str, index: int) -> int:
+def u32(seed, name, index):
     return bits(seed, name, 0, index // 4) >> 32 * (index % 4) & 0xFFFFFFFF
 
 
-def u64(seed: int, name: str, index: int) -> int:
+def u64(seed, name, index):
     return bits(seed, name, 1, index // 2) >> 64 * (index % 2) & (2**64 - 1)
 
 
-def bit(seed: int, name: str, index: int) -> int:
+def bit(seed, name, index):
     return bits(seed, name, 2, index // 128) >> (index % 128) & 1
 
 
-def uniform(seed: int, name: str, index: int) -> float:
+def uniform(seed, name, index):
     return (u64(seed, name, index) // 2**11) / 2**53
 
 
 @cache
-def half_normal(k: int) -> int:
+def half_normal(k):
     """2^63 P(|z| < k / 16), rounded."""
     with mpmath.workprec(200):
         return int(mpmath.floor(mpmath.erf(mpmath.mpf(k) / 16 / mpmath.sqrt(2)) * 2**63 + mpmath.mpf("0.5")))
 
 
-def gauss(seed: int, name: str, index: int) -> float:
+def gauss(seed, name, index):
     magnitude, sign = divmod(bits(seed, name, 3, index // 2) >> 64 * (index % 2) & (2**64 - 1), 2)
     k = 0
     while half_normal(k + 1) <= magnitude:
@@ -70,7 +68,7 @@ def gauss(seed: int, name: str, index: int) -> float:
     return -z if sign else z
 
 
-def exact_gauss(seed: int, name: str, index: int) -> float:
+def exact_gauss(seed, name, index):
     """The number that the same draw would give by exact inversion of the normal distribution."""
     magnitude, sign = divmod(bits(seed, name, 3, index // 2) >> 64 * (index % 2) & (2**64 - 1), 2)
     with mpmath.workprec(120):

@@ -15,20 +15,20 @@ class Said(NamedTuple):
     what: tuple[int, ...]
 
 
-def silence_deadline(last_tick: int, after: int, tolerance: int, received: list[int]) -> int:
+def silence_deadline(last_tick, after, tolerance, received):
     """When a wheel must have gone over after the fresh frame at `last_tick`."""
     due = last_tick + CHARACTER + after
     tests = any(due - 2 * MS <= tick <= due + tolerance for tick in received)
     return due + tolerance + (2 * MS if tests else 0)
 
 
-def silence_is_early(last_tick: int, after: int, tolerance: int, tick: int) -> bool:
+def silence_is_early(last_tick, after, tolerance, tick):
     """Whether a wheel that goes over at `tick` does so before the failsafe may, and not because of the frame."""
     from_frame = tick <= last_tick + CHARACTER + 10 * MS
     return not from_frame and tick < last_tick + max(0, after - tolerance)
 
 
-def missed(frames: list[Said], orders: list[Said], within: int, end: int) -> list[Said]:
+def missed(frames, orders, within, end):
     """Team frames that neither an order in time has obeyed, nor one of a later frame has made past."""
     found = []
     for at, frame in enumerate(frames):
@@ -41,20 +41,18 @@ def missed(frames: list[Said], orders: list[Said], within: int, end: int) -> lis
     return found
 
 
-def _obeys(order: Said, frame: Said, deadline: int) -> bool:
+def _obeys(order, frame, deadline):
     return order.what == frame.what and frame.tick < order.tick <= deadline
 
 
-def is_sent(frames: list[Said], tick: int, words: tuple[int, int], within: int) -> bool:
+def is_sent(frames, tick, words, within):
     """Whether a frame with these velocities was sent at most `within` before `tick`."""
     return any(one.what == words and 0 <= tick - one.tick <= within for one in frames)
 
 
-def answer_fails(
-    events: list[tuple[str, int, int]], within: int, last_character: int
-) -> list[tuple[str, int]]:
+def answer_fails(events, within, last_character):
     """What is wrong with answers to questions: events are ("asked", "answer", "character" or "look", tick, number)."""
-    found: list[tuple[str, int]] = []
+    found = []
     for at, (kind, tick, seq) in enumerate(events):
         past = events[:at]
         asked = [number for what, _, number in past if what == "asked"]
@@ -72,7 +70,7 @@ def answer_fails(
     return found
 
 
-def _left(past: list[tuple[str, int, int]]) -> int:
+def _left(past):
     """How many characters of an answer are still to come."""
     left = 0
     for at, (kind, _, seq) in enumerate(past):
@@ -86,7 +84,7 @@ def _left(past: list[tuple[str, int, int]]) -> int:
     return left
 
 
-def _waiting(past: list[tuple[str, int, int]], patience: int) -> tuple[int, int] | None:
+def _waiting(past, patience):
     """The question that waits: the first that came while none did."""
     waiting = None
     for kind, tick, seq in past:
@@ -102,16 +100,16 @@ def _waiting(past: list[tuple[str, int, int]], patience: int) -> tuple[int, int]
 class Wheel:
     """What one LM629 is told, from the bytes of its commands: (what, velocity, acceleration, abrupt)."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.control = 0
         self.velocity = 0
         self.acceleration = 0
         self.order: tuple[str, int, int, bool] = ("off", 0, 0, False)
 
-    def reset(self) -> None:
-        self.__init__()  # type: ignore[misc]
+    def reset(self):
+        self.__init__()
 
-    def load(self, data: bytes) -> None:
+    def load(self, data):
         self.control = int.from_bytes(data[:2], "big")
         rest = data[2:]
         if self.control & 1 << 5 and len(rest) >= 4:
@@ -121,7 +119,7 @@ class Wheel:
             number = int.from_bytes(rest[:4], "big", signed=True)
             self.velocity = number + (self.velocity if self.control & 1 << 2 else 0)
 
-    def start(self) -> None:
+    def start(self):
         backward = self.control & 1 << 11 and not self.control & 1 << 12
         if self.control & 1 << 8:
             self.order = ("off", 0, self.acceleration, False)

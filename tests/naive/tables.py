@@ -1,10 +1,7 @@
 """Paths of keys in nested tables, written down the long way."""
 
-from collections.abc import Iterator
-from typing import Any
 
-
-def scalar_places(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def scalar_places(value, path=""):
     """(path, value) of everything in the tables that is no table and no list of tables."""
     if isinstance(value, dict):
         for key, item in value.items():

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import NamedTuple
 
-from miro_robot.mcs51.cpu import Cpu
-
 VECTORS = {8 * source + 3: source for source in range(6)}
 RETI = 0x32
 
@@ -26,9 +24,9 @@ class Step(NamedTuple):
     sp: int
 
 
-def steps(cpu: Cpu, until_cycle: int) -> list[Step]:
+def steps(cpu, until_cycle):
     """Everything until then; neighbouring cycles of sleep are one step."""
-    found: list[Step] = []
+    found = []
     while cpu.cycles < until_cycle:
         pc, start, executed = cpu.pc, cpu.cycles, cpu.instructions
         asleep = bool(cpu.idle)
@@ -44,22 +42,22 @@ def steps(cpu: Cpu, until_cycle: int) -> list[Step]:
     return found
 
 
-def executions(taken: list[Step]) -> Counter[int]:
+def executions(taken):
     return Counter(step.pc for step in taken if step.kind == "run")
 
 
-def cycles(taken: list[Step]) -> Counter[int]:
-    total: Counter[int] = Counter()
+def cycles(taken):
+    total = Counter()
     for step in taken:
         if step.kind == "run":
             total[step.pc] += step.end - step.start
     return total
 
 
-def routines(cpu: Cpu, taken: list[Step]) -> dict[int, list[int]]:
+def routines(cpu, taken):
     """Durations of the finished interrupt routines by source, nested ones included."""
-    found: dict[int, list[int]] = {}
-    serving: list[tuple[int, int]] = []
+    found = {}
+    serving = []
     for step in taken:
         if step.kind == "call":
             serving.append((VECTORS[step.pc_after], step.start))

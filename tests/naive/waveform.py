@@ -7,8 +7,6 @@ remembered but the list of changes. Which pin is wired to what is taken from the
 from __future__ import annotations
 
 from miro_exact.state import TICK
-from miro_robot.board import Board
-from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import CYCLES
 from miro_robot.plant import Plant
 
@@ -23,21 +21,21 @@ class Treadmill(Plant):
 
     LEFT, RIGHT, PERIOD = 137, -211, 2048  # ticks a count; backward
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.told = 0
         self.next_tick = self.PERIOD
 
     @staticmethod
-    def phases(tick: int, period: int) -> tuple[int, int]:
+    def phases(tick, period):
         return ((0, 0), (1, 0), (1, 1), (0, 1))[tick // period % 4]
 
-    def attach(self, left, right):  # type: ignore[no-untyped-def]
+    def attach(self, left, right):
         self.left, self.right = left, right
         left.set_encoder(0, 0, 0)
         right.set_encoder(0, 0, 0)
 
-    def advance(self, tick: int) -> None:
+    def advance(self, tick):
         for at in range(self.told + 1, tick + 1):
             for chip, period in ((self.left, self.LEFT), (self.right, self.RIGHT)):
                 if self.phases(at, period) != self.phases(at - 1, period):
@@ -50,17 +48,17 @@ class Sampler:
     """`changes`: per signal, (tick, level) of each change since it was first looked at. For a board with a
     `Treadmill`, a robot in slot 0 of 3, or a `cpu` alone."""
 
-    def __init__(self, cpu: Cpu, board: Board | None = None) -> None:
+    def __init__(self, cpu, board=None):
         self.cpu = cpu
         self.board = board
         self.changes: dict[str, list[tuple[int, int]]] = {}
         self.routines: list[int] = []
 
-    def run(self, end_tick: int) -> None:
+    def run(self, end_tick):
         while 12 * self.cpu.cycles < end_tick:
             self._step()
 
-    def _step(self) -> None:
+    def _step(self):
         cpu = self.cpu
         begin, executed, pc = cpu.cycles, cpu.instructions, cpu.pc
         asleep = cpu.idle or cpu.powered_down
@@ -86,12 +84,12 @@ class Sampler:
         if opcode == RETI and cpu.instructions != executed and self.routines:
             self.routines.pop()
 
-    def _interrupts(self) -> dict[str, int]:
+    def _interrupts(self):
         high = [bool(self.cpu.sfr(0xB8) >> source & 1) for source in self.routines]
         levels = {f"isr_{name}": int(source in self.routines) for source, name in enumerate(SOURCES)}
         return levels | {"low_priority": int(False in high), "high_priority": int(True in high)}
 
-    def _lines(self, tick: int, latches: list[int], chips: dict[str, int]) -> dict[str, int]:
+    def _lines(self, tick, latches, chips):
         """RXD, TXD and all pins; slot 0, three robots."""
         cpu = self.cpu
         levels = {"rxd": cpu.rxd.level_at(tick), "txd": cpu.txd.level_at(tick)}
@@ -103,7 +101,7 @@ class Sampler:
             outside[3] &= 0xF3 | (1 - chips["left_hi"]) << 2 | (1 - chips["right_hi"]) << 3
         return levels | {f"p{port}_": latches[port] & outside[port] for port in range(4)}
 
-    def _chips(self, tick: int, latches: list[int]) -> dict[str, int]:
+    def _chips(self, tick, latches):
         board = self.board
         if board is None:
             return {}
@@ -128,7 +126,7 @@ class Sampler:
                 levels["d"] &= chip.data_out(tick)
         return levels
 
-    def _note(self, tick: int, levels: dict[str, int]) -> None:
+    def _note(self, tick, levels):
         for name, level in levels.items():
             found = self.changes.setdefault(name, [])
             if not found or found[-1][1] != level:

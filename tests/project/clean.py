@@ -1,13 +1,10 @@
 """A new environment outside of this tree, and what is installed in it: as a user has it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys
 import tarfile
 import venv
-from collections.abc import Mapping
 from pathlib import Path
 
 from tests import children
@@ -20,7 +17,7 @@ PURE = {"MIROTWIN_PURE": "1"}
 class Clean:
     """A new environment in `folder`/venv; programs run in `folder` unless told, and see nothing of this tree."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder = folder
         self.bin = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
         self.environment = {
@@ -28,16 +25,14 @@ class Clean:
             "PATH": f"{self.bin}{os.pathsep}{os.environ['PATH']}",
         }
 
-    def make(self, python: str | Path = "") -> None:
+    def make(self, python=""):
         """Makes it, of another Python if one is given."""
         if python:
             self.must(python, "-m", "venv", self.folder / "venv")
         else:
             venv.create(self.folder / "venv", with_pip=True, symlinks=os.name != "nt")
 
-    def run(
-        self, *command: str | Path, cwd: Path | None = None, more: Mapping[str, str] | None = None
-    ) -> tuple[int, str]:
+    def run(self, *command, cwd=None, more=None):
         """Exit code, and both outputs. `more`: for its environment."""
         done = children.run(
             [*map(str, command)],
@@ -48,16 +43,14 @@ class Clean:
         )
         return done.returncode, done.stdout + done.stderr
 
-    def must(
-        self, *command: str | Path, cwd: Path | None = None, more: Mapping[str, str] | None = None
-    ) -> str:
+    def must(self, *command, cwd=None, more=None):
         """The outputs. Raises SystemExit with them for any exit code but 0."""
         code, out = self.run(*command, cwd=cwd, more=more)
         if code:
             raise SystemExit(f"{' '.join(map(str, command))}: exit code {code}\n{out}")
         return out
 
-    def copy_engines(self) -> None:
+    def copy_engines(self):
         """Puts the compiled modules of this tree into what was installed."""
         where = "import sysconfig; print(sysconfig.get_path('platlib'))"
         target = Path(self.must("python", "-c", where).strip())
@@ -66,13 +59,13 @@ class Clean:
                 shutil.copy2(path, target / path.relative_to(ROOT / package))
 
 
-def source_archive(folder: Path) -> Path:
+def source_archive(folder):
     """The source archive of what git tracks in this tree, made in `folder`."""
     copy_tree(folder / "tree", ())
     return _made("sdist", folder / "tree", folder / "dist")
 
 
-def unpacked(archive: Path, folder: Path) -> Path:
+def unpacked(archive, folder):
     """The one folder that a source archive has, in `folder`."""
     with tarfile.open(archive) as tar:
         tar.extractall(folder, filter="data")
@@ -80,12 +73,12 @@ def unpacked(archive: Path, folder: Path) -> Path:
     return tree
 
 
-def pure_wheel(tree: Path, folder: Path) -> Path:
+def pure_wheel(tree, folder):
     """A wheel for every machine, of a tree that is not this one (a build leaves files there), in `folder`."""
     return _made("bdist_wheel", tree, folder, PURE)
 
 
-def _made(command: str, tree: Path, folder: Path, more: Mapping[str, str] | None = None) -> Path:
+def _made(command, tree, folder, more=None):
     """The one file that a command of setup.py leaves in `folder`."""
     line = [sys.executable, "setup.py", "-q", command, "--dist-dir", str(folder)]
     done = children.run(line, cwd=tree, env={**os.environ, **(more or {})}, capture_output=True, text=True)

@@ -1,7 +1,6 @@
 """The rules of "the same bits everywhere" that can be read off the syntax tree of a module."""
 
 import ast
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 # fmt: off
@@ -48,24 +47,24 @@ class Lint(ast.NodeVisitor):
     aliases: dict[str, str] = field(default_factory=dict)
     set_names: set[str] = field(default_factory=set)
 
-    def found(self, node: ast.AST, message: str) -> None:
+    def found(self, node, message):
         self.findings.append(Finding(getattr(node, "lineno", 0), message))
 
-    def visit_Import(self, node: ast.Import) -> None:
+    def visit_Import(self, node):
         for name in node.names:
             root = name.name.split(".")[0]
             self.aliases[name.asname or root] = root
             if root in FORBIDDEN_MODULES:
                 self.found(node, f"import {name.name}: neither clock, chance nor threads")
 
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
+    def visit_ImportFrom(self, node):
         root = (node.module or "").split(".")[0]
         if root in FORBIDDEN_MODULES:
             self.found(node, f"from {node.module} import: neither clock, chance nor threads")
         for name in node.names:
             self.check_member(node, root, name.name)
 
-    def check_member(self, node: ast.AST, module: str, name: str) -> None:
+    def check_member(self, node, module, name):
         if module == "math" and name not in EXACT_MATH:
             self.found(node, f"math.{name} is not exact everywhere: use miro_exact.dmath")
         if module == "numpy" and name in INEXACT_NUMPY:
@@ -73,22 +72,20 @@ class Lint(ast.NodeVisitor):
         if module == "os" and name in ("environ", "getenv", "urandom"):
             self.found(node, f"os.{name}: state must not come from the environment")
 
-    def visit_Attribute(self, node: ast.Attribute) -> None:
+    def visit_Attribute(self, node):
         if isinstance(node.value, ast.Name) and node.value.id in self.aliases:
             self.check_member(node, self.aliases[node.value.id], node.attr)
         self.generic_visit(node)
 
-    def visit_BinOp(self, node: ast.BinOp) -> None:
+    def visit_BinOp(self, node):
         self.check_operator(node, node.op, (node.left, node.right))
         self.generic_visit(node)
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> None:
+    def visit_AugAssign(self, node):
         self.check_operator(node, node.op, (node.target, node.value))
         self.generic_visit(node)
 
-    def check_operator(
-        self, node: ast.AST, operator: ast.operator, operands: tuple[ast.expr, ast.expr]
-    ) -> None:
+    def check_operator(self, node, operator, operands):
         if isinstance(operator, ast.MatMult):
             self.found(node, "@ is BLAS: bits change with threads and core type")
         if isinstance(operator, ast.Pow) and not all(
@@ -96,7 +93,7 @@ class Lint(ast.NodeVisitor):
         ):
             self.found(node, "** of anything but two integer literals: write the product")
 
-    def visit_Call(self, node: ast.Call) -> None:
+    def visit_Call(self, node):
         name = node.func.id if isinstance(node.func, ast.Name) else None
         if name in FORBIDDEN_CALLS and not (name == "sum" and self.integers_only):
             self.found(node, FORBIDDEN_CALLS[name])
@@ -106,28 +103,28 @@ class Lint(ast.NodeVisitor):
                 self.check_walk(argument)
         self.generic_visit(node)
 
-    def visit_Assign(self, node: ast.Assign) -> None:
+    def visit_Assign(self, node):
         if self.is_set(node.value):
             self.set_names.update(target.id for target in node.targets if isinstance(target, ast.Name))
         self.generic_visit(node)
 
-    def visit_For(self, node: ast.For) -> None:
+    def visit_For(self, node):
         self.check_walk(node.iter)
         self.generic_visit(node)
 
-    def visit_comprehension(self, node: ast.comprehension) -> None:
+    def visit_comprehension(self, node):
         self.check_walk(node.iter)
         self.generic_visit(node)
 
-    def visit_Starred(self, node: ast.Starred) -> None:
+    def visit_Starred(self, node):
         self.check_walk(node.value)
         self.generic_visit(node)
 
-    def check_walk(self, node: ast.expr) -> None:
+    def check_walk(self, node):
         if self.is_set(node):
             self.found(node, "the order of a set changes from run to run: sorted() it")
 
-    def is_set(self, node: ast.expr) -> bool:
+    def is_set(self, node):
         if isinstance(node, ast.Set | ast.SetComp):
             return True
         if isinstance(node, ast.Name):
@@ -141,7 +138,7 @@ class Lint(ast.NodeVisitor):
         return False
 
 
-def lint(source: str, integers_only: bool = False) -> Iterator[Finding]:
+def lint(source, integers_only=False):
     """Findings of one module's source, by line."""
     checker = Lint(integers_only)
     checker.visit(ast.parse(source))

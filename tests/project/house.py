@@ -4,13 +4,10 @@ Counted are the product's Python files; rooms, arrows and floors are those of `m
 who imports whom, and the longest way down.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from statistics import median
@@ -25,19 +22,19 @@ SHORT = 60
 class House:
     """One checkout."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root):
         self.root = root
         self.files = {path: path.read_text("utf-8") for path in self._sources(PRODUCT)}
         self.test_files = {path: path.read_text("utf-8") for path in self._sources(("tests",))}
         self.trees = {path: ast.parse(text) for path, text in self.files.items()}
         self.ours = next(path for path in (root / OURS, root / "sim" / OURS) if path.is_dir())
 
-    def _sources(self, folders: tuple[str, ...]) -> Iterator[Path]:
+    def _sources(self, folders):
         for folder in folders:
             yield from sorted((self.root / folder).rglob("*.py"))
 
     @cached_property
-    def arrows(self) -> set[tuple[str, str]]:
+    def arrows(self):
         """(room, room that it imports)."""
         found = set()
         for path, tree in self.trees.items():
@@ -47,27 +44,27 @@ class House:
         return {(one, other) for one, other in found if other in self.rooms}
 
     @cached_property
-    def rooms(self) -> set[str]:
+    def rooms(self):
         inside = (
             path.relative_to(self.ours).parts[0] for path in self.files if path.is_relative_to(self.ours)
         )
         return {part.removesuffix(".py") for part in inside} - {"__init__"}
 
     @property
-    def floors(self) -> int:
+    def floors(self):
         """Rooms on the longest way down; a circle counts as one way through it."""
 
-        def depth(room: str, above: tuple[str, ...]) -> int:
+        def depth(room, above):
             below = [other for one, other in self.arrows if one == room and other not in above]
             return 1 + max((depth(other, (*above, room)) for other in below), default=0)
 
         return max(depth(room, ()) for room in self.rooms)
 
-    def defined(self, *kinds: type[ast.AST]) -> list[str]:
-        return [node.name for tree in self.trees.values() for node in tree.body if isinstance(node, kinds)]  # type: ignore[attr-defined]
+    def defined(self, *kinds):
+        return [node.name for tree in self.trees.values() for node in tree.body if isinstance(node, kinds)]
 
     @property
-    def figures(self) -> dict[str, float]:
+    def figures(self):
         lines = [len(text.splitlines()) for text in self.files.values()]
         classes = self.defined(ast.ClassDef)
         functions = [
@@ -93,7 +90,7 @@ class House:
         }
 
 
-def _imported(tree: ast.AST) -> Iterator[str]:
+def _imported(tree):
     for node in ast.walk(tree):
         names = []
         if isinstance(node, ast.Import):
@@ -105,12 +102,12 @@ def _imported(tree: ast.AST) -> Iterator[str]:
                 yield name.split(".")[1]
 
 
-def _parameters(node: ast.FunctionDef) -> int:
+def _parameters(node):
     given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
     return len([one for one in given if one.arg not in ("self", "cls")])
 
 
-def main() -> int:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkouts", nargs="*", type=Path, default=[ROOT])
     columns = [House(path.resolve()).figures for path in parser.parse_args().checkouts]

@@ -3,8 +3,6 @@
 It imports nothing of this tree, so it tries what is installed, on each system alike.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -13,7 +11,6 @@ import sys
 import sysconfig
 import tempfile
 import tomllib
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -23,7 +20,7 @@ ENGINE_LINE = {"compiled": "compiled (", "python": "python (0 of"}
 """How `mirotwin info` begins what it says of the engine."""
 
 
-def problems(engine: str, folder: Path) -> Iterator[str]:
+def problems(engine, folder):
     """What is wrong, a line each."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     said = _mirotwin(folder, "--version")
@@ -44,7 +41,7 @@ def problems(engine: str, folder: Path) -> Iterator[str]:
         yield f"the run had the engine {summary['engine']}, not {engine}"
 
 
-def _mirotwin(folder: Path, *arguments: str) -> str:
+def _mirotwin(folder, *arguments):
     """What the installed program prints. Raises SystemExit where it fails."""
     program = Path(sysconfig.get_path("scripts")) / ("mirotwin.exe" if os.name == "nt" else "mirotwin")
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
@@ -61,7 +58,7 @@ def _mirotwin(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--engine", choices=sorted(ENGINE_LINE), required=True, help="the one it has to have")
     engine = parser.parse_args(arguments).engine

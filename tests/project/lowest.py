@@ -6,8 +6,6 @@ fits. The copy has its own compiled modules, so the lowest Cython is tried as we
 the compiled modules of this tree are copied, and nothing is built. The rest of the command line goes to pytest.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re
@@ -15,7 +13,6 @@ import shutil
 import sys
 import tomllib
 import venv
-from collections.abc import Iterable
 from pathlib import Path
 
 from tests import children
@@ -36,7 +33,7 @@ SMOKE = (
 )
 
 
-def bounds(pyproject: str) -> dict[str, str]:
+def bounds(pyproject):
     """Package -> lowest version, of all that is required to build, to run and to test.
 
     Raises ValueError for a requirement that is not written as `name>=version` with at most an upper bound after it,
@@ -44,7 +41,7 @@ def bounds(pyproject: str) -> dict[str, str]:
     """
     data = tomllib.loads(pyproject)
     project = data["project"]
-    found: dict[str, str] = {}
+    found = {}
     groups = [
         data["build-system"]["requires"],
         project["dependencies"],
@@ -61,12 +58,12 @@ def bounds(pyproject: str) -> dict[str, str]:
     return found
 
 
-def constraints(lowest: dict[str, str]) -> str:
+def constraints(lowest):
     """A constraints file for pip."""
     return "".join(f"{name}=={version}\n" for name, version in sorted(lowest.items()))
 
 
-def copy_tree(target: Path, patterns: Iterable[str]) -> None:
+def copy_tree(target, patterns):
     """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
     tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
     names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
@@ -77,7 +74,7 @@ def copy_tree(target: Path, patterns: Iterable[str]) -> None:
         shutil.copy2(ROOT / name, target / name)
 
 
-def install(tree: Path, python: Path, smoke: bool) -> None:
+def install(tree, python, smoke):
     """Installs the tree at `tree`, editable, at its lower bounds."""
     held = tree / "lowest.txt"
     lowest = bounds((tree / "pyproject.toml").read_text(encoding="utf-8"))
@@ -108,7 +105,7 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
     program.chmod(0o755)
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments):
     parser = argparse.ArgumentParser(prog="python -m tests.project.lowest")
     parser.add_argument("--smoke", action="store_true", help="build nothing and by default run few tests")
     options, rest = parser.parse_known_args(arguments)

@@ -9,15 +9,12 @@ Compiling takes minutes for each Python; `--smoke` compiles nothing, takes this 
 modules of this tree into its environment.
 """
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import sys
 import tarfile
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests import children
@@ -30,12 +27,12 @@ INSTALLED = Path("tests/project/installed.py")
 MINOR = "import sys; print(sys.version_info[0] * 1000 + sys.version_info[1])"
 
 
-def pythons() -> list[Path]:
+def pythons():
     """One Python of each 3.x from 3.11 on, the oldest first: on the path, of pyenv, and this one."""
     named = [shutil.which(f"python3.{minor}") for minor in range(LOWEST, LOWEST + 10)]
     candidates = [Path(name) for name in named if name]
     candidates += sorted(Path.home().glob(".pyenv/versions/3.*/bin/python3"))
-    found: dict[int, Path] = {}
+    found = {}
     for path in (Path(sys.executable), *candidates):
         done = children.run([str(path), "-c", MINOR], capture_output=True, text=True)
         version = done.stdout.strip()
@@ -44,7 +41,7 @@ def pythons() -> list[Path]:
     return [path for _, path in sorted(found.items())]
 
 
-def left_out(archive: Path) -> list[str]:
+def left_out(archive):
     """What git tracks and a source archive does not have."""
     with tarfile.open(archive) as tar:
         there = {name.partition("/")[2] for name in tar.getnames()}
@@ -54,7 +51,7 @@ def left_out(archive: Path) -> list[str]:
     ]
 
 
-def problems(clean: Clean, tree: Path, engine: str) -> Iterator[str]:
+def problems(clean, tree, engine):
     """What the installed program does wrong, by the test that the archive has; `tree`: the archive, unpacked."""
     code, out = clean.run("python", tree / INSTALLED, "--engine", engine)
     if code:
@@ -63,7 +60,7 @@ def problems(clean: Clean, tree: Path, engine: str) -> Iterator[str]:
         print(f"  {out.strip()}", flush=True)
 
 
-def tried(folder: Path, tree: Path, python: Path, archive: Path, pure: Path, newest: bool) -> Iterator[str]:
+def tried(folder, tree, python, archive, pure, newest):
     """Under one Python: the compiled wheel, the pure one; for the newest the archive without a compiler."""
     compiled = Clean(folder / "compiled")
     compiled.folder.mkdir(parents=True)
@@ -88,7 +85,7 @@ def tried(folder: Path, tree: Path, python: Path, archive: Path, pure: Path, new
         yield from problems(slow, tree, "python")
 
 
-def smoke(folder: Path, tree: Path, pure: Path) -> Iterator[str]:
+def smoke(folder, tree, pure):
     """The pure wheel under this Python, then with the compiled modules of this tree."""
     clean = Clean(folder)
     clean.make()
@@ -99,7 +96,7 @@ def smoke(folder: Path, tree: Path, pure: Path) -> Iterator[str]:
     yield from problems(clean, tree, "compiled")
 
 
-def found(folder: Path, chosen: Sequence[Path]) -> Iterator[str]:
+def found(folder, chosen):
     """All that is wrong. `chosen`: the Pythons; none for the short form."""
     archive = source_archive(folder)
     yield from (f"{archive.name} lacks {name}" for name in left_out(archive))
@@ -113,7 +110,7 @@ def found(folder: Path, chosen: Sequence[Path]) -> Iterator[str]:
         yield from smoke(folder, tree, pure)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--smoke", action="store_true", help="take the compiled modules of this tree")
     parser.add_argument(

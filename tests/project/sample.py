@@ -3,14 +3,11 @@
 Compiling takes minutes; with `--smoke` the wheel is built without, and gets the compiled modules of this tree.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 from tests import children
@@ -26,17 +23,17 @@ TESTS = ("conform", "scenarios", "pytest")
 class Sample(Clean):
     """A new environment, and the project in it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         super().__init__(folder)
         self.project = folder / "mine"
 
-    def install(self, wheel: Path, smoke: bool) -> None:
+    def install(self, wheel, smoke):
         self.make()
         self.must("pip", "install", "-q", wheel, "pytest")
         if smoke:
             self.copy_engines()
 
-    def again(self, out: str) -> list[tuple[int, str]]:
+    def again(self, out):
         """The lines in `out` that reproduce a failure, with the exit code that each gives."""
         return [
             (self.run("sh", "-c", line, cwd=self.project)[0], line)
@@ -44,7 +41,7 @@ class Sample(Clean):
         ]
 
 
-def built(folder: Path, smoke: bool) -> Path:
+def built(folder, smoke):
     """A wheel of this tree."""
     if smoke:
         copy_tree(folder / "tree", ())
@@ -55,7 +52,7 @@ def built(folder: Path, smoke: bool) -> Path:
     return wheel
 
 
-def tried(sample: Sample) -> list[str]:
+def tried(sample):
     """What is wrong: nothing, if the project passes as it is, and each failure of a wrong firmware is reproduced."""
     found = []
     sample.must("mirotwin", "init", "mine")
@@ -84,7 +81,7 @@ def tried(sample: Sample) -> list[str]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--smoke", action="store_true", help="take the compiled modules of this tree")
     given = parser.parse_args(arguments)

@@ -22,7 +22,7 @@ POOL = "ProcessPoolExecutor"
 SHOW = "import signal; print([signal.getsignal(n) == signal.SIG_IGN for n in (signal.SIGINT, signal.SIGHUP)])"
 
 
-def starts(source: str) -> list[int]:
+def starts(source):
     """Lines of `source` that start a process otherwise than through `tests.children`."""
     found = []
     for node in ast.walk(ast.parse(source)):

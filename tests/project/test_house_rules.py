@@ -37,7 +37,7 @@ SOURCES = sorted(
 MOST_LINES = 800
 
 
-def problem(source: str) -> str | None:
+def problem(source):
     """What the house rules have against the length of a file."""
     lines = len(source.splitlines())
     return f"{lines} lines, {MOST_LINES} are allowed: split it" if lines > MOST_LINES else None
@@ -54,7 +54,7 @@ def test_what_is_said_about_the_length_of_a_file(lines, refused):
     assert problem("y = 2\n" * lines) == refused
 
 
-def annotated_tests(source: str) -> list[str]:
+def annotated_tests(source):
     """The names of the test functions in `source` that annotate a parameter or what they return."""
     tests = [
         node

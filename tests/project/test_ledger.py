@@ -17,7 +17,7 @@ RULE = re.compile(r"^\| ([A-Z][0-9]+) \|", re.M)
 STANDINGS = ("exact", "chosen", "thinner", "absent", "")
 
 
-def functions_of(path: Path) -> set[str]:
+def functions_of(path):
     """Names of the functions that pytest collects from a file."""
     tree = ast.parse(path.read_text())
     return {

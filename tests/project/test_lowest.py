@@ -12,17 +12,17 @@ PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 CONSTRAINTS = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8")
 
 
-def pinned() -> dict[str, str]:
+def pinned():
     lines = [line for line in CONSTRAINTS.splitlines() if not line.startswith("#")]
     return {plain(name): version for name, _, version in (line.partition("==") for line in lines)}
 
 
-def plain(name: str) -> str:
+def plain(name):
     """The name as package indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def numbers(version: str) -> tuple[int, ...]:
+def numbers(version):
     return tuple(int(part) for part in version.split("."))
 
 

@@ -28,7 +28,7 @@ def every_type(n):
 CASES = [(form, encode(message, n)) for n in (3, 5) for form, message in every_type(n)]
 
 
-def with_wrong_bits(wire: bytes, first: int, bits) -> bytes:
+def with_wrong_bits(wire, first, bits):
     number = int.from_bytes(wire, "little")
     for bit in bits:
         number ^= 1 << (first + bit)

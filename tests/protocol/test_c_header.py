@@ -9,12 +9,12 @@ from miro_protocol.frames import TeamFrame, encode
 HEADER = Path(__file__).parents[2] / "robot_fw/firmware/protocol.h"
 
 
-def defines() -> dict[str, int]:
+def defines():
     found = re.findall(r"^#define (\w+) +(0x[0-9A-F]+|\d+)(?:UL)?\b", c_header.render(), re.MULTILINE)
     return {name: int(value, 0) for name, value in found}
 
 
-def arrays() -> dict[str, bytes]:
+def arrays():
     found = re.findall(r"char (\w+)\[(\d+)\] = \{([^}]*)\}", c_header.render())
     parsed = {name: bytes(int(value, 16) for value in re.findall(r"0x\w\w", body)) for name, _, body in found}
     assert {name: len(data) for name, data in parsed.items()} == {name: int(size) for name, size, _ in found}

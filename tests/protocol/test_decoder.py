@@ -11,7 +11,7 @@ from miro_protocol import decoder as module
 from miro_protocol import table
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDecoder
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.hypothesis_frames import ReceivedStream, damaged_streams, team_frames, valid_streams
+from miro_protocol.hypothesis_frames import damaged_streams, team_frames, valid_streams
 from miro_protocol.whitening import whiten
 from tests.naive.decoder import NaiveDecoder
 
@@ -19,11 +19,11 @@ FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
 LEAD = b"\x55" * 5 + b"\xff"
 
 
-def decoder_for(heard: ReceivedStream, telemetry: bool, run_limit: int = module.RUN_LIMIT):
+def decoder_for(heard, telemetry, run_limit=module.RUN_LIMIT):
     return WindowDecoder(table.TELEMETRY if telemetry else table.downlink(heard.n), run_limit)
 
 
-def naive_for(heard: ReceivedStream, telemetry: bool, run_limit: int = module.RUN_LIMIT):
+def naive_for(heard, telemetry, run_limit=module.RUN_LIMIT):
     if telemetry:
         return NaiveDecoder(14, 0x1E, LEAD[1:], run_limit)
     return NaiveDecoder(5 + 4 * heard.n, 0x10 | heard.n, LEAD, run_limit)

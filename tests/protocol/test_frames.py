@@ -13,7 +13,7 @@ from miro_protocol.whitening import whiten
 STOPPED = ((0, 0),) * 3
 
 
-def body_of(wire: bytes) -> bytes:
+def body_of(wire):
     return whiten(wire[wire.index(b"\x2d\xd4") + 2 :])[:-2]
 
 

@@ -9,7 +9,7 @@ from miro_protocol.freshness import Freshness
 MS = 24_000
 
 
-def after_first(seq: int) -> Freshness:
+def after_first(seq):
     fresh = Freshness()
     assert fresh.judge(seq, 0)
     return fresh

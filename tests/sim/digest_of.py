@@ -26,7 +26,7 @@ class Entry(NamedTuple):
     settings: tuple[str, ...]
 
 
-def parse(name: str) -> Entry:
+def parse(name):
     """The entry of a name like `fig6 0.5 s seed 7 --set camera.kind=gaussian`. Raises ValueError if it is none."""
     match = _NAME.fullmatch(name)
     if match is None:
@@ -35,7 +35,7 @@ def parse(name: str) -> Entry:
     return Entry(match["scenario"], float(match["duration_s"]), int(match["seed"]), settings)
 
 
-def digest(name: str) -> str:
+def digest(name):
     """Runs it from begin to end."""
     import msgspec
 
@@ -53,7 +53,7 @@ def digest(name: str) -> str:
     return world.digest
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("name", nargs="+")
     parser.add_argument("--engine", choices=engine.ENGINES, default="compiled")

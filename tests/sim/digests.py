@@ -4,11 +4,8 @@ Every built-in scenario, every kind of camera and picture noise, every profile o
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from importlib import resources
 from pathlib import Path
@@ -31,7 +28,7 @@ CAMERAS = (
 )
 
 
-def names() -> Iterator[str]:
+def names():
     """Of all runs, the short one first."""
     yield SHORT
     builtin = resources.files("miro_sim.scenario") / "builtin"
@@ -50,14 +47,14 @@ def names() -> Iterator[str]:
         yield _name("fig6", "variant=ideal", *case.settings)
 
 
-def _name(scenario: str, *settings: str) -> str:
+def _name(scenario, *settings):
     duration_s = load(str(ROOT / scenario) if "/" in scenario else scenario).scenario.duration_s
     return f"{scenario} {duration_s:g} s seed 7" + "".join(
         f" --set {one.replace(' ', '')}" for one in settings
     )
 
 
-def main() -> int:
+def main():
     """Prints the names of those that differ; exit code 1 if there are some."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="for a change of bits that is meant")

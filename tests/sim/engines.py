@@ -12,7 +12,6 @@ import itertools
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,16 +34,16 @@ class Checkpoint(NamedTuple):
     sent: int  # bytes that the robot put on its TXD
     sha256: str
 
-    def line(self) -> str:
+    def line(self):
         return " ".join(str(field) for field in self)
 
 
-def parse(line: str) -> Checkpoint:
+def parse(line):
     *numbers, sha256 = line.split()
-    return Checkpoint(*map(int, numbers), sha256)  # type: ignore[arg-type]
+    return Checkpoint(*map(int, numbers), sha256)
 
 
-def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
+def run(instructions, scenario):
     """Worlds of seed 0, 1, .. in this process's engine, until so many instructions were executed."""
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
@@ -78,7 +77,7 @@ def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
             return
 
 
-def processes(instructions: int, scenario: str) -> tuple[subprocess.Popen[str], subprocess.Popen[str]]:
+def processes(instructions, scenario):
     """One for each engine; they print checkpoints."""
     first, second = (
         children.start(
@@ -93,14 +92,14 @@ def processes(instructions: int, scenario: str) -> tuple[subprocess.Popen[str], 
     return first, second
 
 
-def compare(compiled: Iterable[str], python: Iterable[str]) -> Iterator[Checkpoint]:
+def compare(compiled, python):
     """The checkpoints that both print alike. Raises AssertionError at the first that differs."""
     for ours, theirs in itertools.zip_longest(compiled, python):
         assert ours == theirs, f"the engines part:\ncompiled {ours}python   {theirs}"
         yield parse(ours)
 
 
-def lockstep(instructions: int, scenario: str = "fig6") -> Iterator[Checkpoint]:
+def lockstep(instructions, scenario="fig6"):
     """Both engines over so many instructions. Raises AssertionError where they part, or when one of them fails."""
     pair = processes(instructions, scenario)
     try:
@@ -114,7 +113,7 @@ def lockstep(instructions: int, scenario: str = "fig6") -> Iterator[Checkpoint]:
             process.wait()
 
 
-def main() -> int:
+def main():
     """Prints figures; exit code 1 if the engines part."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--instructions", type=int, default=1_000_000, help="to execute, at least")

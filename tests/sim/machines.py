@@ -22,7 +22,6 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,25 +62,25 @@ class Machine:
     wheels: str = ""
 
     @cached_property
-    def folder(self) -> Path:
+    def folder(self):
         """Where its installation is made."""
         return ROOT / "build" / self.name
 
     @property
-    def compiler(self) -> str:
+    def compiler(self):
         return f"{self.triplet}-gcc"
 
     @property
-    def emulator(self) -> str:
+    def emulator(self):
         return f"qemu-{self.name}-static"
 
     @property
-    def multiarch(self) -> str:
+    def multiarch(self):
         """Debian's name of its library folder."""
         return self.triplet.replace("i686", "i386")
 
     @property
-    def tools(self) -> dict[str, str]:
+    def tools(self):
         """Program -> Debian packages that bring it."""
         return {
             self.compiler: f"gcc-{self.triplet} {self.libc}",
@@ -103,14 +102,14 @@ MACHINES = {
 }
 
 
-def check_tools(machine: Machine) -> None:
+def check_tools(machine):
     """Raises Missing if a tool is not there."""
     missing = [packages for tool, packages in machine.tools.items() if shutil.which(tool) is None]
     if missing:
         raise Missing(f"apt-get install {' '.join(missing)}")
 
 
-def install_python(machine: Machine) -> None:
+def install_python(machine):
     """Debian's Python for that machine into root/, by packages that are unpacked and not installed."""
     root = machine.folder / "root"
     if (root / "usr" / "bin" / f"python{VERSION}").exists():
@@ -134,7 +133,7 @@ def install_python(machine: Machine) -> None:
         run(["dpkg", "-x", str(deb), str(root)])
 
 
-def cross_compiler(machine: Machine, folder: Path, level: str) -> dict[str, str]:
+def cross_compiler(machine, folder, level):
     """The environment in which setuptools compiles for that machine, with `level` of optimising (O0, O2)."""
     headers = machine.folder / "root" / "usr" / "include"
     folder.mkdir(parents=True, exist_ok=True)
@@ -149,7 +148,7 @@ def cross_compiler(machine: Machine, folder: Path, level: str) -> dict[str, str]
     }
 
 
-def install_packages(machine: Machine) -> None:
+def install_packages(machine):
     """What the world imports into site/: wheels of that machine, or built here from their sources."""
     site = machine.folder / "site"
     if all((site / folder).exists() for folder in PACKAGES.values()):
@@ -164,7 +163,7 @@ def install_packages(machine: Machine) -> None:
     run([*command, *sources, *PACKAGES], env=cross_compiler(machine, machine.folder / "packages", "O2"))
 
 
-def build(machine: Machine, level: str) -> Path:
+def build(machine, level):
     """The packages, their hot modules translated by Cython here and compiled with `level`.
 
     Returns where they are.
@@ -175,14 +174,14 @@ def build(machine: Machine, level: str) -> Path:
     return base / "lib"
 
 
-def copy(machine: Machine) -> Path:
+def copy(machine):
     """The packages as sources, for the uncompiled engine. Returns where they are."""
     lib = machine.folder / "python" / "lib"
     run([sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(lib)])
     return lib
 
 
-def digests(machine: Machine, lib: Path, names: Sequence[str], which: str) -> list[str]:
+def digests(machine, lib, names, which):
     """Of the runs so named, by a processor of that machine with the packages in `lib`. Raises Refused."""
     root = machine.folder / "root"
     python = [str(root / "usr" / "bin" / f"python{VERSION}"), "-m", "tests.sim.digest_of"]
@@ -191,7 +190,7 @@ def digests(machine: Machine, lib: Path, names: Sequence[str], which: str) -> li
     return run(command, env={"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}).split()
 
 
-def run(command: Sequence[str], cwd: Path = ROOT, env: dict[str, str] | None = None) -> str:
+def run(command, cwd=ROOT, env=None):
     """What it prints. Raises Refused, or Missing with the end of its complaint if it fails."""
     done = children.run(command, cwd=cwd, env={**os.environ, **(env or {})}, capture_output=True, text=True)
     if done.returncode == REFUSED:
@@ -202,7 +201,7 @@ def run(command: Sequence[str], cwd: Path = ROOT, env: dict[str, str] | None = N
     return done.stdout
 
 
-def prepare(machine: Machine, which: str, level: str) -> Path:
+def prepare(machine, which, level):
     """Its whole installation, for the engine `which`. Returns where the packages are."""
     check_tools(machine)
     install_python(machine)
@@ -210,7 +209,7 @@ def prepare(machine: Machine, which: str, level: str) -> Path:
     return copy(machine) if which == "python" else build(machine, level)
 
 
-def arguments() -> argparse.Namespace:
+def arguments():
     """Those of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("machine", choices=MACHINES)
@@ -232,9 +231,9 @@ def arguments() -> argparse.Namespace:
     return options
 
 
-def wanted(options: argparse.Namespace) -> dict[str, str]:
+def wanted(options):
     """Name of a run -> digest that it must have."""
-    golden: dict[str, str] = json.loads(GOLDEN.read_text())
+    golden = json.loads(GOLDEN.read_text())
     if not options.whole_runs:
         shortest = min(golden, key=lambda name: parse(name).duration_s)
         golden = {shortest: golden[shortest]}
@@ -242,7 +241,7 @@ def wanted(options: argparse.Namespace) -> dict[str, str]:
     return golden | {name: run([*command, name]).strip() for name in options.beside}
 
 
-def main() -> int:
+def main():
     """Prints a line for each run; exit code 1 if a digest differs, 2 if something is missing."""
     options = arguments()
     machine = MACHINES[options.machine]

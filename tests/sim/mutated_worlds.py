@@ -8,15 +8,12 @@ Neither may crash, hang, raise anything else, or touch memory that is not its ow
 with the address sanitizer (CONTRIBUTING.md).
 """
 
-from __future__ import annotations
-
 import argparse
 import faulthandler
 import random
 import struct
 import sys
 from collections import Counter
-from collections.abc import Callable
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
@@ -50,13 +47,13 @@ NUMBERS += (1 << 40, 1 << 54, 1 << 61, 1 << 62, (1 << 63) - 1, -(1 << 63))
 REALS = (0.0, -0.0, float("nan"), float("inf"), float("-inf"), 1e300, -1e300, 1e18, -1e9, 5e-324, 0.5)
 
 
-def fresh(profile: str = "wire") -> World:
+def fresh(profile="wire"):
     """A world of two robots at tick 0, firmware and seed always the same."""
     scenario = scenario_file.parse(SCENARIO.format(profile=profile), "mutated")
     return World(scenario, 11, load_hex(image_path()))
 
 
-def saved_worlds(profile: str = "wire") -> list[bytes]:
+def saved_worlds(profile="wire"):
     """One world, saved at several ticks: in the middle of characters, frames and interrupts."""
     world = fresh(profile)
     saves = []
@@ -69,7 +66,7 @@ def saved_worlds(profile: str = "wire") -> list[bytes]:
     return saves
 
 
-def with_bytes_changed(saved: bytes, draw: random.Random) -> bytes:
+def with_bytes_changed(saved, draw):
     """Some bytes replaced, removed or put in, or the end cut off; never what was given."""
     data = bytearray(saved)
     for _ in range(draw.choice((1, 1, 1, 2, 8))):
@@ -87,7 +84,7 @@ def with_bytes_changed(saved: bytes, draw: random.Random) -> bytes:
     return bytes(data) if bytes(data) != saved else saved[:-1]
 
 
-def with_values_changed(world: World, saved: bytes, draw: random.Random) -> bytes:
+def with_values_changed(world, saved, draw):
     """One to three fields of the state are others; the checksum is right."""
     state = opened(saved, world.identity())
     for _ in range(draw.choice((1, 1, 2, 3))):
@@ -110,7 +107,7 @@ def with_field(world, saved, path, data):
     raise KeyError(path)
 
 
-def _spans(world: World, state: bytes) -> list[tuple[int, int, str]]:
+def _spans(world, state):
     """Begin, end and form of every field, as far as the bytes can be read."""
     spans, at = [], 0
     for field in world.state.fields:
@@ -123,7 +120,7 @@ def _spans(world: World, state: bytes) -> list[tuple[int, int, str]]:
     return spans
 
 
-def _other(data: bytes, form: str, draw: random.Random) -> bytes:
+def _other(data, form, draw):
     """A field with another value: of a list or of bytes another length, one item too many, or something in it."""
     if form == "d":
         (value,) = struct.unpack("<d", data)
@@ -151,7 +148,7 @@ def _other(data: bytes, form: str, draw: random.Random) -> bytes:
     return data[:place] + bytes([data[place] ^ 1 << draw.randrange(8)]) + data[place + 1 :]
 
 
-def outcome(world: World, saved: bytes) -> str:
+def outcome(world, saved):
     """`refused`, `ran`, or what was raised that must not be."""
     before = world.state.save()
     try:
@@ -170,11 +167,11 @@ def outcome(world: World, saved: bytes) -> str:
     return "ran"
 
 
-def changed_bytes(count: int, seed: int, progress: Callable[[int], object]) -> Counter[str]:
+def changed_bytes(count, seed, progress):
     """What came of so many worlds with bytes changed."""
     world = fresh()
     saves = saved_worlds()
-    found: Counter[str] = Counter()
+    found = Counter()
     for number in range(count):
         draw = random.Random(seed * 1_000_003 + number)
         faulthandler.dump_traceback_later(LIMIT_S, exit=True)
@@ -184,12 +181,12 @@ def changed_bytes(count: int, seed: int, progress: Callable[[int], object]) -> C
     return found
 
 
-def changed_values(count: int, seed: int, progress: Callable[[int], object]) -> Counter[str]:
+def changed_values(count, seed, progress):
     """What came of so many worlds with values changed and a checksum that is right."""
     profiles = ("wire", "shared")
     saves = {profile: saved_worlds(profile) for profile in profiles}
     worlds = {profile: fresh(profile) for profile in profiles}
-    found: Counter[str] = Counter()
+    found = Counter()
     for number in range(count):
         draw = random.Random(seed * 1_000_003 + number)
         profile = draw.choice(profiles)
@@ -204,7 +201,7 @@ def changed_values(count: int, seed: int, progress: Callable[[int], object]) -> 
     return found
 
 
-def main() -> int:
+def main():
     """Prints what came of them; exit code 1 when it is not what must be."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=10_000, help="worlds with bytes changed")
@@ -214,7 +211,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the changes")
     options = parser.parse_args()
 
-    def progress(number: int) -> None:
+    def progress(number):
         print(f"\r{number} ", end="", file=sys.stderr, flush=True)
 
     bytes_found = changed_bytes(options.count, options.seed, progress)

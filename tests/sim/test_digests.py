@@ -1,7 +1,5 @@
 """Every scenario, camera, radio and disturbance gives the bits that it gave when they were frozen."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -9,7 +7,7 @@ import pytest
 from tests.sim import digests
 from tests.sim.digest_of import digest
 
-GOLDEN: dict[str, str] = json.loads(digests.GOLDEN.read_text())
+GOLDEN = json.loads(digests.GOLDEN.read_text())
 
 
 def test_the_table_has_a_run_of_everything_and_no_other():

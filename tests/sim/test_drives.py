@@ -24,13 +24,13 @@ THROUGH = 'kind = "line", start_x_cm = 20.0, start_y_cm = 20.0, heading_deg = -1
 WAY = 'kind = "waypoints", points = [{ x_cm = 0.0, y_cm = 0.0, heading_deg = 10.0 }, { x_cm = 60.0, y_cm = 20.0 }, '
 
 
-def text(reference: str, controller: str = POLAR, duration_s: float = 6.0) -> str:
+def text(reference, controller=POLAR, duration_s=6.0):
     return TEXT.format(reference=reference, controller=controller, duration_s=duration_s)
 
 
-def refusal(*arguments: object) -> str:
+def refusal(*arguments):
     with pytest.raises(ScenarioError) as caught:
-        parse(text(*arguments), "my.toml")  # type: ignore[arg-type]
+        parse(text(*arguments), "my.toml")
     return str(caught.value)
 
 

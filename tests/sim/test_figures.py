@@ -9,13 +9,12 @@ import msgspec
 import pytest
 
 from benchmarks.figures import Figure, figures, row
-from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY, EpsilonTrackingParameters
+from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY
 from miro_host.references.arc import ArcRef
 from miro_host.references.line import LineRef
 from miro_sim.scenario.file import builtin_names, load, parse
-from miro_sim.scenario.keys import RobotSpec
 
-CAPTIONS: dict[str, tuple[tuple[float, float, float], type, str]] = {
+CAPTIONS = {
     "fig6": ((7.09, 1.72, -0.38), LineRef, "yang_kim"),
     "fig7": ((52.58, 16.62, -3.09), LineRef, "yang_kim"),
     "fig8": ((11.20, 28.92, -1.31), ArcRef, "yang_kim"),
@@ -25,7 +24,7 @@ CAPTIONS: dict[str, tuple[tuple[float, float, float], type, str]] = {
 TABLE = "[network.robot.controller]\n"
 
 
-def only_robot(name: str) -> RobotSpec:
+def only_robot(name):
     return load(name).scenario.networks[0].robot[0]
 
 
@@ -35,7 +34,7 @@ def as_they_are(name):
     return figures(name, (), range(8))
 
 
-def set_to(gains: EpsilonTrackingParameters) -> list[str]:
+def set_to(gains):
     """The setting that gives a scenario these gains."""
     table = ", ".join(
         f"{key} = {f'{value!r}' if not isinstance(value, str) else chr(34) + value + chr(34)}"
@@ -116,7 +115,7 @@ def test_a_scenario_that_cannot_be_run_is_a_line_from_any_process(jobs):
         figures("fig6", ["camera.kind=3"], range(2), jobs)
 
 
-def ratio(found: list[Figure]) -> float:
+def ratio(found):
     return row(found).y_cm / row(found).x_cm
 
 

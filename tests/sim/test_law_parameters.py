@@ -15,7 +15,7 @@ NUMBERS = [
 ]
 
 
-def refusal(law: str, **keys: object) -> str:
+def refusal(law, **keys):
     table = ", ".join(f"{key} = {value}" for key, value in {"law": f'"{law}"', **keys}.items())
     with pytest.raises(ScenarioError) as caught:
         load("fig6", [f"{PLACE}={{{table}}}"])

@@ -39,7 +39,7 @@ def test_a_refusal_of_the_other_machine_is_no_digest_and_its_line_is_kept():
 
 
 def test_a_python_that_is_refused_says_so_in_one_line_and_by_its_exit_code(monkeypatch, capsys):
-    def refuse(which: str) -> None:
+    def refuse(which):
         raise engine.EngineError("this Python rounds twice", "use another")
 
     monkeypatch.setattr(engine, "select", refuse)

@@ -62,5 +62,5 @@ def test_a_waveform_is_read_back_tick_by_tick():
     assert edges_of(text) == {"rxd": [(0, 1), (1, 0), (24_000_000, 1)]}
 
 
-def level_at(edges: list[tuple[int, int]], tick: int) -> int:
+def level_at(edges, tick):
     return [level for at, level in edges if at <= tick][-1]

@@ -9,7 +9,7 @@ import pytest
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
 from miro_host.estimators.predict import PredictParameters
-from miro_host.laws.interface import Law, LawInput, LawParameters, Velocities
+from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
 from miro_host.plugins import PluginError
 from miro_robot.firmware import image_path
@@ -33,7 +33,7 @@ class Listener(Law[LawParameters]):
 
     INNER = ("position_left",)
 
-    def step(self, given: LawInput) -> Velocities:
+    def step(self, given):
         count = 0.0 if given.telemetry is None else float(given.telemetry.position_left)
         return Velocities(0.1 + count * 1e-5, 0.0, {"position_left": count})
 

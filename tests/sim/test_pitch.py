@@ -28,14 +28,14 @@ HERE = "network[0].robot[1]"
 SPOTS = st.builds(Posture, st.floats(-0.3, 1.4), st.floats(-0.3, 1.1), st.floats(-math.pi, math.pi))
 
 
-def text(start: str = "", reference: str = LINE, duration_s: float = 1.0) -> str:
+def text(start="", reference=LINE, duration_s=1.0):
     whole = TEXT.format(duration_s=duration_s, start=start, reference=reference)
     return whole.replace("slot = 1\n", f"slot = 1\nreference = {{ {LINE}, drive_s = 1.0 }}\n")
 
 
-def refusal(*arguments: object, **options: object) -> str:
+def refusal(*arguments, **options):
     with pytest.raises(ScenarioError) as caught:
-        parse(text(*arguments, **options), "my.toml")  # type: ignore[arg-type]
+        parse(text(*arguments, **options), "my.toml")
     return str(caught.value)
 
 

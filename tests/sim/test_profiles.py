@@ -11,7 +11,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.radio.params import Bursts, Radio
+from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.world.world import World
@@ -29,16 +29,16 @@ reference.kind = "line"
 """
 
 
-def text(*radios: str) -> str:
+def text(*radios):
     head = 'name = "air"\nduration_s = 0.5\ncamera.kind = "gaussian"\n'
     return head + "".join(NETWORK.format(radio) for radio in radios)
 
 
-def radio(lines: str) -> Radio:
+def radio(lines):
     return parse(text(lines), "air.toml").networks[0].radio
 
 
-def refusal(lines: str) -> str:
+def refusal(lines):
     with pytest.raises(ScenarioError) as caught:
         radio(lines)
     assert "\n" not in str(caught.value)
@@ -181,11 +181,11 @@ def test_the_command_line_lists_the_profiles_with_their_keys():
         assert name in result.stdout
 
 
-def world(*radios: str, seed: int = 7) -> World:
+def world(*radios, seed=7):
     return World(parse(text(*radios), "air.toml"), seed, IMAGE)
 
 
-def ran(world: World, periods: int = 6) -> World:
+def ran(world, periods=6):
     for _ in range(periods):
         world.step()
     return world
@@ -208,7 +208,7 @@ def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded
     assert cut.state.save() == whole.state.save()
 
 
-def accepted(world: World) -> list[int | None]:
+def accepted(world):
     return [network.robots[0].counter(0) for network in world.networks]
 
 

@@ -10,7 +10,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 
 
-def errors_cm(name: str, seed: int, *settings: str) -> list[float]:
+def errors_cm(name, seed, *settings):
     """Distances of the robot from its reference, at each camera frame."""
     world, errors = World(load(name, settings).scenario, seed, load_hex(image_path())), []
     while not world.finished:

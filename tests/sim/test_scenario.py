@@ -23,7 +23,7 @@ reference.kind = "line"
 """
 
 
-def refusal(text: str) -> str:
+def refusal(text):
     with pytest.raises(ScenarioError) as caught:
         parse(text, "my.toml")
     message = str(caught.value)
@@ -32,7 +32,7 @@ def refusal(text: str) -> str:
     return message
 
 
-def edited(old: str, new: str) -> str:
+def edited(old, new):
     text = builtin_text("fig6")
     assert old in text
     return text.replace(old, new, 1)
@@ -287,7 +287,7 @@ LINES = builtin_text("fig8").splitlines()
 
 
 @st.composite
-def damaged(draw: st.DrawFn) -> str:
+def damaged(draw):
     """A built-in scenario with some keys renamed, revalued, dropped, or new lines put in."""
     lines = list(LINES)
     for _ in range(draw(st.integers(1, 3))):

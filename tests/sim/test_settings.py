@@ -21,7 +21,7 @@ TABLES = {name: tomllib.loads(builtin_text(name)) for name in ("fig6", "fig8")}
 SCALARS = [(name, *place) for name, table in TABLES.items() for place in scalar_places(table)]
 
 
-def refusal(*settings: str, source: str = "fig6") -> str:
+def refusal(*settings, source="fig6"):
     with pytest.raises(ScenarioError) as caught:
         load(source, settings)
     message = str(caught.value)

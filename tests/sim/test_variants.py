@@ -42,7 +42,7 @@ DISTURBED = [
 ]
 
 
-def refusal(settings: list[str], source: str = "fig6") -> str:
+def refusal(settings, source="fig6"):
     with pytest.raises(ScenarioError) as caught:
         load(source, settings)
     assert "\n" not in str(caught.value)

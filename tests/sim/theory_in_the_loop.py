@@ -84,7 +84,7 @@ def row(name, seeds):
     )
 
 
-def main() -> None:
+def main():
     arguments = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     arguments.add_argument("--seeds", type=int, default=10)
     seeds = arguments.parse_args().seeds

@@ -43,7 +43,7 @@ _SWITCHED_OFF = 0x03  # PCON: the core stands, and there is no end to compare
 class _Drawing:
     """One initial state in the making."""
 
-    def __init__(self, opcode: int, draw: Draw) -> None:
+    def __init__(self, opcode, draw):
         self.opcode = opcode
         self.row = ROW[opcode]
         self.operands = _OPERANDS[self.row]
@@ -53,7 +53,7 @@ class _Drawing:
         self.xram: dict[int, int] = {}
         self.pins: dict[int, int] = {}
 
-    def state(self) -> State:
+    def state(self):
         pc = self.draw(0x10000)
         self._core()
         for _ in range(_DECOYS):
@@ -72,7 +72,7 @@ class _Drawing:
         )
         return state if self.opcode not in _MOVC else self._with_table(state)
 
-    def _core(self) -> None:
+    def _core(self):
         for address in _ALWAYS:
             self.sfr[address] = self.draw(256) | _HIGH.get(address, 0)
         if self.opcode in _MOVX:
@@ -81,12 +81,12 @@ class _Drawing:
             self.sfr[_B] = 0
         self.sfr[_PSW] = self.sfr[_PSW] & 0xFE | self.sfr[_ACC].bit_count() & 1
 
-    def _byte(self, address: int) -> int:
+    def _byte(self, address):
         """A random byte of internal RAM; its value."""
         self.iram[address] = self.draw(256)
         return self.iram[address]
 
-    def _operand_bytes(self) -> list[int]:
+    def _operand_bytes(self):
         """What follows the opcode."""
         length = LENGTH[self.opcode]
         if self.row == 0x85:
@@ -100,7 +100,7 @@ class _Drawing:
         found += [self.draw(256) for _ in range(length - 1 - len(found))]
         return found
 
-    def _direct(self) -> int:
+    def _direct(self):
         """A direct address: RAM or register in equal parts."""
         if self.draw(2):
             return self._special(REGISTERS[self.draw(len(REGISTERS))])
@@ -108,7 +108,7 @@ class _Drawing:
         self._byte(address)
         return address
 
-    def _bit(self) -> int:
+    def _bit(self):
         if self.draw(2):
             bit = self.draw(0x80)
             self._byte(0x20 + (bit >> 3))
@@ -116,7 +116,7 @@ class _Drawing:
         addressable = [address for address in REGISTERS if address & 7 == 0]
         return self._special(addressable[self.draw(len(addressable))]) | self.draw(8)
 
-    def _special(self, address: int) -> int:
+    def _special(self, address):
         if address in _PORTS:
             self.pins[address] = self.draw(256) | _HIGH[address]
         elif address not in self.sfr:
@@ -128,7 +128,7 @@ class _Drawing:
             self.sfr[address] = value
         return address
 
-    def _stack(self) -> None:
+    def _stack(self):
         sp = self.sfr[_SP]
         if self.row in _CALLS:
             self._byte((sp + 1) & 0xFF)
@@ -141,7 +141,7 @@ class _Drawing:
         elif self.row == _POP:
             self._byte(sp)
 
-    def _registers(self) -> None:
+    def _registers(self):
         """Rn, or Ri and what it points at."""
         bank = self.sfr[_PSW] & 0x18
         if "Rn" in self.operands:
@@ -152,7 +152,7 @@ class _Drawing:
             if self.opcode not in _MOVX and address != pointer:
                 self._byte(address)
 
-    def _external(self) -> None:
+    def _external(self):
         if self.opcode in _MOVX:
             if self.opcode in (0xE0, 0xF0):
                 address = self.sfr[_DPH] << 8 | self.sfr[_DPL]
@@ -161,16 +161,16 @@ class _Drawing:
                 address = self.sfr[_P2] << 8 | self.iram[pointer]
             self.xram[address] = self.draw(256)
 
-    def _with_table(self, state: State) -> State:
+    def _with_table(self, state):
         code = dict(state.code)
         code.setdefault(table_address(state), self.draw(256))
         return State(state.pc, state.sfr, state.iram, state.xram, state.pins, sorted(code.items()))
 
 
-def draw_vectors(opcode: int, count: int, draw: Draw) -> list[Vector]:
+def draw_vectors(opcode, count, draw):
     """`count` vectors of one opcode; their results are those of our CPU."""
     bench = VectorRunner()
-    found: list[Vector] = []
+    found = []
     while len(found) < count:
         initial = _Drawing(opcode, draw).state()
         final, cycles = bench.run(initial)
@@ -179,14 +179,14 @@ def draw_vectors(opcode: int, count: int, draw: Draw) -> list[Vector]:
     return found
 
 
-def _is_defined(final: State) -> bool:
+def _is_defined(final):
     """Not for states that end the clock, or that the next S5P2 changes: IEx set by software in level mode."""
     sfr = dict(final.sfr)
     flags = sfr.get(_TCON, 0)
     return not sfr.get(_PCON, 0) & _SWITCHED_OFF and not (flags >> 1) & ~flags & 0x05
 
 
-def _name(state: State) -> str:
+def _name(state):
     """The instruction's bytes and its text."""
     code = bytearray(0x10000)
     for address, value in state.code:

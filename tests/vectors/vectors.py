@@ -51,13 +51,13 @@ class Vector(msgspec.Struct, frozen=True):
     cycles: list[list[Access]]
 
 
-def encode(vectors: list[Vector]) -> bytes:
+def encode(vectors):
     """A file: a JSON array, one vector a line."""
     lines = [msgspec.json.encode(vector) for vector in vectors]
     return b"[\n" + b",\n".join(lines) + b"\n]\n"
 
 
-def decode(content: bytes) -> list[Vector]:
+def decode(content):
     """The vectors in a file. Raises msgspec.ValidationError for what is not one."""
     return msgspec.json.decode(content, type=list[Vector])
 
@@ -67,21 +67,21 @@ class _VectorBus(Bus):
 
     NOT_STATE = ("accesses", "latches")
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.memory: dict[int, int] = {}
         self.accesses: list[Access] = []
         self.latches: list[Access] = []
 
-    def movx_read(self, address: int, tick: int) -> int:
+    def movx_read(self, address, tick):
         value = self.memory.get(address, 0)
         self.accesses.append((address, value, READ))
         return value
 
-    def movx_write(self, address: int, value: int, tick: int) -> None:
+    def movx_write(self, address, value, tick):
         self.memory[address] = value
         self.accesses.append((address, value, WRITE))
 
-    def port_written(self, port: int, latch: int, tick: int) -> None:
+    def port_written(self, port, latch, tick):
         self.latches.append((_PORTS[port], latch, LATCH))
 
 
@@ -90,11 +90,11 @@ class VectorRunner:
 
     NOT_STATE = ("bus", "cpu")
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.bus = _VectorBus()
         self.cpu = Cpu(self.bus)
 
-    def run(self, initial: State) -> tuple[State, list[list[Access]]]:
+    def run(self, initial):
         """What the instruction at `initial.pc` leaves behind, and its bus cycles.
 
         Raises ValueError if it changed what `initial` does not list.
@@ -120,7 +120,7 @@ class VectorRunner:
         )
         return final, self._cycles(initial)
 
-    def prepare(self, state: State) -> None:
+    def prepare(self, state):
         """Registers are written by instructions, ACC last; then PC is set."""
         cpu = self.cpu
         cpu.reset()
@@ -138,19 +138,19 @@ class VectorRunner:
             cpu.write_code(address, value)
         cpu.pc = state.pc
 
-    def _execute(self, instruction: bytes) -> None:
+    def _execute(self, instruction):
         for address, value in enumerate(instruction):
             self.cpu.write_code(address, value)
         self.cpu.pc = 0
         self.cpu.step()
 
-    def _registers(self) -> dict[int, int]:
+    def _registers(self):
         return {address: self.cpu.sfr(address) for address in REGISTERS}
 
-    def _iram(self) -> list[int]:
+    def _iram(self):
         return [self.cpu.peek_iram(address) for address in range(256)]
 
-    def _cycles(self, initial: State) -> list[list[Access]]:
+    def _cycles(self, initial):
         """Fetches by rule, then external memory in the second cycle, then latches in the last."""
         cycles = fetches(initial)
         if self.bus.accesses:
@@ -159,7 +159,7 @@ class VectorRunner:
         return cycles
 
 
-def fetches(state: State) -> list[list[Access]]:
+def fetches(state):
     """The program fetches of each machine cycle: two, at S1 and S4; those not needed are repeated at the byte
     after the instruction and dropped. A MOVX has none in its second cycle; a MOVC reads its table first in
     its second.
@@ -180,7 +180,7 @@ def fetches(state: State) -> list[list[Access]]:
     return [accesses[first : first + _SLOTS] for first in range(0, slots, _SLOTS)]
 
 
-def table_address(state: State) -> int:
+def table_address(state):
     """Where a MOVC reads."""
     registers = {**RESET, **dict(state.sfr)}
     opcode = dict(state.code)[state.pc]

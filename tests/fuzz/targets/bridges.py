@@ -7,43 +7,43 @@ import os
 import socket
 from typing import Any
 
-from tests.fuzz.target import Draws, Run, Target, pieces
+from tests.fuzz.target import Draws, Target, pieces
 
 
 class _Radio:
     """A radio's port that keeps what is sent. `room` is drawn; time stands, but for `world.tick`."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.world = self
         self.tick = self.free_tick = 0
         self.room = 4096
         self.sent = b""
         self.network = self.waiting = 0
 
-    def send(self, data: bytes) -> int:
+    def send(self, data):
         assert 0 < len(data) <= self.room, f"{len(data)} bytes where there is room for {self.room}"
         self.sent += data
         return self.tick
 
-    def purge(self) -> None:
+    def purge(self):
         """Nothing waits."""
 
 
-def _context(radio: _Radio, told: list[str]) -> Any:
+def _context(radio, told):
     from selectors import DefaultSelector
 
     from mirotwin.ports.endpoint import PortContext
 
-    return PortContext(radio, DefaultSelector(), told.append)  # type: ignore[arg-type]
+    return PortContext(radio, DefaultSelector(), told.append)
 
 
-def _negotiation() -> Run:
+def _negotiation():
     from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
 
-    told: list[str] = []
+    told = []
     whole, parts, other = (Rfc2217Endpoint(_context(_Radio(), told), "127.0.0.1", 0) for _ in range(3))
 
-    def run(data: bytes) -> str:
+    def run(data):
         cut, data = 1 + (data[0] if data else 0), data[1:]
         del told[:]
         for port in (whole, parts, other):
@@ -64,10 +64,10 @@ def _negotiation() -> Run:
     return run
 
 
-def _client(draw: Draws, radio: _Radio, port: Any, connect: Any, told: list[str]) -> str:
+def _client(draw, radio, port, connect, told):
     """Does what is drawn; every byte that arrives was sent, in that order, by one client after the other."""
-    clients: list[Any] = []
-    given: list[bytes] = []
+    clients = []
+    given = []
     delivered = 0
     for _ in range(24):
         action = draw.below(10)
@@ -105,25 +105,25 @@ def _client(draw: Draws, radio: _Radio, port: Any, connect: Any, told: list[str]
 
 
 class _TcpClient:
-    def __init__(self, number: int) -> None:
+    def __init__(self, number):
         self.socket = socket.create_connection(("127.0.0.1", number), timeout=5)
         self.socket.setblocking(False)
 
-    def say(self, data: bytes) -> bytes:
+    def say(self, data):
         try:
             return data[: self.socket.send(data)]
         except OSError:
             return b""
 
-    def hear(self) -> None:
+    def hear(self):
         with contextlib.suppress(OSError):
             self.socket.recv(65_536)
 
-    def finish(self) -> None:
+    def finish(self):
         with contextlib.suppress(OSError):
             self.socket.shutdown(socket.SHUT_WR)
 
-    def close(self, hard: int) -> None:
+    def close(self, hard):
         if hard and self.socket.fileno() >= 0:
             linger = b"\1\0\0\0\0\0\0\0"
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
@@ -131,23 +131,23 @@ class _TcpClient:
 
 
 class _TerminalClient:
-    def __init__(self, path: str) -> None:
+    def __init__(self, path):
         self.file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
-    def say(self, data: bytes) -> bytes:
+    def say(self, data):
         try:
             return data[: os.write(self.file, data)] if self.file >= 0 else b""
         except OSError:
             return b""
 
-    def hear(self) -> None:
+    def hear(self):
         try:
             if self.file >= 0:
                 os.read(self.file, 65_536)
         except OSError:
             pass
 
-    def finish(self) -> None:
+    def finish(self):
         """A terminal has no half of a connection to close; it may be set, to another rate and to lines."""
         import termios
 
@@ -157,24 +157,24 @@ class _TerminalClient:
             modes[4] = modes[5] = termios.B115200
             termios.tcsetattr(self.file, termios.TCSANOW, modes)
 
-    def close(self, hard: int) -> None:
+    def close(self, hard):
         if self.file >= 0:
             os.close(self.file)
         self.file = -1
 
 
-def _sockets(kind: str) -> Run:
+def _sockets(kind):
     from mirotwin.ports.rfc2217 import Rfc2217Endpoint
     from mirotwin.ports.sockets import TcpEndpoint
     from mirotwin.ports.terminal import PtyEndpoint
 
-    def run(data: bytes) -> str:
+    def run(data):
         radio, told = _Radio(), []
         context = _context(radio, told)
         port: Any
         if kind == "pty":
             port = PtyEndpoint(context, None)
-            connect: Any = lambda: _TerminalClient(port.path)  # noqa: E731
+            connect = lambda: _TerminalClient(port.path)  # noqa: E731
         else:
             port = (Rfc2217Endpoint if kind == "rfc2217" else TcpEndpoint)(context, "127.0.0.1", 0)
             number = int(port.where.rpartition(":")[2])
@@ -189,7 +189,7 @@ def _sockets(kind: str) -> Run:
     return run
 
 
-def _negotiation_seeds() -> list[bytes]:
+def _negotiation_seeds():
     asks = b"".join(
         b"\xff\xfa\x2c" + body + b"\xff\xf0"
         for body in (
@@ -208,7 +208,7 @@ def _negotiation_seeds() -> list[bytes]:
     ]
 
 
-def _client_seeds() -> list[bytes]:
+def _client_seeds():
     return [
         b"\x00\x01\x00\x09some data\x06\x08answers!\x00\x05\x00\x03\x00\x07\xff\xff\xff",
         b"\x00\x00\x02\x01\x20abcdefgh\x08\x05\x00\x02\x00\x09x\x06\x60y\x01\x06\x60y\x01\x04\x01\x01\x05\x00",

@@ -1,21 +1,19 @@
 """Files of characters: streams, pcapng, hex text, and what `decode` and `export` make of any file."""
 
-from __future__ import annotations
-
 from itertools import islice
 
-from tests.fuzz.target import Run, Target, folder, pieces, refused
+from tests.fuzz.target import Target, folder, pieces, refused
 
 _SOURCE = "fuzz.stream"
 _MOST = 5_000
 """Transmissions that are looked at: a short capture can hold no more anyway."""
 
 
-def _stream() -> Run:
+def _stream():
     from miro_exact.bad_input import BadInput
     from miro_protocol import stream
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = stream.decode(data, _SOURCE)
         except BadInput as error:
@@ -33,15 +31,14 @@ def _stream() -> Run:
     return run
 
 
-def _pcapng() -> Run:
+def _pcapng():
     from collections import Counter
     from io import BytesIO
 
     from miro_protocol import pcapng
     from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
-    from miro_protocol.transmission import Transmission
 
-    def read(source: bytes | BytesIO, passed_over: Counter[int]) -> tuple[list[Transmission], str]:
+    def read(source, passed_over):
         found = []
         try:
             for packet in iterate(source, "fuzz.pcapng", passed_over):
@@ -50,8 +47,8 @@ def _pcapng() -> Run:
             return found, refused(error)
         return found, "taken"
 
-    def run(data: bytes) -> str:
-        passed_over: Counter[int] = Counter()
+    def run(data):
+        passed_over = Counter()
         found, outcome = read(data, passed_over)
         if passed_over:
             assert events_line(passed_over).isprintable()
@@ -65,10 +62,10 @@ def _pcapng() -> Run:
     return run
 
 
-def _hex_text() -> Run:
+def _hex_text():
     from mirotwin.recording.capture.hextext import HexError, HexText
 
-    def read(parts: list[bytes]) -> tuple[bytes, str]:
+    def read(parts):
         text, found = HexText("fuzz.txt"), b""
         try:
             for part in parts:
@@ -78,7 +75,7 @@ def _hex_text() -> Run:
             return found, refused(error)
         return found, "taken"
 
-    def run(data: bytes) -> str:
+    def run(data):
         cut, text = 1 + data[0] % 16 if data else 1, data[1:]
         whole = read([text])
         assert whole == read(list(pieces(text, cut))), "cut elsewhere, the bytes or the error differ"
@@ -89,7 +86,7 @@ def _hex_text() -> Run:
     return run
 
 
-def _capture() -> Run:
+def _capture():
     from miro_exact.bad_input import BadInput
     from mirotwin.recording.capture import convert, render
     from mirotwin.recording.capture.detect import FORMATS, detect
@@ -98,11 +95,11 @@ def _capture() -> Run:
     from mirotwin.recording.capture.rows import rows
     from mirotwin.recording.capture.source import READ_ERRORS, open_source
 
-    def run(data: bytes) -> str:
+    def run(data):
         forced, data = (data[0], data[1:]) if data else (0, b"")
         path = folder() / "fuzz.capture"
         path.write_bytes(data)
-        said: list[str] = []
+        said = []
         with Input(str(path)) as given:
             format, about = detect(given.peek())
             assert about.isprintable()
@@ -129,7 +126,7 @@ def _capture() -> Run:
     return run
 
 
-def stream_seeds() -> list[bytes]:
+def stream_seeds():
     frame = "55 55 55 55 55 ff 2d d4 fc e0 11 22 33"
     bad = frame.replace("fc", "fc!")
     return [
@@ -144,7 +141,7 @@ def stream_seeds() -> list[bytes]:
     ]
 
 
-def _pcapng_seeds() -> list[bytes]:
+def _pcapng_seeds():
     import struct
 
     from miro_protocol import pcapng
@@ -153,7 +150,7 @@ def _pcapng_seeds() -> list[bytes]:
     sent = [Transmission(96000, ">", b"\x55\x55\xff"), Transmission(120000, "<", b"answer", 1)]
     ours = pcapng.render(sent)
 
-    def block(kind: int, body: bytes) -> bytes:
+    def block(kind, body):
         size = struct.pack(">I", len(body) + 12)
         return struct.pack(">I", kind) + size + body + size
 
@@ -170,7 +167,7 @@ def _pcapng_seeds() -> list[bytes]:
     return [ours, section + interface + packets, ours + section + interface + packets]
 
 
-def _hex_seeds() -> list[bytes]:
+def _hex_seeds():
     return [
         b"\x03" + b"55 55 ff 2d d4 # end\n0x55,0xFF;2d:d4\n",
         b"\x00\xef\xbb\xbf5555ff2dd4\n#only\nff f",
@@ -178,7 +175,7 @@ def _hex_seeds() -> list[bytes]:
     ]
 
 
-def _capture_seeds() -> list[bytes]:
+def _capture_seeds():
     found = [
         b"\xff" + seed for seed in (*stream_seeds(), *_pcapng_seeds(), b"55 55 ff 2d d4\n", b"\x89MCAP0\r\n")
     ]

@@ -1,8 +1,6 @@
 """A firmware and what stands beside it: images, symbol and debug files, tracefiles."""
 
-from __future__ import annotations
-
-from tests.fuzz.target import Run, Target, folder, refused, with_sums
+from tests.fuzz.target import Target, folder, refused, with_sums
 from tests.mirotwin.mutated_files import ECHO, ECHO_CDB, ECHO_MAP, ECHO_RST, hex_records
 
 _NAME = "fuzz.ihx"
@@ -10,12 +8,12 @@ _MOST_NAMES = 20
 """Variables of a file that are read and written."""
 
 
-def _hex() -> Run:
+def _hex():
     from pathlib import Path
 
     from miro_robot.image.hex import ImageError, parse_hex
 
-    def parsed(data: bytes) -> str:
+    def parsed(data):
         try:
             image = parse_hex(data, Path(_NAME), 0x10000)
         except ImageError as error:
@@ -26,13 +24,13 @@ def _hex() -> Run:
         assert image.size == sum(end - first for first, end in image.used)
         return f"{min(len(image.used), 3)} ranges"
 
-    def run(data: bytes) -> str:
+    def run(data):
         return f"{parsed(data)}; sums put right: {parsed(with_sums(data))}"
 
     return run
 
 
-def hex_at(first: int, code: bytes) -> bytes:
+def hex_at(first, code):
     """Records of `code` from an address on, without the end record."""
     lines = []
     for place in range(0, len(code), 16):
@@ -42,7 +40,7 @@ def hex_at(first: int, code: bytes) -> bytes:
     return "".join(lines).encode()
 
 
-def _beside(suffix: str) -> Run:
+def _beside(suffix):
     """A symbol file of that suffix beside the image it belongs to; all that reads one."""
     from miro_exact.bad_input import BadInput
     from miro_robot.board import Board
@@ -61,7 +59,7 @@ def _beside(suffix: str) -> Run:
         path.with_suffix(other).write_text(text)
     cpu = Board(load_wiring(), Plant(), 0, 3).cpu
 
-    def run(data: bytes) -> str:
+    def run(data):
         path.with_suffix(suffix).write_bytes(data)
         image = load_hex(path)
         try:
@@ -116,11 +114,11 @@ L:Lmain.main$count$1_0$1:2
 """
 
 
-def _lcov() -> Run:
+def _lcov():
     from miro_exact.bad_input import BadInput
     from miro_robot.inspect.lcov import add, decode, encode
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = decode(data.decode("utf-8", "surrogateescape"), "fuzz.info")
         except BadInput as error:
@@ -135,12 +133,12 @@ def _lcov() -> Run:
     return run
 
 
-def _hex_seeds() -> list[bytes]:
+def _hex_seeds():
     linear = b":020000040000FA\n:0400000500000000F7\n:020000021000EC\n"
     return [hex_records(ECHO), linear + hex_at(0x8000, b"ab") + b":00000001FF\r\n"]
 
 
-def _lcov_seeds() -> list[bytes]:
+def _lcov_seeds():
     old = (
         b"TN:\nSF:main.c\nFN:3,main\nFN:9,12,go\nFNDA:2,main\nBRDA:4,0,0,1\nBRDA:4,0,1,-\nDA:3,2\nDA:4,0,x\n"
     )

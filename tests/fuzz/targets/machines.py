@@ -1,20 +1,18 @@
 """What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
-from __future__ import annotations
-
 from functools import cache
 
-from tests.fuzz.target import Draws, Run, Target, folder, refused
+from tests.fuzz.target import Draws, Target, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
 
 _NAME = "fuzz.ihx"
 
 
-def _pins() -> Run:
+def _pins():
     from miro_exact.bad_input import BadInput
     from miro_robot.bare.pins import read_pins
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             events = read_pins(data.decode("utf-8", "replace"), "fuzz.pins")
         except BadInput as error:
@@ -26,7 +24,7 @@ def _pins() -> Run:
     return run
 
 
-def _serial() -> Run:
+def _serial():
     """Pieces of input with conditions, and pins, for a program that sends back what it gets."""
     from miro_exact.state import snapshot
     from miro_robot.bare.input import InputPiece
@@ -38,7 +36,7 @@ def _serial() -> Run:
     path.write_bytes(hex_records(ECHO))
     image = load_hex(path)
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         baud = (None, 9600, 4800, draw.below(1 << 20))[draw.below(4)]
         crystal_hz = (24_000_000, 11_059_200, draw.below(1 << 27))[draw.below(3)]
@@ -53,7 +51,7 @@ def _serial() -> Run:
             when = draw.take(draw.below(4)) if kind == 1 else b""
             delay_ticks = draw.below(1 << 24) if kind else None
             pieces.append(InputPiece(draw.take(draw.below(16)), when, delay_ticks))
-        sent: tuple[list[int], list[int]] = ([], [])
+        sent = ([], [])
         try:
             whole, parts = (
                 BareMachine(
@@ -78,7 +76,7 @@ def _serial() -> Run:
     return run
 
 
-def _board() -> Run:
+def _board():
     from miro_robot.board import Board
     from miro_robot.image import load_hex
     from miro_robot.plant import Plant
@@ -89,7 +87,7 @@ def _board() -> Run:
     code.write_bytes(hex_records(_BUS_PROGRAM))
     image = load_hex(code)
 
-    def run(data: bytes) -> str:
+    def run(data):
         path.write_bytes(data)
         try:
             wiring = load_wiring(path)
@@ -109,13 +107,13 @@ _BUS_PROGRAM = bytes.fromhex("908000 04 F0 E0 F580 F590 F5A0 F5B0 A3 80F2".repla
 
 
 @cache
-def _miro_toml() -> bytes:
+def _miro_toml():
     from importlib import resources
 
     return resources.files("miro_robot.boards").joinpath("miro.toml").read_bytes()
 
 
-def _board_seeds() -> list[bytes]:
+def _board_seeds():
     text = _miro_toml().decode()
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     plain = "\n".join(lines)
@@ -128,7 +126,7 @@ def _board_seeds() -> list[bytes]:
     return [plain.encode(), (latched + "address = 0x4000\n[[buffer]]\naddress = 1\n").encode()]
 
 
-def _serial_seeds() -> list[bytes]:
+def _serial_seeds():
     return [
         b"\x00\x00\x00\x00\x00\x10\x00\x05hello\x01\x02lo\x10\x20\x00\x03abc",
         b"\x01\x00\x00\x20\x01\x40\x00\x03abc\x03\x00\x10\x01\x02\x01\x02\x00\x80\x00\x02xy",

@@ -1,18 +1,16 @@
 """What the tracker reads: pictures, calibrations, colours, points, samples; and the tracker on drawn patches."""
 
-from __future__ import annotations
-
 import math
 import warnings
 import zlib
 
-from tests.fuzz.target import Draws, Run, Target, refused
+from tests.fuzz.target import Draws, Target, refused
 
 _ORIGIN = "fuzz.file"
 _WIDTH, _HEIGHT = 320, 240
 
 
-def _with_sums(png: bytes) -> bytes:
+def _with_sums(png):
     """A PNG file whose chunks have the right sums."""
     data, place = bytearray(png), 8
     while place + 12 <= len(data):
@@ -25,11 +23,11 @@ def _with_sums(png: bytes) -> bytes:
     return bytes(data)
 
 
-def _picture() -> Run:
+def _picture():
     from miro_exact.bad_input import BadInput
     from mirotwin.camera.picture import Picture, parse, png
 
-    def read(data: bytes) -> str:
+    def read(data):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             try:
@@ -40,18 +38,18 @@ def _picture() -> Run:
         assert isinstance(parse(png(found.image()), "again"), Picture)
         return "taken"
 
-    def run(data: bytes) -> str:
+    def run(data):
         return f"{read(data)}; sums put right: {read(_with_sums(data))}"
 
     return run
 
 
-def _calibration() -> Run:
+def _calibration():
     from miro_host.eye import eye_file
     from miro_host.eye.calibration import Calibration
     from miro_host.eye.eye_file import EyeError
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = eye_file.parse(data.decode("utf-8", "replace"), Calibration, _ORIGIN)
         except EyeError as error:
@@ -73,12 +71,12 @@ def _calibration() -> Run:
     return run
 
 
-def _colours() -> Run:
+def _colours():
     from miro_host.eye import eye_file
     from miro_host.eye.colours import ColourClasses
     from miro_host.eye.eye_file import EyeError
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = eye_file.parse(data.decode("utf-8", "replace"), ColourClasses, _ORIGIN)
         except EyeError as error:
@@ -92,12 +90,12 @@ def _colours() -> Run:
     return run
 
 
-def _points() -> Run:
+def _points():
     from miro_host.eye.camera_parameters import CameraParameters
     from miro_host.eye.eye_file import EyeError
     from miro_host.eye.fit import fit, parse_points
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = parse_points(data.decode("utf-8", "replace"), _ORIGIN)
             fit(found, CameraParameters(), _ORIGIN)
@@ -108,12 +106,12 @@ def _points() -> Run:
     return run
 
 
-def _samples() -> Run:
+def _samples():
     from miro_host.eye.colours import classes_of
     from miro_host.eye.eye_file import EyeError
     from miro_host.eye.sample_file import parse_samples
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = classes_of(parse_samples(data.decode("utf-8", "replace"), _ORIGIN), _ORIGIN)
         except EyeError as error:
@@ -124,7 +122,7 @@ def _samples() -> Run:
     return run
 
 
-def _tracker() -> Run:
+def _tracker():
     """Rectangles of the classes' colours, anywhere, also over the edge, in a few pictures one after the other."""
     from miro_host.eye import eye_file
     from miro_host.eye.calibration_kinds import exact
@@ -139,7 +137,7 @@ def _tracker() -> Run:
     plain = bytes((40, 128, 128)) * (_WIDTH * _HEIGHT)
     calibration = exact(CameraParameters())
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         pattern = list(PATTERNS)[draw.below(len(PATTERNS))]
         centroid = ("binary", "weighted")[draw.below(2)]
@@ -170,7 +168,7 @@ def _tracker() -> Run:
     return run
 
 
-def _colours_toml() -> bytes:
+def _colours_toml():
     from miro_host.eye.camera_parameters import CameraParameters
     from miro_sim.pitch.colour_samples import colours_of
     from miro_sim.pitch.picture_settings import PictureSettings
@@ -178,7 +176,7 @@ def _colours_toml() -> bytes:
     return colours_of(CameraParameters(), PictureSettings(), "diagonal", True).text().encode()
 
 
-def _calibration_seeds() -> list[bytes]:
+def _calibration_seeds():
     from miro_host.eye.calibration_kinds import exact, none
     from miro_host.eye.camera_parameters import CameraParameters
 
@@ -191,7 +189,7 @@ def _calibration_seeds() -> list[bytes]:
     ]
 
 
-def _points_seeds() -> list[bytes]:
+def _points_seeds():
     from miro_host.eye.camera_parameters import CameraParameters
     from mirotwin.camera import calibrate_command
 
@@ -200,13 +198,13 @@ def _points_seeds() -> list[bytes]:
     return ["\n".join(some).encode(), ("\n".join([lines[0], *lines[1:9]]) + "\n").encode()]
 
 
-def _samples_seeds() -> list[bytes]:
+def _samples_seeds():
     rgb = {"yellow": (231, 209, 40), "blue": (30, 40, 200), "magenta": (200, 30, 180), "floor": (34, 78, 52)}
     text = "colour,r,g,b\n" + "".join(f"{name},{r},{g},{b}\n" * 4 for name, (r, g, b) in rgb.items())
     return [text.encode(), b"colour,y,cb,cr\n" + b"cyan, 160,150,60\n" * 4 + b'"green",90,90,90\n' * 5]
 
 
-def _picture_seeds() -> list[bytes]:
+def _picture_seeds():
     from PIL import Image
 
     from mirotwin.camera.picture import png
@@ -218,13 +216,13 @@ def _picture_seeds() -> list[bytes]:
     return [png(image), png(image.convert("LA")), png(small), plain, bits]
 
 
-def _tracker_seeds() -> list[bytes]:
+def _tracker_seeds():
     """A robot that goes to the right, with either pattern; three robots; patches at the edge."""
 
-    def patch(kind: int, left: int, top: int, side: int = 8) -> bytes:
+    def patch(kind, left, top, side=8):
         return bytes([kind]) + left.to_bytes(2, "little") + bytes([top, side - 1, side - 1])
 
-    def robot(identity: int, left: int, top: int, first: int = 8, up: int = 9) -> bytes:
+    def robot(identity, left, top, first=8, up=9):
         return patch(first, left + up, top) + patch(identity, left, top + 9)
 
     going = b"".join(robot(1, 140 + 5 * at, 99, 0 if at else 8) for at in range(3))

@@ -1,12 +1,10 @@
 """Recordings: MCAP files as they are, and files whose records are drawn and whose lengths and sums are right."""
 
-from __future__ import annotations
-
 import struct
 from itertools import islice
 from zlib import crc32
 
-from tests.fuzz.target import Draws, Run, Target, folder, refused
+from tests.fuzz.target import Draws, Target, folder, refused
 from tests.mirotwin.mutated_files import without_sums
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -27,25 +25,25 @@ _SCENARIO = (
 _NAMES = (b"scenario.toml", b"firmware.ihx", b"symbols.json", b"resumed.world", b"other")
 
 
-def _text(data: bytes) -> bytes:
+def _text(data):
     return struct.pack("<I", len(data)) + data
 
 
-def _record(opcode: int, body: bytes) -> bytes:
+def _record(opcode, body):
     return struct.pack("<BQ", opcode, len(body)) + body
 
 
-def _attachment(name: bytes, data: bytes) -> bytes:
+def _attachment(name, data):
     body = struct.pack("<QQ", 0, 0) + _text(name) + _text(b"text/plain") + struct.pack("<Q", len(data)) + data
     return _record(_ATTACHMENT, body + struct.pack("<I", crc32(body)))
 
 
-def _metadata(name: bytes, values: dict[bytes, bytes]) -> bytes:
+def _metadata(name, values):
     pairs = b"".join(_text(key) + _text(value) for key, value in values.items())
     return _record(_METADATA, _text(name) + _text(pairs))
 
 
-def _built(data: bytes, begin: bytes) -> bytes:
+def _built(data, begin):
     """A file whose records `data` draws: whole, with right lengths and sums."""
     draw, out, chunk = Draws(data), [_MAGIC, _record(_HEADER, _text(b"") + _text(b""))], None
     if not draw.below(8):
@@ -90,7 +88,7 @@ def _built(data: bytes, begin: bytes) -> bytes:
     return end + _record(_FOOTER, bytes(20)) + _MAGIC
 
 
-def _begin() -> bytes:
+def _begin():
     """What a reader wants at the beginning of a recording."""
     from mirotwin.recording.recorder import (
         FIRMWARE_ATTACHMENT,
@@ -114,7 +112,7 @@ def _begin() -> bytes:
     )
 
 
-def _recording() -> Run:
+def _recording():
     from miro_exact.bad_input import BadInput
     from mirotwin.recording.capture.input import Input
     from mirotwin.recording.capture.recorded import transmissions, transmissions_of
@@ -125,7 +123,7 @@ def _recording() -> Run:
     begin = _begin()
     path = folder() / "fuzz.mcap"
 
-    def read(data: bytes) -> str:
+    def read(data):
         try:
             found = parse(data, "fuzz.mcap")
             outcome = f"{min(len(found.periods), 3)} periods"
@@ -133,7 +131,7 @@ def _recording() -> Run:
         except RecordingError as error:
             outcome = refused(error)
         path.write_bytes(data)
-        said: list[str] = []
+        said = []
         with Input(str(path)) as given:
             try:
                 count = sum(1 for _ in islice(transmissions(given, {}, said.append), 5_000))
@@ -143,7 +141,7 @@ def _recording() -> Run:
         assert all(line.isprintable() for line in said), said
         return outcome
 
-    def run(data: bytes) -> str:
+    def run(data):
         kind, rest = data[:1], data[1:]
         if kind == b"\0":
             return read(rest)
@@ -162,7 +160,7 @@ def _recording() -> Run:
     return run
 
 
-def _seeds() -> list[bytes]:
+def _seeds():
     """One message of each channel of a short run, in a file that is built of them, and pieces of the real one."""
     from io import BytesIO
 
@@ -179,8 +177,8 @@ def _seeds() -> list[bytes]:
     made = CliRunner().invoke(main, ["run", str(scenario), "--out", str(out), "--force", "-q", "--no-figure"])
     assert made.exit_code == 0, made.output
     data = (out / "run.mcap").read_bytes()
-    channels: dict[int, bytes] = {}
-    messages: dict[int, list[bytes]] = {}
+    channels = {}
+    messages = {}
     for _, record in records(BytesIO(data), "seed"):
         if isinstance(record, Channel):
             channels[record.id] = record.topic.encode()

@@ -1,14 +1,12 @@
 """What people write to say what runs: scenarios with steps and expectations, settings, cases, URLs."""
 
-from __future__ import annotations
-
-from tests.fuzz.target import Run, Target, folder, refused
+from tests.fuzz.target import Target, folder, refused
 from tests.fuzz.targets.captures import STREAM_WORDS, stream_seeds
 
 _ORIGIN = "fuzz.toml"
 
 
-def _scenario() -> Run:
+def _scenario():
     import tomli_w
 
     from miro_sim.scenario.errors import ScenarioError
@@ -17,7 +15,7 @@ def _scenario() -> Run:
     from mirotwin.verify.cases.case import tables_of
     from mirotwin.verify.steps.running import everything
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = parse(decode(data, _ORIGIN), _ORIGIN, (), everything)
         except ScenarioError as error:
@@ -34,13 +32,13 @@ def _scenario() -> Run:
     return run
 
 
-def _settings() -> Run:
+def _settings():
     from miro_sim.scenario.errors import ScenarioError
     from miro_sim.scenario.file import parse
     from mirotwin.verify.steps.running import everything
     from tests.mirotwin.conftest import SHORT
 
-    def run(data: bytes) -> str:
+    def run(data):
         settings = data.decode("utf-8", "surrogateescape").split("\n")
         try:
             found = parse(SHORT, _ORIGIN, settings[:8], everything)
@@ -52,7 +50,7 @@ def _settings() -> Run:
     return run
 
 
-def _world() -> Run:
+def _world():
     """A scenario that is accepted makes a world, which runs or says with which numbers nothing can be computed."""
     from miro_exact.bad_input import BadInput
     from miro_exact.domain import DomainError
@@ -64,7 +62,7 @@ def _world() -> Run:
 
     image = load_hex(image_path())
 
-    def run(data: bytes) -> str:
+    def run(data):
         try:
             found = parse(decode(data, _ORIGIN), _ORIGIN)
         except ScenarioError as error:
@@ -82,7 +80,7 @@ def _world() -> Run:
     return run
 
 
-def _case() -> Run:
+def _case():
     """Stream files as `replay` takes them, up to the world that is to run."""
     import contextlib
     import io
@@ -91,7 +89,7 @@ def _case() -> Run:
     from miro_exact.domain import DomainError
     from mirotwin.rerun.job import load_job
 
-    def run(data: bytes) -> str:
+    def run(data):
         path = folder() / "fuzz.stream"
         path.write_bytes(data)
         said = io.StringIO()
@@ -112,13 +110,13 @@ def _case() -> Run:
     return run
 
 
-def _url() -> Run:
+def _url():
     from urllib.parse import quote
 
     from miro_exact.bad_input import BadInput
     from mirotwin.ports.url import parse_url
 
-    def run(data: bytes) -> str:
+    def run(data):
         text = data.decode("utf-8", "replace")
         try:
             found = parse_url(text)
@@ -135,7 +133,7 @@ def _url() -> Run:
     return run
 
 
-def scenario_seeds() -> list[bytes]:
+def scenario_seeds():
     from tests.mirotwin.conftest import SHORT
     from tests.mirotwin.mutated_files import STEPS
 
@@ -176,7 +174,7 @@ wheel_radius_mismatch = 0.01
     ]
 
 
-def _world_seeds() -> list[bytes]:
+def _world_seeds():
     from miro_sim.scenario.file import builtin_names, builtin_text
 
     found = []
@@ -187,7 +185,7 @@ def _world_seeds() -> list[bytes]:
     return [*scenario_seeds(), *found]
 
 
-def _settings_seeds() -> list[bytes]:
+def _settings_seeds():
     return [
         b"network.radio.latency_s=0.002\nduration_s=2",
         b"network[0].robot[0].reference={kind='line'}\nnetwork.robot.slot=1\ncamera.kind=pixels",
@@ -195,14 +193,14 @@ def _settings_seeds() -> list[bytes]:
     ]
 
 
-def _url_seeds() -> list[bytes]:
+def _url_seeds():
     return [
         b"miro://fig6?seed=7&set=network.radio.latency_s%3D0.002&realtime=1",
         b"MIRO:///tmp/my.toml?limit_s=6e1&out=x",
     ]
 
 
-def _case_seeds() -> list[bytes]:
+def _case_seeds():
     case = b"""# mirotwin stream 2
 #: version = "0.1.0"
 #: seed = 7

@@ -4,19 +4,14 @@ An input names fields by number, each with the bytes that stand there instead. A
 the input says otherwise. The state must be refused with a ValueError and without a change, or run on.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
-from typing import Any
-
-from tests.fuzz.target import Draws, Run, Target, folder, refused
+from tests.fuzz.target import Draws, Target, folder, refused
 
 Span = tuple[int, int]
 _FRESH_AFTER = 64
 """Inputs that one world, board or machine loads: what was loaded before must not matter."""
 
 
-def spans_of(fields: Sequence[Any], state: bytes) -> list[Span]:
+def spans_of(fields, state):
     """Begin and end of each field in the bytes of a state."""
     found, at = [], 0
     for field in fields:
@@ -26,9 +21,9 @@ def spans_of(fields: Sequence[Any], state: bytes) -> list[Span]:
     return found
 
 
-def patched(state: bytes, spans: Sequence[Span], draw: Draws) -> bytes:
+def patched(state, spans, draw):
     """`state` with the fields that are drawn, until there are no more."""
-    others: dict[int, bytes] = {}
+    others = {}
     while draw.left:
         number, head = draw.below(len(spans)), draw.below(256)
         begin, end = spans[number]
@@ -41,12 +36,12 @@ def patched(state: bytes, spans: Sequence[Span], draw: Draws) -> bytes:
     return state
 
 
-def _loading(make: Callable[[], Any], states: Sequence[bytes], go_on: Callable[[Any], object]) -> Run:
+def _loading(make, states, go_on):
     """`make` gives something new to load into, `go_on` lets it run a little."""
     count, subject = 0, make()
     spans = [spans_of(subject.state.fields, state) for state in states]
 
-    def run(data: bytes) -> str:
+    def run(data):
         nonlocal count, subject
         count += 1
         if count % _FRESH_AFTER == 0:
@@ -70,19 +65,19 @@ def _loading(make: Callable[[], Any], states: Sequence[bytes], go_on: Callable[[
 class _World:
     """A world with its `Flat` state; what is put is sealed again."""
 
-    def __init__(self, profile: str) -> None:
+    def __init__(self, profile):
         from tests.sim.mutated_worlds import fresh
 
         self.world = fresh(profile)
         self.state = self.world.state
 
-    def put(self, state: bytes) -> None:
+    def put(self, state):
         from miro_sim.world.saved import sealed
 
         self.world.load(sealed(self.world.identity(), state))
 
 
-def _world(profile: str) -> Run:
+def _world(profile):
     from miro_exact.clock import CONTROL_PERIOD_TICKS
     from miro_sim.world.saved import opened
     from tests.sim.mutated_worlds import saved_worlds
@@ -90,13 +85,13 @@ def _world(profile: str) -> Run:
     identity = _World(profile).world.identity()
     states = [opened(saved, identity) for saved in saved_worlds(profile)]
 
-    def go_on(subject: _World) -> None:
+    def go_on(subject):
         subject.world.run_to(subject.world.tick + CONTROL_PERIOD_TICKS // 4)
 
     return _loading(lambda: _World(profile), states, go_on)
 
 
-def _sealed() -> Run:
+def _sealed():
     """The form around the state: magic, version, what a world belongs to, checksum."""
     import hashlib
 
@@ -106,7 +101,7 @@ def _sealed() -> Run:
     saved = saved_worlds()[1][:-32]
     before = world.state.save()
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         content = bytearray(saved)
         while draw.left:
@@ -129,17 +124,17 @@ def _sealed() -> Run:
 class _Flat:
     """Anything with a table of state."""
 
-    def __init__(self, root: Any) -> None:
+    def __init__(self, root):
         from miro_exact.state import Flat
 
         self.root = root
         self.state = Flat(root)
 
-    def put(self, state: bytes) -> None:
+    def put(self, state):
         self.state.load(state)
 
 
-def _board() -> Run:
+def _board():
     from miro_robot.board import Board
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
@@ -148,7 +143,7 @@ def _board() -> Run:
 
     image = load_hex(image_path())
 
-    def make() -> _Flat:
+    def make():
         board = Board(load_wiring(), Plant(), 1, 3)
         board.load(image)
         board.cpu.rxd.settled_tick = 1 << 40
@@ -160,14 +155,14 @@ def _board() -> Run:
         subject.root.run(tick)
         states.append(subject.state.save())
 
-    def go_on(subject: _Flat) -> None:
+    def go_on(subject):
         subject.root.cpu.rxd.settled_tick = 1 << 60
         subject.root.run(12 * subject.root.cpu.cycles + 24_000)
 
     return _loading(make, states, go_on)
 
 
-def _bare() -> Run:
+def _bare():
     from miro_robot.bare.input import InputPiece
     from miro_robot.bare.machine import BareMachine
     from miro_robot.bare.pins import PinEvent
@@ -178,7 +173,7 @@ def _bare() -> Run:
     path.write_bytes(hex_records(ECHO))
     image = load_hex(path)
 
-    def make() -> _Flat:
+    def make():
         pieces = (InputPiece(b"abc"), InputPiece(b"de", b"c", 5))
         return _Flat(
             BareMachine(image, False, pieces, 9600, pins=(PinEvent(5000, 1, 2, 0), PinEvent(90_000, 1, 2, 1)))
@@ -190,13 +185,13 @@ def _bare() -> Run:
         subject.root.run(max_cycles=cycles)
         states.append(subject.state.save())
 
-    def go_on(subject: _Flat) -> None:
+    def go_on(subject):
         subject.root.run(max_cycles=subject.root.cpu.cycles + 2_000)
 
     return _loading(make, states, go_on)
 
 
-def _seeds() -> list[bytes]:
+def _seeds():
     return [
         b"\x00",
         b"\x01\x05\x00\x04\x01\x00\x00\x00",
@@ -205,7 +200,7 @@ def _seeds() -> list[bytes]:
     ]
 
 
-def _sealed_seeds() -> list[bytes]:
+def _sealed_seeds():
     return [
         b"\x01\x00\x00\x01M",
         b"\x01\x08\x01\x04\x010.2.",

@@ -1,21 +1,17 @@
 """The wire: the window decoder by each way of feeding it, frames, the PC's receiver of telemetry."""
 
-from __future__ import annotations
-
 import importlib.util
 from array import array
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from tests.fuzz.target import Draws, Run, Target, pieces, refused
+from tests.fuzz.target import Draws, Target, pieces, refused
 
 _LIMITS = (1, 7, 64, 4096)
 _SPACINGS = (0, 0, 0, 480, 1200, 1920, -480, -1200, -1920, 100_000, -100_000, 1 << 40)
 """Ticks that a character comes late."""
 
 
-def _uncompiled() -> Any:
+def _uncompiled():
     """The scanner's source as a module of its own: the twin, whichever engine runs."""
     from miro_protocol import decoder
 
@@ -28,7 +24,7 @@ def _uncompiled() -> Any:
     return module.Scanner
 
 
-def _feed() -> Run:
+def _feed():
     from miro_exact.state import snapshot
     from miro_protocol.frames import seal
     from miro_protocol.scan import Scanner
@@ -36,12 +32,12 @@ def _feed() -> Run:
 
     forms = (downlink(3), downlink(5), TELEMETRY)
 
-    def same(scanners: Sequence[Scanner], events: Sequence[list[Any]]) -> None:
+    def same(scanners, events):
         assert events[0] == events[1] == events[2], "cut elsewhere, the events differ"
         first, second, third = map(snapshot, scanners)
         assert first == second == third, "cut elsewhere, the states differ"
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         form, limit, cut = forms[draw.below(3)], _LIMITS[draw.below(4)], 1 + draw.below(40)
         scanners = [Scanner(form, limit) for _ in range(3)]
@@ -90,7 +86,7 @@ def _feed() -> Run:
     return run
 
 
-def _columns() -> Run:
+def _columns():
     from miro_exact.state import snapshot
     from miro_protocol.frames import seal
     from miro_protocol.scan import Scanner
@@ -99,7 +95,7 @@ def _columns() -> Run:
     forms = (downlink(3), downlink(5), TELEMETRY)
     Twin = _uncompiled()
 
-    def rows(draw: Draws, form: Any) -> list[tuple[int, bool, int]]:
+    def rows(draw, form):
         found, tick = [], 0
         while draw.left:
             flaw = draw.below(256)
@@ -114,7 +110,7 @@ def _columns() -> Run:
             tick += _SPACINGS[flaw % len(_SPACINGS)] if flaw < 0xD0 else 0
         return found
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         form, limit, cut = forms[draw.below(3)], _LIMITS[draw.below(4)], 1 + draw.below(40)
         symbols = rows(draw, form)
@@ -154,12 +150,12 @@ def _columns() -> Run:
     return run
 
 
-def _frames() -> Run:
+def _frames():
     from miro_protocol.decoder import WindowDecoder
     from miro_protocol.frames import ContentError, describe, encode, format_of, seal
     from miro_protocol.table import TELEMETRY, downlink
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         n = (3, 5)[draw.below(2)]
         form = (downlink(n), TELEMETRY)[draw.below(2)]
@@ -169,7 +165,7 @@ def _frames() -> Run:
         assert event.body == body
         assert event.data == wire
         try:
-            message = event.message(n)  # type: ignore[union-attr]
+            message = event.message(n)
         except ContentError as error:
             return refused(error)
         assert describe(message).isprintable()
@@ -180,13 +176,13 @@ def _frames() -> Run:
     return run
 
 
-def _telemetry() -> Run:
+def _telemetry():
     from miro_exact.state import snapshot
     from miro_host.telemetry_receiver import TelemetryReceiver
     from miro_protocol.frames import seal
     from miro_protocol.table import TELEMETRY
 
-    def run(data: bytes) -> str:
+    def run(data):
         draw = Draws(data)
         robots, cut = (3, 5)[draw.below(2)], 1 + draw.below(64)
         symbols, tick = [], 0
@@ -209,7 +205,7 @@ def _telemetry() -> Run:
     return run
 
 
-def _frame_seeds() -> list[bytes]:
+def _frame_seeds():
     from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
     from miro_protocol.whitening import whiten
 
@@ -229,7 +225,7 @@ def _frame_seeds() -> list[bytes]:
     return found
 
 
-def _feed_seeds() -> list[bytes]:
+def _feed_seeds():
     bodies = [seed[2:] for seed in _frame_seeds()]
     program = [b"\x00\x03\x05"]
     for body in bodies[:1] + bodies[2:3] * 2:
@@ -246,7 +242,7 @@ def _feed_seeds() -> list[bytes]:
     ]
 
 
-def _column_seeds() -> list[bytes]:
+def _column_seeds():
     bodies = [seed[2:] for seed in _frame_seeds()]
     return [
         b"\x00\x03\x05\xfe" + bodies[0] + b"\x00U\x00U\xd1\xff\x02-\x03\xd4\xfe" + bodies[2],
@@ -255,7 +251,7 @@ def _column_seeds() -> list[bytes]:
     ]
 
 
-def _telemetry_seeds() -> list[bytes]:
+def _telemetry_seeds():
     body = _frame_seeds()[5][2:]
     return [
         b"\x00\x05" + b"".join(bytes([kind]) + body + b"\x10\x20" for kind in (0, 3, 1)),

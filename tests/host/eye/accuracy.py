@@ -4,8 +4,6 @@ Prints, for each pattern, kind of centroid and floor, position and heading error
 pitch, all ten pairs of team and identity in turn, with noise: rms, 99.9 %, largest.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
@@ -18,7 +16,7 @@ from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sample
 FLOORS = {"green": (15, 60, 35), "grey": (40, 40, 40)}
 
 
-def measured(count: int, pattern: str, centroid: str) -> tuple[np.ndarray, int]:
+def measured(count, pattern, centroid):
     """Errors in cm and degrees of the robots that were found, and the number of the lost."""
     colours = classes_of(sampled())
     found, lost = [], 0
@@ -35,7 +33,7 @@ def measured(count: int, pattern: str, centroid: str) -> tuple[np.ndarray, int]:
     return np.array(found), lost
 
 
-def main() -> None:
+def main():
     for floor, paint in FLOORS.items():
         PAINTS["floor"] = paint
         for pattern in ("diagonal", "strip"):

@@ -3,12 +3,9 @@
 `python -m tests.host.eye.scenes python` prints what a tracker makes of twelve pictures, and its state, in that engine.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import sys
-from typing import Any
 
 from miro_exact import engine
 
@@ -21,7 +18,6 @@ from miro_exact.state import snapshot
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.colours import classes_of
-from miro_host.eye.track import Sighting
 from miro_host.eye.tracker import Tracker
 from miro_host.posture import Posture
 from tests.naive.painted_frame import PaintedFrame, PaintedRobot, sampled
@@ -31,25 +27,25 @@ CAMERA = CameraParameters()
 CLASSES = classes_of(sampled())
 
 
-def tracker(team: str = "yellow", robots: tuple[int, ...] = (0,), **changes: Any) -> Tracker:
+def tracker(team="yellow", robots=(0,), **changes):
     given = {"pattern": "diagonal", "calibration": Calibration(camera=CAMERA), "colours": CLASSES, **changes}
     return Tracker(team, robots, **given)
 
 
-def drawn(index: int, name: str = "postures") -> Posture:
+def drawn(index, name="postures"):
     """A posture anywhere on the pitch."""
     stream = Stream(1997, name)
     x, y, turn = (stream.uniform(3 * index + part) for part in range(3))
     return Posture(1.2 * x - 0.05, 0.8 * y - 0.05, wrap_pi(6.28 * turn))
 
 
-def errors(sighting: Sighting, true: Posture) -> tuple[float, float]:
+def errors(sighting, true):
     """Of position in cm and of heading in degrees."""
     off_m = math.hypot(sighting.x_m - true.x_m, sighting.y_m - true.y_m)
     return 100.0 * off_m, math.degrees(abs(wrap_pi(sighting.theta_rad - true.theta_rad)))
 
 
-def beside(posture: Posture, ahead_m: float, left_m: float, turn_rad: float = 0.0) -> Posture:
+def beside(posture, ahead_m, left_m, turn_rad=0.0):
     """A posture given in the axes of another."""
     sin, cos = sincos(posture.theta_rad)
     return Posture(
@@ -59,7 +55,7 @@ def beside(posture: Posture, ahead_m: float, left_m: float, turn_rad: float = 0.
     )
 
 
-def session() -> str:
+def session():
     """Engine, SHA-256 of what two trackers make of twelve pictures with six robots."""
     found = hashlib.sha256()
     trackers = [tracker("yellow", (0, 1, 2)), tracker("blue", (0, 1, 2), centroid="binary")]

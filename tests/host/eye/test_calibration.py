@@ -39,7 +39,7 @@ OTHER = CameraParameters(
 )
 
 
-def seen(camera: CameraParameters, *heights_m: float, step: int = 26) -> list[ControlPoint]:
+def seen(camera, *heights_m, step=26):
     lens = Lens(camera)
     places = [
         (x / 100, y / 100, z) for z in heights_m for x in range(-10, 121, step) for y in range(-10, 81, 18)

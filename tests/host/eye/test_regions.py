@@ -26,7 +26,7 @@ HOT, SOURCE = Regions(TABLE), uncompiled()(TABLE)
 KINDS = {".": 0, "a": 1, "b": 2, "c": 3}
 
 
-def window(*rows: str) -> tuple[bytearray, int, int]:
+def window(*rows):
     pixels = bytearray()
     for row in rows:
         for letter in row:

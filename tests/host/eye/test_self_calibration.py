@@ -1,7 +1,5 @@
 """The camera's parameters from lines and walls: marks in a rendered picture, and what a tracker learns from them."""
 
-from __future__ import annotations
-
 import math
 
 import msgspec

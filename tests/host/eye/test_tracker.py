@@ -20,11 +20,11 @@ from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sample
 MIDDLE = Posture(0.5, 0.35, 0.4)
 
 
-def picture(*robots: PaintedRobot, noise: int | None = 7) -> PaintedFrame:
+def picture(*robots, noise=7):
     return PaintedFrame(robots, noise=noise)
 
 
-def sight(one, true: Posture, slot: int = 0, tick: int = 0) -> None:
+def sight(one, true, slot=0, tick=0):
     """Gives a tracker a sighting."""
     track = one.tracks[slot]
     track.seen, track.tick = 1, tick

@@ -113,7 +113,7 @@ def remark_1():
         yield f"largest u1 in 0.5 s from alpha = {alpha:g}", text
 
 
-def main() -> None:
+def main():
     arguments = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     arguments.add_argument("--starts", type=int, default=100, help="how many random starts each law gets")
     count = arguments.parse_args().starts

@@ -7,7 +7,7 @@ Vector = list[float]
 Matrix = list[Vector]
 
 
-def diagonal(values: Vector) -> Matrix:
+def diagonal(values):
     """A square matrix with these values on its diagonal."""
     made = [[0.0] * len(values) for _ in values]
     for index, value in enumerate(values):
@@ -15,12 +15,12 @@ def diagonal(values: Vector) -> Matrix:
     return made
 
 
-def transposed(a: Matrix) -> Matrix:
+def transposed(a):
     """a^T."""
     return [list(column) for column in zip(*a, strict=True)]
 
 
-def dot(a: Vector, b: Vector) -> float:
+def dot(a, b):
     """a . b, added from left to right."""
     total = 0.0
     for x, y in zip(a, b, strict=True):
@@ -28,23 +28,23 @@ def dot(a: Vector, b: Vector) -> float:
     return total
 
 
-def times(a: Matrix, x: Vector) -> Vector:
+def times(a, x):
     """a x."""
     return [dot(row, x) for row in a]
 
 
-def product(a: Matrix, b: Matrix) -> Matrix:
+def product(a, b):
     """a b."""
     columns = transposed(b)
     return [[dot(row, column) for column in columns] for row in a]
 
 
-def added(a: Vector, b: Vector) -> Vector:
+def added(a, b):
     """a + b."""
     return [x + y for x, y in zip(a, b, strict=True)]
 
 
-def solution(a: Matrix, right: Matrix) -> Matrix:
+def solution(a, right):
     """The x of a x = right by elimination, each column's largest entry first. ValueError for a singular a."""
     size = len(a)
     rows = [list(row) + list(more) for row, more in zip(a, right, strict=True)]
@@ -64,6 +64,6 @@ def solution(a: Matrix, right: Matrix) -> Matrix:
     return [[x / row[at] for x in row[size:]] for at, row in enumerate(rows)]
 
 
-def solved(a: Matrix, right: Vector) -> Vector:
+def solved(a, right):
     """The x of a x = right for one column. ValueError for a singular a."""
     return [row[0] for row in solution(a, [[value] for value in right])]

@@ -45,12 +45,12 @@ class Reduced(msgspec.Struct, frozen=True):
     g: Vector
 
 
-def constrained(system: System) -> Matrix:
+def constrained(system):
     """A S, which equation (2) wants to be 0."""
     return product(system.constraints, system.directions)
 
 
-def reduced(system: System, z: Vector) -> Reduced:
+def reduced(system, z):
     """H and G of equation (7) at the velocities z. ValueError where S^T E is singular: an input is missing."""
     across = transposed(system.directions)
     through = product(across, system.inputs)  # S^T E
@@ -59,12 +59,12 @@ def reduced(system: System, z: Vector) -> Reduced:
     return Reduced(h, solved(through, times(across, drift)))
 
 
-def acceleration(system: System, z: Vector, z_dot: Vector) -> Vector:
+def acceleration(system, z, z_dot):
     """q'' of equation (5)."""
     return added(times(system.directions, z_dot), times(system.directions_rate, z))
 
 
-def constraint_forces(system: System, z: Vector, z_dot: Vector, torque: Vector) -> Vector:
+def constraint_forces(system, z, z_dot, torque):
     """lambda of equation (3): what the constraints do to keep (1), from A A^T lambda = A (E tau - M q'' - V)."""
     q_accel = acceleration(system, z, z_dot)
     inertial = added(times(system.inertia, q_accel), system.force)
@@ -73,7 +73,7 @@ def constraint_forces(system: System, z: Vector, z_dot: Vector, torque: Vector) 
     return solved(square, times(system.constraints, rest))
 
 
-def residual(system: System, z: Vector, z_dot: Vector, torque: Vector) -> Vector:
+def residual(system, z, z_dot, torque):
     """M q'' + V - E tau + A^T lambda: what is left of equation (3), 0 for a motion that the reduction allows."""
     forces = times(transposed(system.constraints), constraint_forces(system, z, z_dot, torque))
     inertial = added(times(system.inertia, acceleration(system, z, z_dot)), system.force)
@@ -81,12 +81,12 @@ def residual(system: System, z: Vector, z_dot: Vector, torque: Vector) -> Vector
     return [one - other + force for one, other, force in zip(inertial, driven, forces, strict=True)]
 
 
-def energy(system: System, z: Vector) -> float:
+def energy(system, z):
     """The kinetic energy q'^T M q' / 2 in J."""
     q_dot = times(system.directions, z)
     return 0.5 * dot(q_dot, times(system.inertia, q_dot))
 
 
-def power(system: System, z: Vector, torque: Vector) -> float:
+def power(system, z, torque):
     """q'^T E tau in W: constraint forces do no work, so this is the rate of the energy."""
     return dot(times(system.directions, z), times(system.inputs, torque))

@@ -6,18 +6,18 @@ The law is asked in every stage of a step. Where a sign function switches, the m
 held within what the law does in one step.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Literal, Protocol
 
 import msgspec
 
 from miro_exact.dmath import atan2, sincos
-from miro_host.integrator import Limits, clamp
+from miro_host.integrator import clamp
 from miro_host.posture import Posture
 from miro_host.theory import radius
 from tests.host.theory import computed_torque
 from tests.host.theory.matrices import Vector, solution, times
-from tests.host.theory.unicycle import UnicycleBody, cartesian_rates, inertia, polar_rates
+from tests.host.theory.unicycle import cartesian_rates, inertia, polar_rates
 
 Chart = Literal["cartesian", "polar"]
 Torques = Callable[[float], Vector]
@@ -26,7 +26,7 @@ Torques = Callable[[float], Vector]
 class Demand(Protocol):
     """A law: z_r' + u in m/s2 and rad/s2 for a robot at a posture with velocities v, w, t seconds after the start."""
 
-    def __call__(self, t_s: float, posture: Posture, v: float, w: float, /) -> tuple[float, float]: ...
+    def __call__(self, t_s, posture, v, w, /): ...
 
 
 class SimulatedStep(msgspec.Struct, frozen=True):
@@ -40,7 +40,7 @@ class SimulatedStep(msgspec.Struct, frozen=True):
     torque_nm: Vector
 
 
-def no_disturbance(t_s: float) -> Vector:
+def no_disturbance(t_s):
     return [0.0, 0.0]
 
 
@@ -51,15 +51,8 @@ class BodySimulation:
     """
 
     def __init__(
-        self,
-        body: UnicycleBody,
-        demand: Demand,
-        *,
-        disturbance: Torques = no_disturbance,
-        model: UnicycleBody | None = None,
-        limits: Limits | None = None,
-        chart: Chart = "cartesian",
-    ) -> None:
+        self, body, demand, *, disturbance=no_disturbance, model=None, limits=None, chart="cartesian"
+    ):
         self.demand = demand
         self.disturbance = disturbance
         self.limits = limits
@@ -68,9 +61,7 @@ class BodySimulation:
         self._inverse = solution(inertia(body), [[1.0, 0.0], [0.0, 1.0]])
         self._rates = polar_rates if chart == "polar" else cartesian_rates
 
-    def run(
-        self, start: Posture, z: tuple[float, float], start_s: float, end_s: float, step_s: float
-    ) -> Iterator[SimulatedStep]:
+    def run(self, start, z, start_s, end_s, step_s):
         """Rows from `start_s` to `end_s`, both included. Raises ValueError unless that is a whole number of steps."""
         count = round((end_s - start_s) / step_s)
         if count < 0 or abs(count * step_s - (end_s - start_s)) > 1e-6 * step_s:
@@ -83,7 +74,7 @@ class BodySimulation:
             yield SimulatedStep(t, posture, state[3], state[4], demanded, torque)
             state = self._stepped(t, state, step_s)
 
-    def _stepped(self, t: float, state: Vector, step: float) -> Vector:
+    def _stepped(self, t, state, step):
         half = 0.5 * step
         k1 = self._derivative(t, state)
         k2 = self._derivative(t + half, _moved(state, half, k1))
@@ -95,7 +86,7 @@ class BodySimulation:
             for x, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
         ]
 
-    def _derivative(self, t: float, state: Vector) -> Vector:
+    def _derivative(self, t, state):
         q, v, w = state[:3], state[3], state[4]
         _, applied = self._drive(t, self._posture(state), v, w)
         against = self.disturbance(t)
@@ -104,7 +95,7 @@ class BodySimulation:
         )  # (10), G = 0
         return [*self._rates(q, [v, w]), *z_dot]
 
-    def _drive(self, t: float, posture: Posture, v: float, w: float) -> tuple[tuple[float, float], Vector]:
+    def _drive(self, t, posture, v, w):
         """What is demanded, and the torques of equation (14)."""
         v_dot, w_dot = self.demand(t, posture, v, w)
         limits = self.limits
@@ -113,22 +104,22 @@ class BodySimulation:
             w_dot = _limited(w, clamp(w_dot, limits.max_w_dot_rad_s2), limits.max_w_rad_s)
         return (v_dot, w_dot), computed_torque.torque(self._model, [0.0, 0.0], [v_dot, w_dot])
 
-    def _coordinates(self, posture: Posture) -> Vector:
+    def _coordinates(self, posture):
         if self.chart == "cartesian":
             return [posture.x_m, posture.y_m, posture.theta_rad]
         return [radius(posture), atan2(posture.y_m, posture.x_m), posture.theta_rad]
 
-    def _posture(self, state: Vector) -> Posture:
+    def _posture(self, state):
         if self.chart == "cartesian":
             return Posture(state[0], state[1], state[2])
         sin, cos = sincos(state[1])
         return Posture(state[0] * cos, state[0] * sin, state[2])
 
 
-def _moved(state: Vector, time: float, rates: Vector) -> Vector:
+def _moved(state, time, rates):
     return [x + time * rate for x, rate in zip(state, rates, strict=True)]
 
 
-def _limited(speed: float, rate: float, most: float) -> float:
+def _limited(speed, rate, most):
     """The rate, or 0 where it would raise a speed that is at its limit."""
     return 0.0 if abs(speed) >= most and speed * rate > 0.0 else rate

@@ -8,7 +8,7 @@ and V follow from the kinetic energy m (rho'^2 + rho^2 phi'^2) / 2 + J theta'^2 
 import msgspec
 
 from miro_exact.dmath import sincos
-from tests.host.theory.matrices import Matrix, Vector, diagonal
+from tests.host.theory.matrices import diagonal
 from tests.host.theory.mechanics import System
 
 
@@ -20,32 +20,32 @@ class UnicycleBody(msgspec.Struct, frozen=True, kw_only=True):
     wheel_radius_m: float
     track_m: float
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         for name in self.__struct_fields__:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
 
 
-def inertia(body: UnicycleBody) -> Matrix:
+def inertia(body):
     """H of equation (7), written out: wheel torques for v' = 1 m/s2 (first column) and w' = 1 rad/s2 (second)."""
     forward = 0.5 * body.wheel_radius_m * body.mass_kg
     turn = body.wheel_radius_m * body.yaw_inertia_kg_m2 / body.track_m
     return [[forward, -turn], [forward, turn]]
 
 
-def cartesian_rates(q: Vector, z: Vector) -> Vector:
+def cartesian_rates(q, z):
     """q' of equation (8); q = (x, y, theta), z = (v, w)."""
     sin, cos = sincos(q[2])
     return [z[0] * cos, z[0] * sin, z[1]]
 
 
-def polar_rates(q: Vector, z: Vector) -> Vector:
+def polar_rates(q, z):
     """q' of equation (9); q = (rho, phi, theta), z = (v, w). ZeroDivisionError in the origin."""
     sin, cos = sincos(q[1] - q[2])
     return [z[0] * cos, -(z[0] / q[0]) * sin, z[1]]
 
 
-def cartesian(body: UnicycleBody, q: Vector, z: Vector) -> System:
+def cartesian(body, q, z):
     """The robot at q = (x, y, theta) in m and rad with z = (v, w)."""
     sin, cos = sincos(q[2])
     w, r, arm = z[1], body.wheel_radius_m, 0.5 * body.track_m
@@ -59,7 +59,7 @@ def cartesian(body: UnicycleBody, q: Vector, z: Vector) -> System:
     )
 
 
-def polar(body: UnicycleBody, q: Vector, z: Vector) -> System:
+def polar(body, q, z):
     """The same at q = (rho, phi, theta), rho > 0. The constraint is that of (8) in these coordinates."""
     rho, r, arm, mass = q[0], body.wheel_radius_m, 0.5 * body.track_m, body.mass_kg
     sin, cos = sincos(q[1] - q[2])

@@ -1,7 +1,5 @@
 """`mirotwin camera calibrate`: a camera from control points, and what is said of points that tell none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -17,11 +15,11 @@ LENS = ("camera.kind=pixels", "camera.lens.tilt_x_rad=0.01", "camera.lens.turn_r
 TRUE = CameraParameters(tilt_x_rad=0.01, turn_rad=3.14)
 
 
-def settings(*pairs: str) -> list[str]:
+def settings(*pairs):
     return [word for pair in pairs for word in ("--set", pair)]
 
 
-def names(folder: Path) -> list[str]:
+def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
@@ -117,7 +115,7 @@ def test_what_the_points_cannot_tell_is_taken_from_the_start(mirotwin, short, tm
 GRID = [(x, y, 0, 16 + 2.28 * (x + 10), 219 - 2.24 * (y + 10)) for x in (-10, 50, 110) for y in (-10, 35, 80)]
 
 
-def csv(rows: list[tuple[float, ...]]) -> str:
+def csv(rows):
     return HEADER + "".join(",".join(map(str, row)) + "\n" for row in rows)
 
 

@@ -1,7 +1,5 @@
 """`mirotwin camera look`: the picture of a frame, with and without what the tracker made of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -13,13 +11,13 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.camera.picture import Picture, taken
-from mirotwin.camera.view import View, views_of
+from mirotwin.camera.view import views_of
 from tests.mirotwin.conftest import hex_file
 
 GAUSSIAN = ("--set", "camera.kind=gaussian")
 
 
-def world_of(path: object) -> World:
+def world_of(path):
     return World(load(str(path)).scenario, 0, load_hex(image_path()))
 
 
@@ -54,7 +52,7 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
 @pytest.mark.parametrize("plain", [True, False])
 def test_looking_changes_no_bit_of_a_run(short, plain):
     seen, unseen = world_of(short), world_of(short)
-    pictures: list[bytes] = []
+    pictures = []
     views_of(seen, "short")[0].shows.append(lambda view: pictures.append(view.png(plain)))
     while not unseen.finished:
         seen.step()
@@ -69,7 +67,7 @@ def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short):
     seen, unseen = (World(scenario, 0, load_hex(image_path())) for _ in range(2))
     captions, pictures = [], []
 
-    def keep(view: View) -> None:
+    def keep(view):
         captions.append("not received" in view.caption())
         pictures.append(view.picture().data)
         view.png(plain=False)

@@ -1,7 +1,5 @@
 """`mirotwin fw disasm|trace|profile|coverage`: looking into an image, a scenario, a recording, a stream."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys
@@ -15,7 +13,7 @@ from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
 from mirotwin.rerun.inspected_run import RobotRun, watch
 from tests import children
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build_modules
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -70,7 +68,7 @@ def test_a_window_shows_what_the_whole_trace_shows_there(mirotwin, short):
 
 @pytest.mark.slow
 def test_both_engines_trace_and_profile_alike(short):
-    def shown(*arguments: str) -> str:
+    def shown(*arguments):
         command = [MIROTWIN, "fw", arguments[0], short, "--to", "12ms", *arguments[1:]]
         return children.run(command, check=True, capture_output=True, text=True).stdout
 
@@ -114,7 +112,7 @@ def test_coverage_of_several_runs_adds_up_in_one_file(mirotwin, short, tmp_path)
     assert len(_hits(first)) < len(_hits(whole.read_text()))
 
 
-def _hits(info: str) -> list[str]:
+def _hits(info):
     """The lines that ran. (How often is the largest count of a line's instructions, which does not add up.)"""
     return [
         line.partition(",")[0] for line in info.splitlines() if line.startswith("DA:") and line[-2:] != ",0"
@@ -149,7 +147,7 @@ def test_looking_changes_no_bit_of_the_world(short):
     from miro_robot.inspect.activity import Activity
     from miro_robot.inspect.counters import Counters
 
-    def world() -> World:
+    def world():
         return World(scenario_file.load(str(short)).scenario, 3, load_hex(image_path()))
 
     plain, watched = world(), world()
@@ -183,7 +181,7 @@ def test_what_cannot_be_looked_at_is_one_line(mirotwin, arguments, said):
         assert err.count("\n") == 1
 
 
-def one_line(result: Result) -> str:
+def one_line(result):
     code, out, err = result
     assert (code, out, err.count("\n")) == (2, "", 1)
     return err.removeprefix("mirotwin: error: ").rstrip("\n")

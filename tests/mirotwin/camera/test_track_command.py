@@ -1,13 +1,8 @@
 """`mirotwin camera track`: the tracker on pictures from files and recordings, and what is said of others."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -42,11 +37,11 @@ def seen(mirotwin, short, tmp_path_factory):
     return folder
 
 
-def files(seen: Path) -> tuple[object, ...]:
+def files(seen):
     return "--calibration", seen / "camera.toml", "--colours", seen / "colours.toml"
 
 
-def measured(seen: Path) -> dict[tuple[int, int], tuple[float, float, float]]:
+def measured(seen):
     found = {}
     for frame, period in enumerate(recording_reader.read(seen / "run" / "run.mcap").periods):
         for robot in period.robots:
@@ -103,7 +98,7 @@ def test_ppm_files_say_the_same_and_other_files_are_passed_over(mirotwin, seen, 
     given = (*files(seen), "--numbers", "0,2", "--json", "--centroid", "weighted")
     one = mirotwin("camera", "track", seen / "frames", *given)[1].splitlines()
     other = mirotwin("camera", "track", tmp_path, *given)[1].splitlines()
-    without: Callable[[str], dict[str, Any]] = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
+    without = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
     assert [without(line) for line in one] == [without(line) for line in other] != []
 
 
@@ -186,13 +181,13 @@ def test_a_damaged_picture_is_named(mirotwin, seen, tmp_path):
         assert err.startswith(f"mirotwin: error: {file}: is ")
 
 
-def without_colour(name: str) -> str:
+def without_colour(name):
     classes = colours_of(CameraParameters(), PictureSettings(), "diagonal")
     text = classes.text()
     return text.replace(f"[colours.{name}]", f"[colours.{name}_paint]")
 
 
-def same_colour(text: str) -> str:
+def same_colour(text):
     """The class of magenta, once more as violet."""
     _, _, rest = text.partition("[colours.magenta]\n")
     means = rest.partition("\n\n")[0]

@@ -1,7 +1,6 @@
 """Campaigns that the tests run: short ones."""
 
 from concurrent.futures import Executor, Future
-from pathlib import Path
 
 from mirotwin import campaign
 
@@ -19,7 +18,7 @@ def plan_of(text=SHORT, path="short.toml"):
     return campaign.parse(text, path)
 
 
-def rows(path: Path):
+def rows(path):
     """The rows of results, as dictionaries."""
     return campaign.read(path)[0].to_pylist()
 

@@ -30,7 +30,7 @@ def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin):
         assert mirotwin("fw", "run", image_path(), "--until", name, "--max-cycles", 100_000) == (0, "", "")
 
 
-def with_a_map_of_the_robot(tmp_path: Path, suffix: str = ".map", code: bytes = LOOP) -> tuple[Path, Path]:
+def with_a_map_of_the_robot(tmp_path, suffix=".map", code=LOOP):
     """An image of `code`, and the symbol file beside it that belongs to another one."""
     image = hex_file(tmp_path / "a.ihx", code)
     beside = image.with_suffix(suffix)
@@ -161,7 +161,7 @@ def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_
 def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path):
     """A limit on the length of files stands in for the disk."""
 
-    def limit() -> None:
+    def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 
     image, dump = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "dump.json"
@@ -250,7 +250,7 @@ def test_info_names_versions_engine_and_firmware(mirotwin):
 
 
 def test_every_command_and_option_explains_itself():
-    def walk(command: click.Command) -> None:
+    def walk(command):
         assert command.help
         for parameter in command.params:
             if isinstance(parameter, click.Option):

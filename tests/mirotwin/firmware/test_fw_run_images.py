@@ -1,7 +1,5 @@
 """`mirotwin fw run` of programs that do not begin at 0, of several images, and of input that was not all sent."""
 
-from pathlib import Path
-
 import pytest
 
 SENDS = bytes.fromhex("759850 758bff 758920 d28e 7599")
@@ -9,7 +7,7 @@ SENDS = bytes.fromhex("759850 758bff 758920 d28e 7599")
 ENDS = bytes.fromhex("80fe")
 
 
-def placed(path: Path, code: bytes, at: int = 0) -> Path:
+def placed(path, code, at=0):
     """An image with this code at an address."""
     record = bytes([len(code), at >> 8, at & 0xFF, 0]) + code
     path.write_text(f":{record.hex()}{-sum(record) & 0xFF:02x}\n:00000001ff\n".upper())

@@ -1,7 +1,5 @@
 """`mirotwin fw vcd`: files, windows, what is refused, and that sigrok reads out of them what was on the wires."""
 
-from __future__ import annotations
-
 import io
 import os
 import re
@@ -26,7 +24,7 @@ from miro_robot.inspect.waveform import Waveform
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
 from tests import children
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.reading import read
 from tests.robot.mcs51.asm import assemble
 
@@ -69,7 +67,7 @@ def quiet(tmp_path_factory):
     return path
 
 
-def characters(vcd: Path, wire: str, baud: int = 9600) -> list[tuple[int, int]]:
+def characters(vcd, wire, baud=9600):
     """What sigrok makes of a UART wire at 1 us: (us at which the data bits begin, byte)."""
     if shutil.which("sigrok-cli") is None:
         if "CI" not in os.environ:
@@ -148,7 +146,7 @@ def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path)
 
 
 def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(short, tmp_path):
-    def written(name: str, *options: str) -> bytes:
+    def written(name, *options):
         out = tmp_path / f"{name}.vcd"
         command = [MIROTWIN, "fw", "vcd", short, "--slot", "0", "--out", out, *options]
         children.run(command, check=True, capture_output=True)
@@ -181,7 +179,7 @@ def test_a_faulty_firmware_leaves_its_waveform_up_to_the_fault(mirotwin, tmp_pat
     assert read((tmp_path / "bad.vcd").read_bytes()).wires["p1_0"] == [(0, 1), (12, 0), (24, 1)]
 
 
-def refused(result: Result, message: str) -> None:
+def refused(result, message):
     code, out, err = result
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
@@ -191,7 +189,7 @@ def refused(result: Result, message: str) -> None:
 def test_what_cannot_be_written_is_refused_and_nothing_is_left(mirotwin, short, tmp_path):
     out = tmp_path / "x.vcd"
 
-    def vcd(*arguments: object) -> Result:
+    def vcd(*arguments):
         return mirotwin("fw", "vcd", *arguments)
 
     refused(vcd(short, "--from", "5ms", "--to", "5ms", "--out", out), "the window is empty")
@@ -250,7 +248,7 @@ def test_the_encoder_wires_count_what_the_chip_counts(tmp_path):
 
 
 def test_a_watched_world_has_the_digest_of_an_unwatched_one(mirotwin, short):
-    def digest(watched: bool, pieces: int) -> str:
+    def digest(watched, pieces):
         world = World(scenario_file.load(str(short)).scenario, 5, load_hex(image_path()))
         waveforms = []
         for robot in world.networks[0].robots if watched else []:

@@ -3,8 +3,6 @@
 The monitor measures the bit rate of the first character before it switches its receiver on (tests/robot/monitor).
 """
 
-from __future__ import annotations
-
 import os
 import pty
 import select
@@ -13,14 +11,13 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from tests import children
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -53,7 +50,7 @@ def monitor(tmp_path_factory):
     return build(folder, MONITOR.read_text())
 
 
-def talk(image: Path, *options: object) -> Result:
+def talk(image, *options):
     """A dialogue by script; stdout as the program sent it."""
     command = [MIROTWIN, "fw", "run", image, "--stdin", image.with_name("space"), *map(str, options)]
     done = children.run(command, capture_output=True, timeout=PATIENCE_S)
@@ -117,15 +114,15 @@ def test_the_look_commands_take_the_same_dialogue(monitor, mirotwin):
 class Talk:
     """The far end of a terminal at which `fw run --terminal` runs."""
 
-    def __init__(self, master: int, child: subprocess.Popen[bytes]) -> None:
+    def __init__(self, master, child):
         self.master = master
         self.child = child
         self.seen = b""
 
-    def type(self, keys: str) -> None:
+    def type(self, keys):
         os.write(self.master, keys.encode())
 
-    def until(self, text: str) -> None:
+    def until(self, text):
         """Reads on until `text` was shown since the last call."""
         deadline = time.monotonic() + PATIENCE_S
         while text.encode() not in self.seen:
@@ -138,7 +135,7 @@ class Talk:
 
 
 @contextmanager
-def terminal(*arguments: object) -> Iterator[Talk]:
+def terminal(*arguments):
     """Starts `fw run --terminal` in a terminal of its own, which must come out as it went in."""
     master, slave = pty.openpty()
     before = termios.tcgetattr(slave)

@@ -1,10 +1,7 @@
 """What the tests of campaigns share: the command in this process, with an engine that needs no other program."""
 
-from pathlib import Path
-
 import pytest
 
-from miro_robot.image import Image
 from tests.mirotwin.conftest import finished as finished
 from tests.mirotwin.conftest import mirotwin as mirotwin
 from tests.mirotwin.conftest import short as short
@@ -14,7 +11,7 @@ from tests.mirotwin.fuzz.random_engine import RandomEngine
 @pytest.fixture
 def engines(monkeypatch):
     """The engines that `mirotwin fuzz` makes in a test: in this process, by chance."""
-    made: list[RandomEngine] = []
+    made = []
 
     def engine_for(spec, inputs, folder, target, jobs, seed):
         made.append(RandomEngine(target, list(inputs), folder.folder("engine"), seed))
@@ -29,8 +26,8 @@ def built():
     """The image of the firmware with a planted mistake, by its name."""
     from tests.mirotwin.verify.checks.rig import planted
 
-    def find(name: str) -> Path:
-        image: Image = planted(name)
+    def find(name):
+        image = planted(name)
         return image.path
 
     return find

@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 
 from mirotwin.fuzz.engine import EngineProgress
-from mirotwin.fuzz.target import Target
 
 BATCH = 150
 
@@ -15,7 +14,7 @@ BATCH = 150
 class RandomEngine:
     """Runs a batch each time that it is asked for what is new. `stopped`: that it was told to stop."""
 
-    def __init__(self, target: Target, seeds: list[bytes], out: Path, seed: int) -> None:
+    def __init__(self, target, seeds, out, seed):
         self.target = target
         self.out = out
         self.random = random.Random(seed)
@@ -28,31 +27,31 @@ class RandomEngine:
         self.began_s = time.monotonic()
         target.use_map(self.edges)
 
-    def start(self) -> None:
+    def start(self):
         for data in list(self.queue):
             self._try(data)
 
-    def stop(self) -> None:
+    def stop(self):
         self.stopped = True
 
-    def progress(self) -> EngineProgress:
+    def progress(self):
         run_s = time.monotonic() - self.began_s
         done = self.target.executions
         return EngineProgress(done, done / run_s, len(self.seen) - self.seen.count(0))
 
-    def new_crashes(self) -> list[Path]:
+    def new_crashes(self):
         for _ in range(0 if self.stopped else BATCH):
             self._try(self._changed(self.random.choice(self.queue)))
         return self._new("crashes")
 
-    def new_queue(self) -> list[Path]:
+    def new_queue(self):
         return self._new("queue")
 
-    def _new(self, kind: str) -> list[Path]:
+    def _new(self, kind):
         new, self.found[kind] = self.found[kind], []
         return new
 
-    def _try(self, data: bytes) -> None:
+    def _try(self, data):
         self.edges[:] = bytes(len(self.edges))
         code = self.target.run(data)
         new = any(now and not before for now, before in zip(self.edges, self.seen, strict=True))
@@ -66,7 +65,7 @@ class RandomEngine:
             path.write_bytes(data)
             self.found[kind].append(path)
 
-    def _changed(self, data: bytes) -> bytes:
+    def _changed(self, data):
         changed = bytearray(data)
         for _ in range(self.random.randrange(1, 4)):
             place = self.random.randrange(len(changed) + 1)

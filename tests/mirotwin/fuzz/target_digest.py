@@ -1,7 +1,5 @@
 """What a target makes of some inputs: `python -m tests.mirotwin.fuzz.target_digest --engine python`."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 
@@ -16,7 +14,7 @@ INPUTS = (
 )
 
 
-def lines() -> list[str]:
+def lines():
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
     from mirotwin.fuzz.target import target_for
@@ -33,7 +31,7 @@ def lines() -> list[str]:
     return found
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--engine", choices=("compiled", "python"), required=True)
     engine.select(parser.parse_args().engine)

@@ -1,7 +1,6 @@
 """The engine where AFL++ is missing: what it keeps, that a seed repeats it, and that it ends at once."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,17 +28,15 @@ def importable_toy(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
 
-def kept_after(
-    runs: int, seed: int, seeds: tuple[bytes, ...] = ()
-) -> tuple[list[tuple[str, bytes]], Explorer]:
-    kept: list[tuple[str, bytes]] = []
+def kept_after(runs, seed, seeds=()):
+    kept = []
     explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
     explore(explorer, TOY, seeds, seed, lambda: explorer.target.executions < runs)
     return kept, explorer
 
 
 def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_new():
-    kept: list[tuple[str, bytes]] = []
+    kept = []
     explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
     for data in (b"a", b"b", b"ab", b"F", b"abcd", b"1234567", b"12345678", b"Fa"):
         explorer.run(data)
@@ -48,7 +45,7 @@ def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_
 
 
 def test_a_finding_is_kept_once_for_each_check_and_place():
-    kept: list[tuple[str, bytes]] = []
+    kept = []
     explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
     for data in (b"FZ\x01", b"FZ\x01\x02", b"FZ\x02"):
         explorer.run(data)
@@ -76,7 +73,7 @@ def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one
 def test_inputs_of_all_kinds_are_drawn(kind, foreign):
     @settings(max_examples=20)
     @given(inputs(kind, 5, 4, foreign), st.data())
-    def is_read(data: bytes, draw: st.DataObject) -> None:
+    def is_read(data, draw):
         assert data
         assert draw.draw(inputs(kind, 3, 0, foreign, (data,)))
 
@@ -88,7 +85,7 @@ def test_a_session_is_made_of_whole_operations():
 
     @settings(max_examples=30)
     @given(inputs("session"))
-    def is_whole(data: bytes) -> None:
+    def is_whole(data):
         assert data[0] < len(OPERATIONS)
         target.program.read(data)
         assert target.program.count or data[0] >= OPERATIONS.index("again")
@@ -97,7 +94,7 @@ def test_a_session_is_made_of_whole_operations():
 
 
 def test_the_shipped_firmware_is_fed_and_its_edges_are_found():
-    kept: list[str] = []
+    kept = []
     target = target_for(load_hex(image_path()))
     explorer = Explorer(target, lambda kind, data: kept.append(kind))
     explore(explorer, TargetSpec(), (), 3, lambda: target.executions < 60)
@@ -113,7 +110,7 @@ def seeds(tmp_path):
     return folder
 
 
-def waited(run: HypothesisRun, limit_s: float = 60.0) -> Iterator[None]:
+def waited(run, limit_s=60.0):
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:
         yield
@@ -122,8 +119,8 @@ def waited(run: HypothesisRun, limit_s: float = 60.0) -> Iterator[None]:
 
 
 def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(tmp_path, seeds):
-    crashes: list[Path] = []
-    queue: list[Path] = []
+    crashes = []
+    queue = []
     with HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=2, seed=5) as run:
         for _ in waited(run):
             crashes += run.new_crashes()
@@ -163,7 +160,7 @@ def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(tmp_pa
         _wait_for_ever(run)
 
 
-def _wait_for_ever(run: HypothesisRun) -> None:
+def _wait_for_ever(run):
     for _ in waited(run):
         run.progress()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import TargetFailure
 
 
@@ -14,15 +13,15 @@ class Toy:
     input = "bytes"
     map_size = 64
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.executions = self.frames_fed = self.characters_fed = 0
         self.failure: TargetFailure | None = None
         self.edges: Any = bytearray(self.map_size)
 
-    def use_map(self, edges: Any) -> None:
+    def use_map(self, edges):
         self.edges = edges
 
-    def run(self, data: Any) -> int:
+    def run(self, data):
         self.executions += 1
         self.characters_fed += len(data)
         self.edges[0] = 1
@@ -35,7 +34,7 @@ class Toy:
         return int(self.failure is not None)
 
 
-def toy(spec: TargetSpec) -> Toy:
+def toy(spec):
     """For `TargetSpec.maker`."""
     if spec.parameters.get("broken"):
         raise ValueError("the toy is broken")

@@ -2,7 +2,6 @@
 
 import socket
 import time
-from collections.abc import Callable
 from selectors import DefaultSelector
 from typing import TypeVar
 
@@ -10,7 +9,6 @@ from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, PortContext
 from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import RadioPort
-from mirotwin.ports.sockets import TcpEndpoint
 from tests.mirotwin.ports.rig import own_image
 
 Port = TypeVar("Port", bound=Endpoint)
@@ -19,25 +17,25 @@ Port = TypeVar("Port", bound=Endpoint)
 class Rig:
     """A world and what is needed to open ports of its radio; `told` is what the user would read."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.world = World(live_scenario("fig6").scenario, 1, own_image())
         self.selector = DefaultSelector()
         self.told: list[str] = []
         self.context = PortContext(RadioPort(self.world), self.selector, self.told.append)
         self.open: list[Endpoint] = []
 
-    def opened(self, port: Port) -> Port:
+    def opened(self, port):
         self.open.append(port)
         return port
 
-    def close(self) -> None:
+    def close(self):
         for port in self.open:
             port.close()
         assert not self.selector.get_map()
         self.selector.close()
 
 
-def soon(port: Endpoint, wanted: Callable[[], object]) -> bytes:
+def soon(port, wanted):
     """What the port receives until `wanted`, in at most 5 s."""
     got, until_s = b"", time.monotonic() + 5
     while not wanted():
@@ -48,7 +46,7 @@ def soon(port: Endpoint, wanted: Callable[[], object]) -> bytes:
     return got
 
 
-def connected(port: TcpEndpoint) -> socket.socket:
+def connected(port):
     client = socket.create_connection(("127.0.0.1", int(port.where.rpartition(":")[2])), timeout=5)
     soon(port, lambda: port.client)
     return client

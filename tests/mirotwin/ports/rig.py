@@ -6,16 +6,14 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.recording import reader
@@ -29,16 +27,16 @@ CLEAN = ("network.radio.bit_error_rate=0",)
 ANSWER_BYTES = 19
 
 
-def own_image() -> Image:
+def own_image():
     return load_hex(image_path())
 
 
-def question(seq: int, speed: int = 200, robots: int = 3) -> bytes:
+def question(seq, speed=200, robots=3):
     """Team velocities that ask robot `seq` modulo `robots`, which answers."""
     return encode(TeamFrame(3, seq, ((speed, speed),) * robots), robots)
 
 
-def replays(path: Path) -> int:
+def replays(path):
     """AssertionError unless what the hosts of a recording sent gives the same digests; returns how many periods."""
     recording = reader.read(path)
     scenario = parse(recording.source.scenario_text, "recorded")
@@ -49,7 +47,7 @@ def replays(path: Path) -> int:
     return len(recording.periods)
 
 
-def sent_bytes(path: Path, network: int = 0) -> bytes:
+def sent_bytes(path, network=0):
     """All that went on the air of a network, in the order of time."""
     found = script_of(reader.read(path).periods)
     return b"".join(one.data for one in found if one.network == network)
@@ -64,21 +62,21 @@ class Served:
     code: int | None = None
     err: str = ""
 
-    def number(self, kind: str = "tcp") -> int:
+    def number(self, kind="tcp"):
         return int(self.ports[kind][0].rpartition(":")[2])
 
-    def stop(self, number: int = signal.SIGINT) -> None:
+    def stop(self, number=signal.SIGINT):
         self.process.send_signal(number)
         self.wait()
 
-    def wait(self) -> None:
+    def wait(self):
         _, self.err = self.process.communicate(timeout=120)
         self.code = self.process.returncode
         assert "Traceback" not in self.err, self.err
 
 
 @contextmanager
-def served(*arguments: object, **more: Any) -> Iterator[Served]:
+def served(*arguments, **more):
     """A session, ready for clients; ended at the end if it has not."""
     command = [sys.executable, "-c", PROGRAM, "serve", *map(str, arguments)]
     process = children.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
@@ -100,26 +98,26 @@ def served(*arguments: object, **more: Any) -> Iterator[Served]:
             process.communicate()
 
 
-def python(code: str, *arguments: object, **more: Any) -> subprocess.CompletedProcess[str]:
+def python(code, *arguments, **more):
     """Runs a program of the user's in another process; it knows nothing of Mirotwin unless `code` imports it."""
     named = {"capture_output": True, "text": True, "timeout": 120, "check": False, **more}
     return children.run([sys.executable, "-c", code, *map(str, arguments)], **named)
 
 
-def fake_pace(factor: float = 1.0) -> Any:
+def fake_pace(factor=1.0):
     """A pace whose wall clock stands wherever a test puts `now`; looking at it takes `per_look` ticks."""
     from mirotwin.rerun.pacing import Pace
 
     class Faked(Pace):
-        def __init__(self) -> None:
+        def __init__(self):
             super().__init__(factor)
             self.now = 0
             self.per_look = 0
 
-        def start(self, tick: int) -> None:
+        def start(self, tick):
             self.now = tick
 
-        def tick(self) -> int:
+        def tick(self):
             self.now += self.per_look
             return self.now
 

@@ -6,8 +6,6 @@ a frame. Then the recording has to give the same digest in every control period 
 again.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -18,7 +16,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,7 +28,7 @@ BUSY = "while True: pass"
 
 
 @contextmanager
-def load(processes: int, nice: int = 0) -> Iterator[None]:
+def load(processes, nice=0):
     """So many processes that do nothing but compute."""
     command = ["nice", "-n", f"{nice}", sys.executable, "-c", BUSY]
     busy = [children.start(command, stdout=subprocess.DEVNULL) for _ in range(processes)]
@@ -43,7 +40,7 @@ def load(processes: int, nice: int = 0) -> Iterator[None]:
             process.wait()
 
 
-def client(number: int, draw: random.Random) -> tuple[bytes, bool]:
+def client(number, draw):
     """Sends frames and pieces of them, reads what comes, and goes; returns what it sent, and whether it vanished."""
     sent = b""
     with socket.create_connection(("127.0.0.1", number), timeout=60) as port:
@@ -66,7 +63,7 @@ def client(number: int, draw: random.Random) -> tuple[bytes, bool]:
     return sent, vanishes
 
 
-def session(seed: int, folder: Path) -> tuple[int, float]:
+def session(seed, folder):
     """One session; returns its control periods and by how much it was late, in ms. AssertionError unless it replays."""
     draw = random.Random(seed)
     settings = ("--set", f"network.radio.latency_s={draw.choice((0, 0.002, 0.005))}")
@@ -84,7 +81,7 @@ def session(seed: int, folder: Path) -> tuple[int, float]:
     return replays(out / "run.mcap"), late_ms
 
 
-def main() -> int:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--together", type=int, default=5, help="sessions at once")

@@ -8,7 +8,6 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 import serial
@@ -45,11 +44,11 @@ def site(tmp_path):
     return folder
 
 
-def with_site(site: Path) -> dict[str, str]:
+def with_site(site):
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), *filter(None, sys.path)])}
 
 
-def questions() -> list[str]:
+def questions():
     return [question(seq).hex() for seq in range(0, 12, 3)]
 
 
@@ -82,24 +81,24 @@ def test_the_same_program_talks_to_a_served_robot(kind, tmp_path):
 class Terminal:
     """A program on a terminal of its own, as somebody would use it."""
 
-    def __init__(self, command: list[object], **more: Any) -> None:
+    def __init__(self, command, **more):
         self.master, slave = pty.openpty()
         named = {"stdin": slave, "stdout": slave, "stderr": slave, "start_new_session": True, **more}
         self.process = children.start([str(word) for word in command], **named)
         os.close(slave)
         self.shown = b""
 
-    def type(self, text: str) -> None:
+    def type(self, text):
         os.write(self.master, text.encode())
 
-    def until(self, wanted: bytes) -> None:
+    def until(self, wanted):
         until_s = time.monotonic() + 20
         while wanted not in self.shown:
             assert time.monotonic() < until_s, self.shown
             if select.select([self.master], [], [], 0.1)[0]:
                 self.shown += os.read(self.master, 4096)
 
-    def close(self) -> None:
+    def close(self):
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
@@ -108,7 +107,7 @@ class Terminal:
 
 @pytest.mark.parametrize("kind", ["miro", "pty", "tcp", "rfc2217"])
 def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(kind, site, tmp_path):
-    def use(url: str) -> None:
+    def use(url):
         command = [sys.executable, "-m", "serial.tools.miniterm", "--encoding", "hexlify", url]
         terminal = Terminal(command, env=with_site(site))
         try:

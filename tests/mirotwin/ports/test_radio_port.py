@@ -6,7 +6,6 @@ import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_protocol.transmission import DOWN, Transmission
-from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import source_text
 from miro_sim.world.world import World
@@ -16,7 +15,7 @@ from mirotwin.rerun.script import script_of
 from tests.mirotwin.ports.rig import own_image, question
 
 
-def live_world(*settings: str, scenario: str = "fig6") -> World:
+def live_world(*settings, scenario="fig6"):
     return World(live_scenario(scenario, settings).scenario, 1, own_image())
 
 
@@ -24,7 +23,7 @@ def live_world(*settings: str, scenario: str = "fig6") -> World:
 @pytest.mark.parametrize("off_ticks", [-121, -1, 0, 1, 120, 24_000, 119_999, 120_000, 400_000])
 def test_what_is_sent_at_any_tick_replays_to_the_same_digests(latency_s, off_ticks):
     world = live_world(f"network.radio.latency_s={latency_s}")
-    periods: list[Period] = []
+    periods = []
     world.observers.append(periods.append)
     world.run_to(2 * CONTROL_PERIOD_TICKS + off_ticks)
     RadioPort(world).send(question(0))

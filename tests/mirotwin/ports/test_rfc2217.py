@@ -14,7 +14,7 @@ IAC, SB, SE, WILL, DO = b"\xff", b"\xfa", b"\xf0", b"\xfb", b"\xfd"
 COM_PORT = b"\x2c"
 
 
-def sent_to(port: Rfc2217Endpoint, data: bytes) -> bytes:
+def sent_to(port, data):
     """What of a client's bytes goes to the radio, in pieces as TCP may cut them."""
     return b"".join(port.heard_from(data[at : at + 7]) for at in range(0, len(data), 7))
 
@@ -89,7 +89,7 @@ def fuzzed():
 def test_no_negotiation_raises_or_grows_without_bound(fuzzed, pieces):
     if not fuzzed.open:
         fuzzed.opened(Rfc2217Endpoint(fuzzed.context, "127.0.0.1", 0))
-        fuzzed.client = connected(fuzzed.open[0])  # type: ignore[attr-defined, arg-type]
+        fuzzed.client = connected(fuzzed.open[0])
     port = fuzzed.open[0]
     assert isinstance(port, Rfc2217Endpoint)
     port.greet()

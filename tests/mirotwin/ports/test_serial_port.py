@@ -5,7 +5,6 @@ import time
 import warnings
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import pytest
 import serial
@@ -22,9 +21,9 @@ Open = Callable[..., Serial]
 def miro(monkeypatch):
     """Opens URLs as a program does; all are closed at the end."""
     monkeypatch.setattr(serial, "protocol_handler_packages", ["serial.urlhandler", "mirotwin.ports"])
-    opened: list[Any] = []
+    opened = []
 
-    def call(url: str = URL, **named: Any) -> Any:
+    def call(url=URL, **named):
         opened.append(serial.serial_for_url(url, **named))
         return opened[-1]
 
@@ -33,7 +32,7 @@ def miro(monkeypatch):
         port.close()
 
 
-def asked(port: Serial, seq: int = 0) -> bytes:
+def asked(port, seq=0):
     port.write(question(seq))
     return port.read(ANSWER_BYTES)
 
@@ -147,7 +146,7 @@ def test_purging_forgets_what_was_heard_and_what_waits(miro):
 
 def test_a_reading_thread_is_ended_by_cancel_read(miro):
     port = miro(URL + "&realtime=1", timeout=None)
-    found: list[bytes] = []
+    found = []
     thread = threading.Thread(target=lambda: found.append(port.read(100)))
     thread.start()
     port.write(question(0))

@@ -15,7 +15,6 @@ from tests.mirotwin.ports.rig import (
     ANSWER_BYTES,
     CLEAN,
     PROGRAM,
-    Served,
     question,
     replays,
     sent_bytes,
@@ -27,7 +26,7 @@ PARTS = ["case.part.stream", "run.part.mcap", "summary.part.json"]
 SETTINGS = [word for setting in CLEAN for word in ("--set", setting)]
 
 
-def talk(session: Served, seq: int = 0) -> socket.socket:
+def talk(session, seq=0):
     """A client that has asked robot 0 and got its answer, and is in the middle of the next frame."""
     client = socket.create_connection(("127.0.0.1", session.number()), timeout=5)
     client.sendall(question(seq) + question(seq + 3)[:9])
@@ -81,7 +80,7 @@ def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path):
 
 
 def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path):
-    def limited() -> None:
+    def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
     command = ("fig6", "--tcp", 0, *SETTINGS, "--pace", 5, "--out", tmp_path / "out")

@@ -1,11 +1,8 @@
 """A live session in this process, under a wall clock that stands where the test puts it."""
 
-from typing import Any
-
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.ports.byte_fifo import ByteFifo
 from mirotwin.ports.endpoint import Endpoint, PortContext
@@ -22,38 +19,36 @@ class Scripted(Endpoint):
 
     kind = "scripted"
 
-    def __init__(self, context: PortContext, sends: list[tuple[int, bytes]]) -> None:
+    def __init__(self, context, sends):
         super().__init__(context, "here")
         self.sends = sends
         self.got = b""
         self.has_come("a test")
 
-    def receive(self) -> bytes:
+    def receive(self):
         if self.sends and self.port.world.tick >= self.sends[0][0]:
             return self.sends.pop(0)[1]
         return b""
 
-    def push(self) -> None:
+    def push(self):
         self.got += self.out.take(len(self.out))
 
 
-def session_of(
-    *sends: tuple[int, bytes], ports: int = 1, **more: Any
-) -> tuple[Session, list[Scripted], list[str]]:
+def session_of(*sends, ports=1, **more):
     scenario = live_scenario("fig6", ("network.radio.bit_error_rate=0",)).scenario
     world = World(scenario, 1, own_image())
-    told: list[str] = []
-    context = PortContext(RadioPort(world), NO_SELECTOR, told.append)  # type: ignore[arg-type]
+    told = []
+    context = PortContext(RadioPort(world), NO_SELECTOR, told.append)
     found = [Scripted(context, list(sends) if index == 0 else []) for index in range(ports)]
     pace = fake_pace()
-    session = Session(world, pace, NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more})  # type: ignore[arg-type]
+    session = Session(world, pace, NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more})
     return session, found, told
 
 
 def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_to_its_digests():
     session, (client,), _ = session_of((ticks(0.05), question(0)), (ticks(0.2), question(3)))
-    session.pace.per_look = ticks(0.0007)  # type: ignore[attr-defined]
-    periods: list[Period] = []
+    session.pace.per_look = ticks(0.0007)
+    periods = []
     session.world.observers.append(periods.append)
     runner.run(session)
     assert session.tick == 15 * CONTROL_PERIOD_TICKS >= ticks(0.5)
@@ -66,8 +61,8 @@ def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_t
 
 def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
     session, _, _ = session_of((ticks(0.1), question(0)))
-    session.pace.per_look = ticks(0.0003)  # type: ignore[attr-defined]
-    periods: list[Period] = []
+    session.pace.per_look = ticks(0.0003)
+    periods = []
     session.world.observers.append(periods.append)
     runner.run(session)
     (sent,) = script_of(periods)
@@ -76,7 +71,7 @@ def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
 
 def test_all_ports_of_a_network_hear_its_robots():
     session, clients, _ = session_of((0, question(0)), ports=3)
-    session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
+    session.pace.per_look = ticks(0.001)
     runner.run(session)
     assert len(clients[0].got) == 19
     assert clients[0].got == clients[1].got == clients[2].got
@@ -84,10 +79,10 @@ def test_all_ports_of_a_network_hear_its_robots():
 
 def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much():
     session, _, told = session_of()
-    session.pace.per_look = ticks(0.0005)  # type: ignore[attr-defined]
+    session.pace.per_look = ticks(0.0005)
     session.run_to(ticks(0.1))
     assert session.live().late_max_ms < 3
-    session.pace.now += ticks(0.25)  # type: ignore[attr-defined]
+    session.pace.now += ticks(0.25)
     session.run_to(ticks(0.8))  # a slice of 2 ms takes 1 ms: after 0.46 s it is 20 ms after
     live = session.live()
     assert 240 < live.late_max_ms < 260
@@ -98,7 +93,7 @@ def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much
 
 def test_once_ends_it_when_the_last_client_has_gone():
     session, (client, other), _ = session_of(ports=2, once=True)
-    session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
+    session.pace.per_look = ticks(0.001)
     session.step()
     client.has_gone()
     session.step()

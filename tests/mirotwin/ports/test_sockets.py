@@ -37,7 +37,7 @@ def test_a_second_client_is_refused_and_the_first_one_stays(rig):
         soon(port, lambda: port.refused)
         assert second.recv(1) == b""
     first.sendall(b"x")
-    got: list[bytes] = []
+    got = []
     soon(port, lambda: got.append(port.receive()) or b"".join(got))
     assert b"".join(got) == b"x"
     assert any(line.endswith(f"is refused; {port.client} is there") for line in rig.told)

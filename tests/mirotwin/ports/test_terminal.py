@@ -113,7 +113,7 @@ def test_a_lock_whose_file_another_session_has_just_removed_is_taken_again(tmp_p
     fcntl = pytest.importorskip("fcntl")
     path, flock, removed = tmp_path / ".radio.lock", fcntl.flock, []
 
-    def late(descriptor: int, how: int) -> None:
+    def late(descriptor, how):
         if not removed:
             removed.append(path.unlink())
         flock(descriptor, how)

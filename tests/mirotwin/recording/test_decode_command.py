@@ -31,7 +31,7 @@ PCAPNG = render([Transmission(*sent) for sent in SENT])
 STREAM = format_stream([Transmission(*sent) for sent in SENT]).encode()
 
 
-def decode(data: bytes, *options: str) -> tuple[int, list[str], str]:
+def decode(data, *options):
     """Exit code, lines and errors of decoding `data` from standard input."""
     result = CliRunner().invoke(main, ["decode", "-", *options], input=data)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
@@ -39,7 +39,7 @@ def decode(data: bytes, *options: str) -> tuple[int, list[str], str]:
     return result.exit_code, result.stdout.splitlines(), result.stderr
 
 
-def as_json(data: bytes, *options: str) -> tuple[int, list[dict], str]:  # type: ignore[type-arg]
+def as_json(data, *options):
     code, lines, err = decode(data, "--json", *options)
     return code, [json.loads(line) for line in lines], err
 

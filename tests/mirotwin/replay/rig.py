@@ -1,8 +1,5 @@
 """For the tests of replay and diff: a short scenario, its script, and worlds in which something is planted."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -11,10 +8,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.frames import encode
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import Image
-from miro_sim.periods import Period
 from miro_sim.scenario.file import parse
-from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from tests.mirotwin.verify.checks.rig import built_in, own_image, team
 
@@ -34,11 +28,11 @@ STOP_AT = own_image().code.index(b"\x74\x6e", own_image().symbols.names["_failsa
 
 
 @cache
-def scenario() -> Scenario:
+def scenario():
     return parse(TEXT, "pair")
 
 
-def script(frames: int = 4) -> list[Transmission]:
+def script(frames=4):
     """Frames that make the robot drive and answer, and then nothing: the failsafe comes 110 ms later."""
     return [
         Transmission((seq + 1) * CONTROL_PERIOD_TICKS, DOWN, encode(team(seq, 900, 700, ask=True), 3))
@@ -46,37 +40,37 @@ def script(frames: int = 4) -> list[Transmission]:
     ]
 
 
-def world(image: Image | None = None, seed: int = 3) -> World:
+def world(image=None, seed=3):
     return World(scenario(), seed, image or own_image(), script=script())
 
 
 class Planted(World):
     """A world that somebody changes from outside at a tick, however it gets there."""
 
-    def plant(self, tick: int, change: Callable[[World], object]) -> Planted:
+    def plant(self, tick, change):
         self.planted_tick = tick
         self.change = change
         return self
 
-    def run_to(self, tick: int) -> None:
+    def run_to(self, tick):
         if self.tick < self.planted_tick <= tick:
             super().run_to(self.planted_tick)
             self.change(self)
         super().run_to(tick)
 
 
-def planted_world(tick: int, change: Callable[[World], object]) -> Planted:
+def planted_world(tick, change):
     return Planted(scenario(), 3, own_image(), script=script()).plant(tick, change)
 
 
-def periods(of: World) -> list[Period]:
+def periods(of):
     found = []
     while not of.finished:
         found.append(of.step())
     return found
 
 
-def with_byte(image: Image, address: int, value: int) -> Image:
+def with_byte(image, address, value):
     """The image with another byte of code, its symbols, and no debug files."""
     code = bytearray(image.code)
     code[address] = value
@@ -97,6 +91,6 @@ BUILDS = {
 }
 
 
-def built(folder: Path, name: str) -> Image:
+def built(folder, name):
     """The firmware with one of the changes above."""
     return built_in(folder, *BUILDS[name])

@@ -8,9 +8,7 @@ import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
-from miro_sim.periods import Period
 from miro_sim.scenario.file import load
-from miro_sim.world.world import World
 from mirotwin.recording.recorder import Recorder, source_of
 from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.replay.rig import STOP_AT, Planted
@@ -38,7 +36,7 @@ def runs(mirotwin, short, tmp_path_factory):
     return folder
 
 
-def with_stop_after(ms: int) -> str:
+def with_stop_after(ms):
     """The robot's own image as Intel HEX, with another constant in the failsafe."""
     lines = []
     for line in image_path().read_text().splitlines():
@@ -122,7 +120,7 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
     text = load(str(short))
     tick = 3 * CONTROL_PERIOD_TICKS + 123_456
 
-    def change(of: World) -> None:
+    def change(of):
         if what == "ram":
             cpu = of.robot(0, 2).board.cpu
             cpu.poke_iram(0xF0, cpu.peek_iram(0xF0) ^ 1)
@@ -145,7 +143,7 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
 
 
 def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(mirotwin, finished, tmp_path):
-    def change(period: Period) -> Period:
+    def change(period):
         digest = f"{period.index:064x}"
         robot = msgspec.structs.replace(period.robots[0], accepted=9)
         changed = period.robots if period.index < 2 else (robot, *period.robots[1:])

@@ -46,7 +46,7 @@ def test_every_option_on_the_page_is_one_of_the_commands(name):
     assert {"--compare", "--json", "--from", "--to", "--all", "--lines-from", "--sources"} <= own
 
 
-def run(*arguments: object) -> str:
+def run(*arguments):
     return CliRunner().invoke(main, list(map(str, arguments))).stdout
 
 

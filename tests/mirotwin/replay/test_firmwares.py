@@ -5,11 +5,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from miro_robot.image import Image, Symbols
+from miro_robot.image import Symbols
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
 from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
-from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.firmwares import first_instruction
 from mirotwin.replay.moved import moved
 from mirotwin.replay.state_fields import extents, name_of_byte
 from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
@@ -19,7 +19,7 @@ from tests.mutants.draw import SOURCE
 END = 9_600_000
 
 
-def apart(other: Image, folder: Path | None = None, until_tick: int = END) -> FirmwareDifference:
+def apart(other, folder=None, until_tick=END):
     annotated = (
         AnnotatedImage(own_image(), [SOURCE]),
         AnnotatedImage(other, [] if folder is None else [folder]),

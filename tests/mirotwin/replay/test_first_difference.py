@@ -1,8 +1,6 @@
 """Two worlds side by side: what is planted in one is named by tick and field, to the last bit."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +8,6 @@ from hypothesis import strategies as st
 
 import mirotwin
 from miro_sim.scenario.file import parse
-from miro_sim.world.world import World
 from mirotwin.replay import first_difference
 from tests.mirotwin.replay.rig import Planted, planted_world, scenario, world
 from tests.mirotwin.verify.checks.rig import own_image
@@ -19,18 +16,18 @@ LAST_LEFT = own_image().symbols.names["_last_left"].address
 BODY = "networks[0].robots[0].board.plant.body"
 
 
-def flipped(address: int, bit: int = 0) -> Callable[[World], None]:
-    def change(of: World) -> None:
+def flipped(address, bit=0):
+    def change(of):
         cpu = of.robot(0, 1).board.cpu
         cpu.poke_iram(address, cpu.peek_iram(address) ^ 1 << bit)
 
     return change
 
 
-def nudged(name: str) -> Callable[[World], None]:
+def nudged(name):
     """The next double after a field of the plant's body."""
 
-    def change(of: World) -> None:
+    def change(of):
         field = next(field for field in of.state.fields if field.path == f"{BODY}.{name}")
         setattr(field.part, name, math.nextafter(getattr(field.part, name), math.inf))
 
@@ -81,7 +78,7 @@ def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough():
     """The accumulator, while the processor runs: written again by one of the next instructions."""
     tick = 40_001
 
-    def change(of: World) -> None:
+    def change(of):
         of.robot(0, 1).board.cpu.a ^= 1
 
     for look_ticks in (12, 1):
@@ -134,7 +131,7 @@ def test_a_step_that_is_none_is_refused(step):
 def test_its_json_holds_tick_path_and_both_values():
     found = first_difference(world(), planted_world(24_000, flipped(LAST_LEFT + 1)))
     assert found is not None
-    document: dict[str, Any] = found.as_json()
+    document = found.as_json()
     assert document["tick"] == 24_000
     assert document["fields"] == [
         {

@@ -1,8 +1,5 @@
 """`mirotwin replay`: the same bytes give the same robot, and where they do not it says so."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import msgspec
 import pytest
 
@@ -10,7 +7,6 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.pcapng import render
 from miro_protocol.stream import write
 from miro_protocol.transmission import Transmission
-from miro_sim.periods import Period
 from mirotwin.recording import reader as recording_reader
 from mirotwin.recording.recorder import Recorder, RunSource
 from tests.mirotwin.conftest import hex_file
@@ -18,7 +14,7 @@ from tests.mirotwin.conftest import hex_file
 IDLE_FOR_EVER = b"\x80\xfe"
 
 
-def rewritten(path: Path, target: Path, change: Callable[[Period], Period]) -> Path:
+def rewritten(path, target, change):
     """A recording with something else in its periods."""
     recording = recording_reader.read(path)
     with target.open("wb") as stream, Recorder(stream, recording.source) as recorder:
@@ -74,7 +70,7 @@ def test_a_stream_drives_robots_over_an_ideal_link(mirotwin, tmp_path):
 
 
 def test_a_changed_recording_is_a_divergence_with_its_first_place(mirotwin, finished, tmp_path):
-    def change(period: Period) -> Period:
+    def change(period):
         if period.index < 3:
             return period
         robot = period.robots[1]
@@ -181,7 +177,7 @@ def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(mirotwin, 
 def test_a_recording_whose_characters_no_host_can_have_sent_is_refused(
     mirotwin, finished, tmp_path, change, what
 ):
-    def changed(period: Period) -> Period:
+    def changed(period):
         if period.index:
             return period
         first, *others = period.wire

@@ -1,13 +1,11 @@
 """`mirotwin replay --compare`: how strictly a replay is compared, what is told of it, and the first instruction."""
 
 import json
-from typing import Any
 
 import msgspec
 import pytest
 
 from miro_protocol.frames import TeamFrame, encode
-from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording import recorder as recording_recorder
@@ -103,7 +101,7 @@ def test_json_holds_the_same_and_nothing_else_is_on_stdout(mirotwin, silent, lat
     assert len(every["differences"]) == every["count"] == document["count"]
 
 
-def shifted(period: Period) -> Period:
+def shifted(period):
     robot = period.robots[1]
     left = msgspec.structs.replace(robot.left, real_position=robot.left.real_position + 3)
     right = msgspec.structs.replace(robot.right, status=robot.right.status ^ 1)
@@ -134,7 +132,7 @@ def test_wheels_have_a_tolerance_in_counts(mirotwin, finished, tmp_path):
 
 
 def test_a_window_leaves_the_rest_out(mirotwin, finished, tmp_path):
-    def late_change(period: Period) -> Period:
+    def late_change(period):
         return shifted(period) if period.index == 2 else period
 
     path = rewritten(finished / "run.mcap", tmp_path / "shifted.mcap", late_change)
@@ -160,7 +158,7 @@ def test_a_digest_is_compared_where_the_host_was_silent(mirotwin, tmp_path):
         assert mirotwin("run", scenario, "--out", folder, "-q", "--no-figure")[0] == 0
         assert mirotwin("replay", folder / "run.mcap", "-q")[0] == 0
 
-        def change(period: Period) -> Period:
+        def change(period):
             return msgspec.structs.replace(period, digest="00" * 32) if period.index == 2 else period
 
         path = rewritten(folder / "run.mcap", tmp_path / f"{host}.mcap", change)
@@ -282,7 +280,7 @@ def test_the_json_of_a_stream_says_that_nothing_was_recorded(mirotwin, tmp_path)
     path = tmp_path / "a.stream"
     path.write_text("792000 > 55 55\n")
     code, out, _ = mirotwin("replay", path, "--json", "--seed", 9, "--to", "70ms")
-    document: dict[str, Any] = json.loads(out)
+    document = json.loads(out)
     assert (code, document["exit_code"], document["seed"]) == (0, 0, 9)
     assert document["periods"] == {"recorded": 0, "replayed": 3}
     assert (document["first"], document["instruction"]) == (None, None)

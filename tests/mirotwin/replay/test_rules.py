@@ -1,6 +1,5 @@
 """What counts as a difference under each rule, on periods that are made by hand."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import msgspec
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
-from miro_sim.periods import Period
 from mirotwin.recording.compare import CompareRule, Difference, differences
 from mirotwin.recording.difference import first_per_channel
 from mirotwin.recording.sequences import SAME_TICKS, LogEntry, unlike
@@ -21,7 +19,7 @@ RUN = list(periods(6, [(0, 0), (0, 2)]))
 MS = 24_000
 
 
-def with_commands(ticks: Sequence[int], data: str = "0400") -> list[Period]:
+def with_commands(ticks, data="0400"):
     """The run with commands to the left LM629 of the first robot at these ticks and nothing else."""
     changed = []
     before = -1
@@ -40,7 +38,7 @@ def with_commands(ticks: Sequence[int], data: str = "0400") -> list[Period]:
     return changed
 
 
-def with_answers(*answers: Transmission) -> list[Period]:
+def with_answers(*answers):
     return [
         msgspec.structs.replace(
             period, wire=tuple(one for one in answers if one.tick // CONTROL_PERIOD_TICKS == period.index)
@@ -49,7 +47,7 @@ def with_answers(*answers: Transmission) -> list[Period]:
     ]
 
 
-def with_position(offset: int, name: str = "real_position") -> list[Period]:
+def with_position(offset, name="real_position"):
     changed = []
     for period in RUN:
         robot = period.robots[1]
@@ -235,7 +233,7 @@ def test_a_difference_has_a_line_for_people_and_json_for_programs():
 
 
 def test_what_a_chip_answers_is_no_part_of_a_command():
-    def reading(data: str) -> list[Period]:
+    def reading(data):
         return [
             msgspec.structs.replace(
                 period,

@@ -8,9 +8,6 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import NoReturn
 
 import pytest
 
@@ -33,11 +30,11 @@ def _default_interrupt():
     signal.signal(signal.SIGINT, before)
 
 
-def at_period(monkeypatch: pytest.MonkeyPatch, index: int, act: Callable[[], object]) -> None:
+def at_period(monkeypatch, index, act):
     """Has `act` called when the world is about to compute control period `index`."""
     step = World.step
 
-    def stepped(world: World) -> object:
+    def stepped(world):
         if world.index == index:
             act()
         return step(world)
@@ -45,18 +42,18 @@ def at_period(monkeypatch: pytest.MonkeyPatch, index: int, act: Callable[[], obj
     monkeypatch.setattr(World, "step", stepped)
 
 
-def raising(error: BaseException) -> Callable[[], NoReturn]:
-    def act() -> NoReturn:
+def raising(error):
+    def act():
         raise error
 
     return act
 
 
-def names(folder: Path) -> list[str]:
+def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-CASES: list[tuple[str, Callable[[], object], int, str]] = [
+CASES = [
     ("Ctrl-C", lambda: signal.raise_signal(signal.SIGINT), 130, "mirotwin: interrupted"),
     ("SIGTERM", lambda: signal.raise_signal(signal.SIGTERM), 143, "mirotwin: ended by SIGTERM"),
     (
@@ -133,7 +130,7 @@ def parts(mirotwin, short, tmp_path, monkeypatch):
     return tmp_path / "out"
 
 
-def cut(path: Path, size: int) -> Path:
+def cut(path, size):
     """A copy of a recording as a killed process leaves it: without the end, perhaps cut in a record."""
     target = path.with_name("cut.mcap")
     target.write_bytes(path.read_bytes()[:size])
@@ -170,7 +167,7 @@ def test_decode_and_export_read_it_and_say_so(mirotwin, parts, tmp_path, target)
     assert out_file.stat().st_size > 0
 
 
-def killed(parts: Path, more: int) -> Path:
+def killed(parts, more):
     """What is left of the run of `parts` if it is killed `more` bytes into the message after its second period."""
     data = (parts / "run.part.mcap").read_bytes()
     chunk = data.index(b"mirotwin.Posture") - 200
@@ -191,9 +188,9 @@ def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(mirotwin, 
 def test_a_second_interruption_waits_until_the_files_are_closed(mirotwin, short, tmp_path, monkeypatch):
     encode = run_files.to_json
 
-    def impatient(summary: object) -> bytes:
+    def impatient(summary):
         signal.raise_signal(signal.SIGINT)
-        return encode(summary)  # type: ignore[arg-type]
+        return encode(summary)
 
     monkeypatch.setattr(run_files, "to_json", impatient)
     with monkeypatch.context() as patch:
@@ -218,9 +215,9 @@ def test_two_runs_into_one_folder_the_second_is_refused(mirotwin, short, tmp_pat
     assert names(tmp_path) == []
 
 
-def started(arguments: list[object], **more: object) -> "subprocess.CompletedProcess[str]":
+def started(arguments, **more):
     command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
-    return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)  # type: ignore[call-overload,no-any-return]
+    return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)
 
 
 def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finished, short, tmp_path):
@@ -228,7 +225,7 @@ def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finish
         (tmp_path / path.name).write_bytes(path.read_bytes())
     size = (finished / "run.mcap").stat().st_size * 3 // 4
 
-    def limited() -> None:
+    def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     done = started(["run", short, "--out", tmp_path, "--force", "-q"], preexec_fn=limited)

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import NoReturn
 
 import pytest
 
@@ -149,7 +148,7 @@ def test_a_scenario_may_count_faults_and_go_on(mirotwin, short, tmp_path):
 
 
 def test_an_interrupted_run_leaves_nothing_behind(mirotwin, short, tmp_path, monkeypatch):
-    def interrupted(*arguments: object) -> NoReturn:
+    def interrupted(*arguments):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(runner, "run", interrupted)

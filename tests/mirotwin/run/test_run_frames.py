@@ -1,7 +1,5 @@
 """`mirotwin run --frames`: every frame as a picture, nothing half-written, and not a bit of the run changed."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -13,7 +11,7 @@ from tests.mirotwin.conftest import SHORT
 FRAMES = [f"frame-{number:06d}.png" for number in range(6)]
 
 
-def names(folder: Path) -> list[str]:
+def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
@@ -107,7 +105,7 @@ def test_a_run_that_breaks_off_leaves_whole_frames_only(
 ):
     write = Path.write_bytes
 
-    def breaking(path: Path, data: bytes) -> int:
+    def breaking(path, data):
         if path.name == "frame-000003.part.png":
             write(path, data[:100])
             raise raised

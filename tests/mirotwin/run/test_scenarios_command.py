@@ -12,7 +12,7 @@ from mirotwin.shell.program import MainGroup
 from mirotwin.verify.checks.registry import CHECKS
 
 
-def mirotwin(*arguments: str) -> tuple[int, str, str]:
+def mirotwin(*arguments):
     result = CliRunner().invoke(main, arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit)
     return result.exit_code, result.stdout, result.stderr
@@ -96,10 +96,10 @@ FULL_DISK = OSError(28, "No space left on device", "out/run.mcap")
 )
 def test_what_comes_from_outside_is_no_traceback_either(raised, code, line):
     @click.group(cls=MainGroup)
-    def group() -> None: ...
+    def group(): ...
 
     @group.command()
-    def stumble() -> None:
+    def stumble():
         raise raised
 
     result = CliRunner().invoke(group, ["stumble"])
@@ -108,10 +108,10 @@ def test_what_comes_from_outside_is_no_traceback_either(raised, code, line):
 
 def test_a_mistake_of_the_program_itself_asks_for_a_report():
     @click.group(cls=MainGroup)
-    def group() -> None: ...
+    def group(): ...
 
     @group.command()
-    def stumble() -> None:
+    def stumble():
         raise ZeroDivisionError
 
     result = CliRunner().invoke(group, ["stumble"])

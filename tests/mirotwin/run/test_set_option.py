@@ -10,7 +10,7 @@ from tests.mirotwin.conftest import SHORT, hex_file
 SETTINGS = ("duration_s=0.1", "network.robot.0.start_error_x_cm=3", "network.radio.carrier=on")
 
 
-def options(settings: tuple[str, ...] = SETTINGS) -> list[str]:
+def options(settings=SETTINGS):
     return [word for setting in settings for word in ("--set", setting)]
 
 

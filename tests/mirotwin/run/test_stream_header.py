@@ -15,14 +15,14 @@ OTHER = "0123456789abcdef" * 4
 V2 = "# mirotwin stream 2\n"
 
 
-def in_header(scenario: str) -> str:
+def in_header(scenario):
     """A scenario as the table [scenario] of a header."""
     return "[scenario]\n" + scenario.replace("[[network", "[[scenario.network").replace(
         "[network.radio]", "[scenario.network.radio]"
     )
 
 
-def counters(out: str) -> list[list[str]]:
+def counters(out):
     """Robot, accepted, rejected and stale of the table at the end."""
     lines = [line.split() for line in out.splitlines()]
     head = max(place for place, words in enumerate(lines) if words[:2] == ["robot", "accepted"])

@@ -6,8 +6,6 @@ period. Then the recording has to be readable, what it lacks has to be at most h
 have to be those of the other rounds, and nothing else may be in the folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import mmap
 import os
@@ -17,13 +15,10 @@ import struct
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 
-from miro_sim.periods import Period
 from mirotwin.commands import main
 from mirotwin.recording import reader as recording_reader
-from mirotwin.recording.recorder import Recorder
 from mirotwin.rerun import runner
 from tests import children
 
@@ -43,39 +38,33 @@ _TIME = struct.Struct("<d")
 class Times:
     """When each control period was computed, in memory that the processes share."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.memory = mmap.mmap(-1, _TIME.size * PERIODS)
 
-    def put(self, index: int) -> None:
+    def put(self, index):
         _TIME.pack_into(self.memory, _TIME.size * index, time.monotonic())
 
-    def get(self) -> list[float]:
+    def get(self):
         times = [time_s for (time_s,) in _TIME.iter_unpack(self.memory[:])]
         return times[: times.index(0.0)] if 0.0 in times else times
 
 
-def run_publishing(times: Times, scenario: Path, out: Path) -> None:
+def run_publishing(times, scenario, out):
     """The command, with a callback that tells `times` of each period as soon as there is one."""
     run = runner.run
 
-    def published(
-        world: runner.Simulation,
-        recorder: Recorder | None,
-        full: bool,
-        keep: Callable[[Period], bool | None],
-        move: Callable[[], object] | None = None,
-    ) -> None:
-        def note(period: Period) -> bool | None:
+    def published(world, recorder, full, keep, move=None):
+        def note(period):
             times.put(period.index)
             return keep(period)
 
         run(world, recorder, full, note, move)
 
-    runner.run = published  # type: ignore[assignment]
+    runner.run = published
     main(["run", str(scenario), "--out", str(out), "--quiet"])
 
 
-def killed_run(scenario: Path, out: Path, delay_s: float) -> list[float]:
+def killed_run(scenario, out, delay_s):
     """Starts a run, kills it `delay_s` after its first control period, returns when its periods were computed."""
     times = Times()
     process = children.fork()
@@ -94,7 +83,7 @@ def killed_run(scenario: Path, out: Path, delay_s: float) -> list[float]:
     return times.get()
 
 
-def check(out: Path, times: list[float], digests: dict[int, str]) -> tuple[int, float]:
+def check(out, times, digests):
     """Periods that are missing, and for how long they had been there, in s. AssertionError for a bad rest."""
     left = sorted(path.name for path in out.parent.iterdir()), sorted(path.name for path in out.iterdir())
     assert left == (["long.toml", "out"], ["run.part.mcap"]), left
@@ -108,10 +97,10 @@ def check(out: Path, times: list[float], digests: dict[int, str]) -> tuple[int, 
     return max(computed - there, 0), loss_s
 
 
-def rounds(times: int, seed: int) -> None:
+def rounds(times, seed):
     """Raises AssertionError for the first round that goes wrong."""
     draw = random.Random(seed)
-    digests: dict[int, str] = {}
+    digests = {}
     losses = []
     for count in range(times):
         delay_s = draw.uniform(0.0, LATEST_KILL_S)

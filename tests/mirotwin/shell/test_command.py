@@ -33,11 +33,11 @@ class LookOptions(Options, frozen=True, kw_only=True):
     quiet: Annotated[bool, Option("-q", "--quiet", help="No lines.", apart="live")] = False
 
 
-taken: list[LookOptions] = []
+taken = []
 
 
 @command_of(LookOptions)
-def look(options: LookOptions) -> None:
+def look(options):
     """Looks.
 
     At FILE.

@@ -14,7 +14,7 @@ LINE = "written to " + "/a folder with a long name" * 12 + "/out.vcd"
 class Terminal(io.StringIO):
     """80 columns wide."""
 
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 

@@ -11,7 +11,7 @@ FORGED = "x\nall  100.0 %  forged"
 LOOP = ":0200000080FE80\n:00000001FF\n"
 
 
-def plain(text: str) -> bool:
+def plain(text):
     return all(char == "\n" or char.isprintable() for char in text)
 
 

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,7 +21,7 @@ PROGRAM = (
 LONGEST_S = 1.2
 
 
-def interrupted(delay_s: float, *arguments: str) -> tuple[int, bytes, bytes]:
+def interrupted(delay_s, *arguments):
     """Exit code, stdout and stderr of the program, which is interrupted so long after our first line of code ran."""
     with children.start(
         [sys.executable, "-c", PROGRAM, *arguments],
@@ -38,13 +37,13 @@ def interrupted(delay_s: float, *arguments: str) -> tuple[int, bytes, bytes]:
     return process.returncode, out, err
 
 
-def moments(count: int, seed: int) -> Iterator[float]:
+def moments(count, seed):
     draw = random.Random(seed)
     for _ in range(count):
         yield draw.uniform(0.0, LONGEST_S)
 
 
-def check(code: int, out: bytes, err: bytes) -> None:
+def check(code, out, err):
     if code == 0:
         assert err == b""
         assert out.endswith(b"bytes of 8192\n")
@@ -106,7 +105,7 @@ def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it():
 
 
 if __name__ == "__main__":  # python -m tests.mirotwin.shell.test_interrupt: 200 moments
-    ends: dict[int, int] = {}
+    ends = {}
     for moment in moments(200, 2):
         ended = interrupted(moment, "info")
         check(*ended)

@@ -10,13 +10,11 @@ from mirotwin.shell.progress import ProgressBar
 
 
 class Screen(io.StringIO):
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
-def drawn(
-    monkeypatch: pytest.MonkeyPatch, screen: io.StringIO, patience_s: float, quiet: bool = False
-) -> str:
+def drawn(monkeypatch, screen, patience_s, quiet=False):
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setattr(progress, "PATIENCE_S", patience_s)
     with ProgressBar("simulating", 10, quiet) as bar:

@@ -1,7 +1,5 @@
 """Times on the command line have their unit, everywhere the same ones."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import click

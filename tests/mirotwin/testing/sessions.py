@@ -7,7 +7,6 @@ import io
 import os
 import shlex
 import sys
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -34,7 +33,7 @@ class Done(NamedTuple):
     stderr: str
 
 
-def session(folder: Path, *arguments: object, tests: str = "", child: bool = False) -> Done:
+def session(folder, *arguments, tests="", child=False):
     """`tests`: the content of `test_mine.py`, whose imports are there already; "" for what stands there.
 
     It runs in this process, or with `child` in one of its own: where its modules or its workers matter.
@@ -50,7 +49,7 @@ def session(folder: Path, *arguments: object, tests: str = "", child: bool = Fal
     return Done(done.returncode, done.stdout, done.stderr)
 
 
-def _in_this_process(folder: Path, words: list[str]) -> Done:
+def _in_this_process(folder, words):
     """The modules of the folder are forgotten afterwards."""
     out, err = io.StringIO(), io.StringIO()
     path, environment = list(sys.path), dict(os.environ)
@@ -64,7 +63,7 @@ def _in_this_process(folder: Path, words: list[str]) -> Done:
     return Done(int(code), out.getvalue(), err.getvalue())
 
 
-def run(folder: Path, line: str) -> Done:
+def run(folder, line):
     """A line that a report printed, in the same folder."""
     program, *words = shlex.split(line)
     if program == "pytest":

@@ -1,7 +1,5 @@
 """What the link fixture does: sending, expecting, silence."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_exact.bad_input import BadInput

@@ -1,7 +1,5 @@
 """The marker of a test: which keys it has, and which one holds."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_exact.bad_input import BadInput

@@ -1,7 +1,5 @@
 """The pytest plugin as a user has it: sessions with fixtures, options and markers, and what failed tests leave."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The world of a test: when it begins, and how the checks judge it."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_exact.bad_input import BadInput

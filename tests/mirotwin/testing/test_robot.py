@@ -1,7 +1,5 @@
 """What the robot fixture does: wheels, breakpoints, memory, switches."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_exact.bad_input import BadInput

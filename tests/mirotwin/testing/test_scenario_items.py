@@ -1,7 +1,5 @@
 """pytest collects scenario files: as a user has it, in a session of its own."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 import pytest

@@ -16,7 +16,7 @@ from tests.mirotwin.conftest import mirotwin
 __all__ = ["mirotwin"]
 
 
-def tree(folder: Path) -> set[str]:
+def tree(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 

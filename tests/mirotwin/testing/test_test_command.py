@@ -1,7 +1,5 @@
 """`mirotwin test`: which files are tests, their verdicts, and what a failure leaves."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,6 @@
 """`--expect` and `[expect]` in `run` and `replay`: lines on stderr, exit codes, the summary."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ MISSED = ("--expect", "tracks_within_cm={limit_cm=1.9, from_s=0.0}")
 FAILURE = "tracks_within_cm: net0/robot0: tick 0 (0.000 ms): wanted at most 1.9 cm from the reference, found 2.000 cm"
 
 
-def summary(folder: Path) -> dict:
+def summary(folder):
     return json.loads((folder / "summary.json").read_text())
 
 

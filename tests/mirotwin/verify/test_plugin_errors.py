@@ -1,7 +1,5 @@
 """Mistakes of a user's plug-in, as each command tells them: file, line and function, exit code 2, no traceback."""
 
-from __future__ import annotations
-
 import re
 import sys
 
@@ -62,7 +60,7 @@ def here(tmp_path, monkeypatch):
         del sys.modules[name]
 
 
-def told(result: tuple[int, str, str]) -> str:
+def told(result):
     """The error's line, from stdout or stderr."""
     code, out, err = result
     assert code == 2

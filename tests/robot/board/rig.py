@@ -1,16 +1,13 @@
 """A board with a few assembled lines in its flash, on the bench: no radio, no motors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec
 
 from miro_robot.board import Board
 from miro_robot.image import Image, Symbol, Symbols
-from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
-from miro_robot.wiring import Wiring, load_wiring
+from miro_robot.wiring import load_wiring
 from tests.robot.mcs51.asm import assemble, labels_of
 
 CYCLE = 12
@@ -23,7 +20,7 @@ RESET = "CLR P2.5\nNOP\nNOP\nSETB P2.5\nMOV R6,#5\nwait:\nMOV R7,#0\nDJNZ R7,$\n
 """The reset handshake by waiting: 4 cycles to the end of the pulse, then 2575 cycles (the chip takes 2048)."""
 
 
-def image_of(text: str) -> Image:
+def image_of(text):
     """The assembled lines as an image; its labels are its symbols."""
     code = assemble(text)
     return Image(
@@ -36,13 +33,7 @@ def image_of(text: str) -> Image:
     )
 
 
-def board_with(
-    text: str,
-    wiring: Wiring | None = None,
-    stop_on_fault: bool = True,
-    options: Lm629Options | None = None,
-    plant: Plant | None = None,
-) -> Board:
+def board_with(text, wiring=None, stop_on_fault=True, options=None, plant=None):
     """The MIRO board, or one wired otherwise, with `text` in its flash and a silent radio."""
     board = Board(wiring or load_wiring(), plant or Plant(), 0, 3, options, stop_on_fault)
     board.load(image_of(text))
@@ -50,7 +41,7 @@ def board_with(
     return board
 
 
-def raw_movx_wiring() -> Wiring:
+def raw_movx_wiring():
     """What the manual of no chip recommends: the strobes of the LM629 on /WR and /RD of a MOVX, D7..D0 on P0, and
     the high address byte as PS (P2.0) and chip selects (P2.3, P2.4).
     """

@@ -1,7 +1,5 @@
 """The LM629's bus limits: each at its last tick that is too short and its first that is long enough."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ WRITING = (0, 1, 0, 0, 0x02)
 READING = (0, 0, 1, 0, 0x02)
 
 
-def broken_by(*edges: tuple[int, tuple[int, ...]]) -> list[str]:
+def broken_by(*edges):
     """Names of the limits that a list of edges breaks, from pins at rest."""
     timing = BusTiming()
     timing.rest(0, 0, 0, 0xFF)

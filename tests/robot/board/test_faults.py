@@ -3,8 +3,6 @@
 Ticks are counted by hand: 12 a machine cycle, LJMP takes 2 cycles, so `main` begins in cycle 2.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,12 +1,9 @@
 """The board tells a chip without a strobe less, and the chip ends in the same state as one that is told everything."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.state import snapshot
-from miro_robot.board import Board
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.wiring import CHIP_INPUTS
@@ -25,7 +22,7 @@ EDGES = st.lists(st.one_of(WRITE.map(lambda one: [one]), BYTE.map(lambda one: [o
 PULSE = [(CONTROL, IDLE & ~RESET)] * 5 + [(CONTROL, IDLE)]
 
 
-def tell_everything(board: Board, chips: dict[str, Lm629], ports: list[int], tick: int) -> None:
+def tell_everything(board, chips, ports, tick):
     banks = [*ports, *[0xFF] * 9]
     for side, chip in chips.items():
         levels = {}

@@ -1,7 +1,6 @@
 """A board file is built as it says, or refused in one line that names it: whatever numbers and nets it has."""
 
 from importlib import resources
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,7 @@ SOUND = {"address": "0x8000", "mask": "0xC000", "initial": "0"}
 FREE = ("P1.4", "P1.5", "P1.6", "P1.7", "P2.6", "P2.7", "P3.4", "P3.5", "P3.6", "P3.7")
 
 
-def made(folder: Path, text: str) -> Board:
+def made(folder, text):
     path = folder / "board.toml"
     path.write_text(text)
     return Board(load_wiring(path), Plant(), 0, 3)

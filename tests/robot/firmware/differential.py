@@ -12,9 +12,8 @@ shows it.
 
 import random
 import sys
-from collections.abc import Sequence
 
-from miro_protocol.decoder import Decoder, Received, Symbol
+from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.freshness import Freshness
 from miro_protocol.table import FRESH_AGAIN_TICKS, downlink
@@ -24,17 +23,17 @@ FRAMES_PER_RIG = 100
 LOOKING = 4 * MS  # the firmware has looked at a frame so long after its last character
 
 
-def frame(seq: int, n: int = 3, velocity: int = 1234, kind: int = 0) -> bytes:
+def frame(seq, n=3, velocity=1234, kind=0):
     return encode(TeamFrame(kind, seq, ((velocity, -velocity),) * n), n)
 
 
-def drawn_stream(seed: int, n: int, frames: int) -> list[Symbol]:
+def drawn_stream(seed, n, frames):
     """Frames, garbage, cuts, wrong bits, wrong stop bits and pauses of at most 20 us or at least 80 us."""
     draw = random.Random(seed)
-    symbols: list[Symbol] = []
+    symbols = []
     tick = 0
 
-    def put(byte: int, stop_good: bool = True, pause_us: int = 0) -> None:
+    def put(byte, stop_good=True, pause_us=0):
         nonlocal tick
         symbols.append((byte, stop_good, tick))
         tick += CHARACTER + pause_us * US
@@ -57,7 +56,7 @@ def drawn_stream(seed: int, n: int, frames: int) -> list[Symbol]:
     return symbols
 
 
-def at_the_edge(tick: int, freshness: Freshness) -> bool:
+def at_the_edge(tick, freshness):
     """Whether a frame comes within 0.2 ms of 150 ms after the last fresh one.
 
     The firmware measures that from a decoding time that interrupts stretch by up to 0.1 ms.
@@ -65,7 +64,7 @@ def at_the_edge(tick: int, freshness: Freshness) -> bool:
     return freshness.last_seq is not None and abs(tick - freshness.last_tick - FRESH_AGAIN_TICKS) <= 200 * US
 
 
-def compare(symbols: Sequence[Symbol], n: int, sent: Sequence[Symbol] | None = None) -> bool:
+def compare(symbols, n, sent=None):
     """AssertionError unless firmware and Python make the same of `symbols` (the firmware is sent `sent` instead).
 
     False if it ended early because a frame came right at the 150 ms edge.
@@ -89,19 +88,19 @@ def compare(symbols: Sequence[Symbol], n: int, sent: Sequence[Symbol] | None = N
     return True
 
 
-def _same(rig: Rig, decoder: Decoder, freshness: Freshness) -> None:
+def _same(rig, decoder, freshness):
     expected = (freshness.accepted, decoder.rejected, freshness.stale)
     assert rig.counters == expected, f"tick {rig.now}: firmware counts {rig.counters}, Python {expected}"
 
 
-def _same_frame(rig: Rig, event: Received, n: int, fresh: bool) -> None:
+def _same_frame(rig, event, n, fresh):
     address = iram("_body")
     body = bytes(rig.cpu.peek_iram(address + place) for place in range(downlink(n).body_size))
     assert body == event.body, f"firmware has {body.hex(' ')}, Python {event.body.hex(' ')}"
     assert not fresh or rig.u8("_last_hdr") == event.body[0]
 
 
-def main() -> int:
+def main():
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     done = cut = 0

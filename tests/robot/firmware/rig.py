@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
-from miro_protocol.decoder import Symbol
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.lm629.chip import Lm629
-from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
-from miro_robot.wiring import Wiring, load_wiring
+from miro_robot.wiring import load_wiring
 
 MS = 24_000
 US = 24
@@ -25,7 +21,7 @@ IMAGE = load_hex(image_path())
 BOOTED = 4 * MS
 
 
-def iram(name: str) -> int:
+def iram(name):
     """Address of a variable of the firmware."""
     symbol = IMAGE.symbols.find(name)
     assert symbol is not None, name
@@ -36,12 +32,12 @@ def iram(name: str) -> int:
 class Probe(Board):
     """Notes every change of a port the firmware makes. With `deaf` the wire /RD is broken: the bus reads FFh."""
 
-    def __init__(self, *args: object, **kwargs: object) -> None:
+    def __init__(self, *args, **kwargs):
         self.writes: list[tuple[int, int, int]] = []
         self.deaf = False
-        super().__init__(*args, **kwargs)  # type: ignore[arg-type]
+        super().__init__(*args, **kwargs)
 
-    def port_written(self, port: int, latch: int, tick: int) -> None:
+    def port_written(self, port, latch, tick):
         self.writes.append((tick, port, latch))
         super().port_written(port, latch | 0x02 if port == 2 and self.deaf else latch, tick)
 
@@ -58,15 +54,7 @@ class Command:
 class Rig:
     """One robot, `slot` of `n`. Time is `now`; characters are sent from then on and run by `run_to`."""
 
-    def __init__(
-        self,
-        slot: int = 0,
-        n: int = 3,
-        wiring: Wiring | None = None,
-        options: Lm629Options | None = None,
-        plant: Plant | None = None,
-        boot: bool = True,
-    ) -> None:
+    def __init__(self, slot=0, n=3, wiring=None, options=None, plant=None, boot=True):
         self.n = n
         self.board = Probe(wiring or load_wiring(), plant or Plant(), slot, n, options)
         self.cpu = self.board.cpu
@@ -83,7 +71,7 @@ class Rig:
 
     # ---- time ----------------------------------------------------------------------------------------------
 
-    def run_to(self, tick: int) -> None:
+    def run_to(self, tick):
         """Runs the board; no fault may come up."""
         while self.now < tick:
             until = min(tick, self.now + 100 * MS)
@@ -95,12 +83,12 @@ class Rig:
             self._listen()
         assert self.board.faults == [], self.board.faults
 
-    def run_ms(self, ms: float) -> None:
+    def run_ms(self, ms):
         self.run_to(self.now + int(ms * MS))
 
     # ---- radio -------------------------------------------------------------------------------------------
 
-    def send(self, data: bytes, at: int | None = None, bit: int = BIT, pauses: Iterable[int] = ()) -> int:
+    def send(self, data, at=None, bit=BIT, pauses=()):
         """Puts characters on RXD from tick `at` (default: as soon as the line is free).
 
         `pauses[i]` ticks follow character i. Returns the tick of the last start bit."""
@@ -112,7 +100,7 @@ class Rig:
             tick += 10 * bit + (extra[index] if index < len(extra) else 0)
         return start
 
-    def send_symbol(self, symbol: Symbol, bit: int = BIT) -> None:
+    def send_symbol(self, symbol, bit=BIT):
         """One character. A damaged one is low through the middle of its stop bit and high before its end."""
         byte, stop_good, tick = symbol
         assert tick >= self.line_free - bit // 4  # a stop bit may be cut, not left out
@@ -123,16 +111,16 @@ class Rig:
             self.pending.insert(-1, (tick + 9 * bit, 0))
         self.line_free = tick + 10 * bit
 
-    def team(self, seq: int, left: int, right: int, ask: bool = False, slot: int = 0) -> int:
+    def team(self, seq, left, right, ask=False, slot=0):
         """Sends a team frame in which `slot` gets these velocities; runs until it has been dealt with."""
         pairs = [(0, 0)] * self.n
         pairs[slot] = (left, right)
         return self.frame(encode(TeamFrame(3 if ask else 0, seq, tuple(pairs)), self.n))
 
-    def service(self, seq: int, slot: int, opcode: int, *values: int) -> int:
+    def service(self, seq, slot, opcode, *values):
         return self.frame(encode(ServiceFrame(seq, slot, opcode, values), self.n))
 
-    def frame(self, data: bytes, settle_ms: float = 4) -> int:
+    def frame(self, data, settle_ms=4):
         """Sends one frame and runs until it has been dealt with; returns the start of its last character."""
         last = self.send(data)
         self.run_to(last + CHARACTER + int(settle_ms * MS))
@@ -140,12 +128,12 @@ class Rig:
 
     # ---- what came of it -----------------------------------------------------------------------------------
 
-    def _listen(self) -> None:
+    def _listen(self):
         """Takes over the edges of TXD."""
         line = self.cpu.txd
         self.edges += [edge for edge in line.edges() if not self.edges or edge[0] > self.edges[-1][0]]
 
-    def sent(self) -> list[Symbol]:
+    def sent(self):
         """Characters on TXD so far, sampled in the middle of 2500-tick bits from each start edge."""
         level_at = _levels(self.edges)
         symbols, free = [], 0
@@ -158,31 +146,31 @@ class Rig:
             free = tick + 9 * BIT + BIT // 2
         return symbols
 
-    def told(self, chip: Lm629) -> list[Command]:
+    def told(self, chip):
         """The commands that `chip` got since the last call."""
         commands = [Command(*command) for command in chip.commands]
         chip.commands.clear()
         return commands
 
-    def u8(self, name: str) -> int:
+    def u8(self, name):
         return self.cpu.peek_iram(iram(name))
 
-    def u16(self, name: str) -> int:
+    def u16(self, name):
         address = iram(name)
         return self.cpu.peek_iram(address) | self.cpu.peek_iram(address + 1) << 8
 
-    def i16(self, name: str) -> int:
+    def i16(self, name):
         value = self.u16(name)
         return value - 0x10000 if value & 0x8000 else value
 
     @property
-    def counters(self) -> tuple[int, int, int]:
+    def counters(self):
         """(accepted, rejected, stale)"""
         return self.u16("_frames_accepted"), self.u16("_frames_rejected"), self.u16("_frames_stale")
 
 
-def _levels(edges: list[tuple[int, int]]):  # type: ignore[no-untyped-def]
-    def level_at(tick: int) -> int:
+def _levels(edges):
+    def level_at(tick):
         level = 1
         for at, after in edges:
             if at > tick:

@@ -6,27 +6,27 @@ from pathlib import Path
 import pytest
 
 from miro_robot.lm629.commands import BY_NAME, COMMANDS
-from tests.robot.firmware.rig import Command, Rig
+from tests.robot.firmware.rig import Rig
 
 PAGE = (Path(__file__).parents[3] / "robot_fw/README.md").read_text("utf-8")
 RDSIGS = 0x0C
 
 
-def rows(heading: str) -> list[list[str]]:
+def rows(heading):
     """The cells of the tables below a heading, without heads."""
     part = PAGE.split(f"### {heading}\n")[1].split("\n##")[0]
     lines = [line for line in part.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 
-def said(when: str) -> list[str]:
+def said(when):
     """What the page says a chip is told, as hex strings: the codes of its row."""
     (row,) = [row for row in rows("LM629: what a robot says, byte by byte") if row[0].startswith(when)]
     return [code.replace(" ", "").lower() for code in re.findall(r"`([^`]*)`", row[2])]
 
 
-def told(rig: Rig) -> list[list[str]]:
-    def text(command: Command) -> str:
+def told(rig):
+    def text(command):
         return f"{command.opcode:02x}{command.data.hex()}"
 
     return [

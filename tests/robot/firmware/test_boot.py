@@ -52,7 +52,7 @@ def test_the_robot_is_ready_within_three_milliseconds_and_sleeps(cold):
     assert cold.cpu.idle_cycles - idle > 0.9 * 20_000
 
 
-def broken_board(**nets: str) -> Rig:
+def broken_board(**nets):
     wiring = load_wiring()
     changed = {net.replace("_", "."): source for net, source in nets.items()}
     return Rig(wiring=msgspec.structs.replace(wiring, nets={**wiring.nets, **changed}), boot=False)

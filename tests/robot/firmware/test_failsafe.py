@@ -11,9 +11,7 @@ STOP, OFF = bytes.fromhex("0400"), bytes.fromhex("0100")
 PLACES = [(0, 3), (4, 5)]
 
 
-def driving(
-    place: tuple[int, int], velocity: int = 2279, chips: Lm629Options | None = None
-) -> tuple[Rig, int]:
+def driving(place, velocity=2279, chips=None):
     """A robot just told to drive at 0.2 m/s, and the tick of the last start bit."""
     rig = Rig(*place, options=chips)
     rig.run_ms(20)
@@ -23,7 +21,7 @@ def driving(
     return rig, last
 
 
-def stop_after_ms(rig: Rig, end: int) -> float:
+def stop_after_ms(rig, end):
     """From `end`, the end of the last fresh frame, to the smooth stop; the left wheel is told nothing in between."""
     rig.told(rig.board.left)
     rig.run_to(end + 116 * MS)
@@ -117,7 +115,7 @@ def test_a_long_step_is_fresh_again_from_150_ms_on(place):
         assert rig.counters == (accepted, 0, 2 - accepted), age
 
 
-def before_the_wrap() -> tuple[Rig, int]:
+def before_the_wrap():
     """A robot 86 ms before its counter of milliseconds wraps, and the tick at which it will."""
     rig = Rig()
     while rig.u8("_ticks") != 170:
@@ -154,7 +152,7 @@ ACCELERATION = 2
 LOADING_MS = [i / 10 for i in range(-6, 13)]
 
 
-def loading(place: tuple[int, int], chips: Lm629Options | None = None) -> tuple[Rig, int]:
+def loading(place, chips=None):
     """A robot that stops and has an acceleration to load, and the tick at which it begins to do so."""
     ticks = []
     for until in (None, 0):
@@ -181,7 +179,7 @@ def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(place, 
     assert 109.7 <= stop_after_ms(rig, end) <= 110
 
 
-def stop_behind(rig: Rig, seq: int, behind: int, at: int) -> float:
+def stop_behind(rig, seq, behind, at):
     """Milliseconds from the end of a frame that ends at `at`, with characters right after it, to the stop."""
     data = encode(TeamFrame(0, seq, ((1000, 1000),) * rig.n), rig.n)
     rig.send(data + bytes(behind), at=at - len(data) * CHARACTER)

@@ -13,7 +13,7 @@ SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
 VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
 
 
-def sdcc_version() -> str:
+def sdcc_version():
     if shutil.which("sdcc") is None or shutil.which("make") is None:
         return ""
     return children.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout

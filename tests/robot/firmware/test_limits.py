@@ -9,7 +9,7 @@ SP, PSW, PORT_2 = 0x81, 0xD0, 2
 CHIP_SELECTS, READ = 0x18, 0x02
 
 
-def busy_rig(n: int = 3) -> Rig:
+def busy_rig(n=3):
     """A robot that gets everything at once: polls, settings, damage, and telemetry on its way out."""
     rig = Rig(slot=0, n=n)
     seq = 0

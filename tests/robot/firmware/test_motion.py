@@ -15,11 +15,11 @@ def rig():
     return Rig()
 
 
-def register(velocity: int) -> str:
+def register(velocity):
     return f"{min(abs(velocity), 16633) << 8:08x}"
 
 
-def expected(velocity: int) -> list[tuple[int, bytes]]:
+def expected(velocity):
     control = "0808" if velocity < 0 else "1808"
     return [(LTRJ, bytes.fromhex(control + register(velocity))), (STT, b"")]
 

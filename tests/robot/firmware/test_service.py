@@ -4,7 +4,7 @@ import pytest
 
 from miro_protocol.frames import seal
 from miro_protocol.table import downlink
-from tests.robot.firmware.rig import MS, SAMPLE, Command, Rig
+from tests.robot.firmware.rig import MS, SAMPLE, Rig
 
 STT, UDF, LFIL, LTRJ, RDSIGS = 0x01, 0x04, 0x1E, 0x1F, 0x0C
 PING, FILTER, ACCELERATION = 0, 1, 2
@@ -16,7 +16,7 @@ def rig():
     return Rig(slot=1)
 
 
-def settings_of(commands: list[Command]) -> list[tuple[int, bytes]]:
+def settings_of(commands):
     return [(command.opcode, command.data) for command in commands if command.opcode != RDSIGS]
 
 
@@ -98,7 +98,7 @@ def test_an_acceleration_waits_through_the_failsafe_too(rig):
     assert start < rig.now < start + 50 * MS
 
 
-def unchecked(rig: Rig, seq: int, opcode: int, data: bytes) -> None:
+def unchecked(rig, seq, opcode, data):
     """A service frame that `encode` would refuse."""
     body = bytes([1 << 6 | seq, 1, opcode]) + data
     rig.frame(seal(downlink(3), body.ljust(1 + downlink(3).payload_size, b"\0")))

@@ -10,7 +10,7 @@ from miro_protocol.table import Flags
 from tests.robot.firmware.rig import CHARACTER, Rig
 
 
-def answers(rig: Rig) -> list[TelemetryFrame]:
+def answers(rig):
     events = TelemetryDecoder().feed_symbols(rig.sent())
     assert all(isinstance(event, Received) for event in events), events
     messages = [event.message(rig.n) for event in events if isinstance(event, Received)]

@@ -7,7 +7,7 @@ from miro_sim.plant.params import DriveParams
 from tests.robot.firmware.rig import SAMPLE, Rig
 
 
-def follow(rig: Rig, left_units: int, right_units: int, samples: int) -> list[tuple[int, int]]:
+def follow(rig, left_units, right_units, samples):
     """(position error left, right) at every LM629 sample, while frames keep the failsafe away."""
     errors = []
     for sample in range(samples):

@@ -1,7 +1,5 @@
 """A program built once for all tests of this folder."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.robot.inspect.programs import build

@@ -1,10 +1,7 @@
 """Small C programs, built by SDCC with its debug files, for tests of what reads those."""
 
-from __future__ import annotations
-
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -39,21 +36,21 @@ void main(void)
 """
 
 
-def line_of(text: str) -> int:
+def line_of(text):
     """Number of the line of PROGRAM that begins so."""
     return next(
         number for number, line in enumerate(PROGRAM.splitlines(), 1) if line.strip().startswith(text)
     )
 
 
-def build(folder: Path, text: str = PROGRAM, *options: str) -> Path:
+def build(folder, text=PROGRAM, *options):
     """`program.ihx` with everything that SDCC leaves beside it."""
     (folder / "program.c").write_text(text)
     _sdcc(folder, *(options or ("--debug",)), "program.c")
     return folder / "program.ihx"
 
 
-def build_modules(folder: Path, *modules: str) -> Path:
+def build_modules(folder, *modules):
     """An image of several C files that are in `folder` already; it has the first one's name."""
     for module in modules:
         _sdcc(folder, "--debug", "-c", f"{module}.c")
@@ -61,7 +58,7 @@ def build_modules(folder: Path, *modules: str) -> Path:
     return folder / f"{modules[0]}.ihx"
 
 
-def _sdcc(folder: Path, *arguments: str) -> None:
+def _sdcc(folder, *arguments):
     if shutil.which("sdcc") is None:
         assert not os.environ.get("CI"), "CI needs sdcc"
         pytest.skip("needs sdcc")

@@ -22,22 +22,22 @@ class Vcd:
     first_tick: int = 0
     last_tick: int = 0
 
-    def until(self, end_tick: int) -> dict[str, Changes]:
+    def until(self, end_tick):
         """What happened before a tick."""
         return {
             wire: [change for change in changes if change[0] < end_tick]
             for wire, changes in self.wires.items()
         }
 
-    def level_at(self, wire: str, tick: int) -> int | str:
+    def level_at(self, wire, tick):
         changes = self.wires[wire]
         return changes[bisect_right(changes, tick, key=lambda change: change[0]) - 1][1]
 
 
-def read(data: bytes) -> Vcd:
+def read(data):
     vcd = Vcd()
-    names: dict[str, str] = {}
-    scope: list[str] = []
+    names = {}
+    scope = []
     tick = -1
     for token in tokenize(io.BytesIO(data)):
         if token.kind is TokenKind.SCOPE:
@@ -67,7 +67,7 @@ def read(data: bytes) -> Vcd:
     return vcd
 
 
-def tick_of(nanoseconds: int) -> int:
+def tick_of(nanoseconds):
     """The one tick whose time, rounded down, is this."""
     tick = nanoseconds * 3 // 125
     while tick * 125 // 3 < nanoseconds:

@@ -1,7 +1,5 @@
 """Coverage says of each C line what its instructions did."""
 
-from __future__ import annotations
-
 import shutil
 
 from miro_robot.bare.machine import BareMachine

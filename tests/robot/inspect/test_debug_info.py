@@ -1,7 +1,5 @@
 """C lines and functions of an image: from the listing, from the .cdb, and without either."""
 
-from __future__ import annotations
-
 import re
 import shutil
 

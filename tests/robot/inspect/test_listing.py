@@ -1,7 +1,5 @@
 """The listing shows every byte once, and assembles to the image it came from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hypothesis import given, settings
@@ -16,7 +14,7 @@ from tests.robot.inspect.programs import build_modules
 from tests.robot.mcs51.asm import assemble
 
 
-def image_of(code: bytes, symbols: dict[str, Symbol] | None = None) -> Image:
+def image_of(code, symbols=None):
     return Image(
         path=Path("none.ihx"),
         code=code.ljust(0x10000, b"\xff"),

@@ -1,7 +1,5 @@
 """A trace has a line for each step, with what it changed."""
 
-from __future__ import annotations
-
 from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, InstructionTrace, registers
@@ -34,11 +32,11 @@ sub:
 """
 
 
-def traced(cycles: int, only: set[int] | None = None) -> list[str]:
+def traced(cycles, only=None):
     code = assemble(PROGRAM)
     cpu = Cpu(RecordingBus())
     cpu.load(code)
-    lines: list[str] = []
+    lines = []
     attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append, only))
     cpu.run(cycles)
     return lines
@@ -71,7 +69,7 @@ def test_sleep_is_one_line_however_the_run_is_cut():
     code = assemble("NOP\nMOV PCON,#01h\nSJMP $")
     cpu = Cpu(RecordingBus())
     cpu.load(code)
-    lines: list[str] = []
+    lines = []
     trace = InstructionTrace(SymbolNames(image_of(code)), lines.append, heading="heading")
     attach(cpu, trace)
     for cycle in (10, 20, 500):
@@ -84,7 +82,7 @@ def test_sleep_is_one_line_however_the_run_is_cut():
 def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
     code = assemble("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h")
     machine = BareMachine(image_of(code), code_in_xram=True)
-    lines: list[str] = []
+    lines = []
     attach(machine.cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     machine.run(max_cycles=30)
     shown = [line.split("MOV A,")[1].split()[0] for line in lines if "MOV A," in line]
@@ -106,7 +104,7 @@ def test_the_changed_registers_lead_from_the_first_state_to_the_last():
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     state = dict(zip(REGISTERS, registers(cpu), strict=True))
-    lines: list[str] = []
+    lines = []
     attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     cpu.run(24)  # before the first interrupt, which pushes
     for line in lines:
@@ -123,7 +121,7 @@ def test_of_a_program_that_changes_itself_only_so_many_instructions_are_remember
 
 
 def test_ports_show_the_pins_that_changed():
-    lines: list[str] = []
+    lines = []
     code = assemble("CLR P1.3\nMOV P1,#5Ah\nMOV P1,#5Ah\nSETB P1.0\nMOV P2,#0Fh\nNOP")
     cpu = Cpu(RecordingBus())
     cpu.load(code)

@@ -1,10 +1,7 @@
 """Variables are read by the names and types of the debug file: the shipped firmware's, and those of a program."""
 
-from __future__ import annotations
-
 import re
 import shutil
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,7 +9,7 @@ from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_robot.image.c_types import CType, bytes_of, type_named, type_of, value_of
 from miro_robot.image.variables import parse_variables, variables_of
 from miro_robot.inspect.values import read_value, write_value
@@ -68,7 +65,7 @@ def program(tmp_path_factory):
     return load_hex(folder / "typed.ihx")
 
 
-def at_rest(image: Image) -> Cpu:
+def at_rest(image):
     cpu = Cpu(Bus())
     cpu.load(image.code, image.used)
     cpu.run(100_000)
@@ -80,7 +77,7 @@ def cpu(program):
     return at_rest(program)
 
 
-VALUES: dict[str, Any] = {
+VALUES = {
     "sc": -3,
     "uc": 200,
     "pc": 65,

@@ -63,7 +63,7 @@ inner:
 class Log(Watcher):
     """Notes everything it is told in the words of the naive twin."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.steps: list[watching.Step] = []
 
     def executed(self, cpu, pc, start):
@@ -76,7 +76,7 @@ class Log(Watcher):
         self.steps.append(watching.Step("sleep", cpu.pc, start, end, cpu.pc, cpu.sp))
 
 
-def program(th0: int, th1: int, ip: int, ie: int, loops: int) -> bytes:
+def program(th0, th1, ip, ie, loops):
     return assemble(BUSY.format(th0=th0, th1=th1, ip=ip, ie=ie | 0x80, loops=loops))
 
 
@@ -91,18 +91,18 @@ PROGRAMS = st.builds(
 CUTS = st.lists(st.integers(1, 700), min_size=1, max_size=12)
 
 
-def cpu_of(code: bytes) -> Cpu:
+def cpu_of(code):
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     return cpu
 
 
-def run(cpu: Cpu, cuts: list[int]) -> None:
+def run(cpu, cuts):
     for cut in cuts:
         cpu.run(cpu.cycles + cut)
 
 
-def shown(steps: list[watching.Step]) -> list[tuple[str, int]]:
+def shown(steps):
     """Instructions and calls in their order; where sleep is cut depends on who looks."""
     return [(step.kind, step.start) for step in steps if step.kind != "sleep"]
 
@@ -153,7 +153,7 @@ def test_a_jump_is_counted_as_taken_only_when_it_leaves():
     assert (counters.executed_at(2), counters.jumped_at(2)) == (3, 2)
 
 
-def timer_latencies(text: str) -> tuple[int, int]:
+def timer_latencies(text):
     """(worst latency, how often) of timer 0 in a program that gets to its main loop at `main`."""
     cpu = cpu_of(assemble("LJMP main\nORG 0Bh\nRETI\nmain:\n" + text))
     activity = Activity()

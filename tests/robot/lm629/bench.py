@@ -5,8 +5,6 @@ Only what several tests need; the sequences under test stand in the tests.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.options import Lm629Options
@@ -18,21 +16,21 @@ CYCLE = 12
 class Bench:
     """`edges` collects (tick, pwm, sign, hi) at every change of the output pins."""
 
-    def __init__(self, chip: Lm629 | None = None, tick: int = 0) -> None:
+    def __init__(self, chip=None, tick=0):
         self.chip = Lm629() if chip is None else chip
         self.tick = tick
         self.edges: list[tuple[int, int, int, int]] = []
         self.pins = (1, 1, 1, 1, 0xFF)
 
     @classmethod
-    def running(cls, **options: object) -> Bench:
+    def running(cls, **options):
         """A bench whose chip has gone through the reset handshake."""
-        bench = cls(Lm629(Lm629Options(**options)))  # type: ignore[arg-type]
+        bench = cls(Lm629(Lm629Options(**options)))
         bench.reset()
         bench.command("RSTI", 0)
         return bench
 
-    def wait(self, ticks: int) -> None:
+    def wait(self, ticks):
         end = self.tick + ticks
         while self.chip.next_tick <= end:
             now = self.chip.next_tick
@@ -40,12 +38,12 @@ class Bench:
             self.note(now)
         self.tick = end
 
-    def note(self, tick: int) -> None:
+    def note(self, tick):
         state = (self.chip.pwm, self.chip.sign, self.chip.hi)
         if not self.edges or self.edges[-1][1:] != state:
             self.edges.append((tick, *state))
 
-    def drive(self, **levels: int) -> None:
+    def drive(self, **levels):
         """Change pins now, then let one machine cycle pass."""
         cs, rd, wr, ps, data = self.pins
         named = {"cs": cs, "rd": rd, "wr": wr, "ps": ps, "data": data} | levels
@@ -54,20 +52,20 @@ class Bench:
         self.note(self.tick)
         self.wait(CYCLE)
 
-    def reset(self, wait: bool = True) -> None:
+    def reset(self, wait=True):
         self.chip.set_reset(self.tick, 0)
         self.wait(5 * CYCLE)
         self.chip.set_reset(self.tick, 1)
         if wait:
             self.wait(3 * SAMPLE_TICKS + 4)
 
-    def write(self, ps: int, byte: int) -> None:
+    def write(self, ps, byte):
         self.drive(ps=ps, data=byte, cs=0)
         self.drive(wr=0)
         self.drive(wr=1)
         self.drive(cs=1)
 
-    def read(self, ps: int) -> int:
+    def read(self, ps):
         self.drive(ps=ps, data=0xFF, cs=0)
         self.drive(rd=0)
         byte = self.chip.data_out(self.tick)
@@ -75,25 +73,25 @@ class Bench:
         self.drive(cs=1)
         return byte
 
-    def status(self) -> int:
+    def status(self):
         return self.read(0)
 
-    def ready(self) -> None:
+    def ready(self):
         while self.status() & 1:
             pass
 
-    def word(self, word: int) -> None:
+    def word(self, word):
         self.ready()
         self.write(1, word >> 8)
         self.write(1, word & 0xFF)
 
-    def command(self, name: str, *words: int) -> None:
+    def command(self, name, *words):
         self.ready()
         self.write(0, BY_NAME[name].opcode)
         for word in words:
             self.word(word)
 
-    def ask(self, name: str, signed: bool = True) -> int:
+    def ask(self, name, signed=True):
         """A reading command and its answer."""
         self.command(name)
         answer = bytearray()
@@ -102,26 +100,26 @@ class Bench:
             answer += bytes((self.read(1), self.read(1)))
         return int.from_bytes(answer, "big", signed=signed)
 
-    def signals(self) -> int:
+    def signals(self):
         return self.ask("RDSIGS", signed=False)
 
-    def load(self, control: int, *values: int) -> None:
+    def load(self, control, *values):
         """LTRJ with 32-bit parameters."""
         words = [word for value in values for word in (value >> 16 & 0xFFFF, value & 0xFFFF)]
         self.command("LTRJ", control, *words)
 
-    def filter(self, kp: int = 0, ki: int = 0, kd: int = 0, il: int = 0, ds: int = 0) -> None:
+    def filter(self, kp=0, ki=0, kd=0, il=0, ds=0):
         self.command("LFIL", ds << 8 | 0x0F, kp, ki, kd, il)
         self.command("UDF")
 
-    def sample(self, count: int = 1) -> None:
+    def sample(self, count=1):
         """To the next sample boundary, `count` times."""
         for _ in range(count):
             self.wait(self.chip.sample_tick - self.tick)
 
-    def turn(self, counts: int) -> None:
+    def turn(self, counts):
         """Turn the encoder, as fast as the chip can follow, from a place that is a multiple of 4 counts."""
-        states: Sequence[tuple[int, int]] = ((0, 0), (1, 0), (1, 1), (0, 1))
+        states = ((0, 0), (1, 0), (1, 1), (0, 1))
         for n in range(1, abs(counts) + 1):
             a, b = states[(n if counts > 0 else -n) % 4]
             self.chip.set_encoder(self.tick, a, b)

@@ -5,14 +5,11 @@ suite and new ones each time, until the process has used so much CPU time. A tes
 does in the suite, and is not called again. Hypothesis keeps the example, so that `pytest` shows it again.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from hypothesis import HealthCheck, is_hypothesis_test, settings
@@ -23,7 +20,7 @@ ROUND = 10
 """Times the examples of the test suite."""
 
 
-def properties() -> Iterator[Callable[[], None]]:
+def properties():
     """The tests of this folder that take drawn input. They read the profile when they are imported."""
     for path in sorted(Path(__file__).parent.glob("test_*.py")):
         module = importlib.import_module(f"{__package__}.{path.stem}")
@@ -35,21 +32,21 @@ def properties() -> Iterator[Callable[[], None]]:
 class Counted:
     """A test that counts the examples it was called with and the CPU time it took."""
 
-    def __init__(self, test: Callable[[], None]) -> None:
+    def __init__(self, test):
         self.test = test
         self.examples = 0
         self.seconds = 0.0
         self.failed = False
-        handle = test.hypothesis  # type: ignore[attr-defined]
+        handle = test.hypothesis
         inner = handle.inner_test
 
-        def count(*arguments: object, **named: object) -> None:
+        def count(*arguments, **named):
             self.examples += 1
             inner(*arguments, **named)
 
         handle.inner_test = count
 
-    def call(self) -> None:
+    def call(self):
         begin = time.process_time()
         try:
             self.test()
@@ -58,12 +55,12 @@ class Counted:
             traceback.print_exc()
         self.seconds += time.process_time() - begin
 
-    def line(self) -> str:
+    def line(self):
         verdict = "FAILED" if self.failed else "ok"
         return f"{self.examples:9} examples {self.seconds:7.0f} s  {verdict:6}  {self.test.__name__}"
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments):
     parser = argparse.ArgumentParser(prog="python -m tests.robot.lm629.long")
     parser.add_argument("--minutes", type=float, default=30.0, help="CPU time, in whole rounds (default 30)")
     wanted = parser.parse_args(arguments).minutes * 60

@@ -1,23 +1,20 @@
 """The chip and its slow twin on one bench, compared after every step."""
 
-from __future__ import annotations
-
 from miro_robot.lm629.chip import Lm629
-from miro_robot.lm629.options import Lm629Options
 from tests.naive.lm629 import NaiveLm629
 
 
 class Pair:
     """Looks like a chip to a `Bench`."""
 
-    def __init__(self, options: Lm629Options) -> None:
+    def __init__(self, options):
         self.chip = Lm629(options)
         self.naive = NaiveLm629(options)
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name):
         return getattr(self.chip, name)
 
-    def compare(self, tick: int) -> None:
+    def compare(self, tick):
         chip, naive = self.chip, self.naive
         loaded, gains = chip.trajectory_buffer, chip.filter_buffer
         ours = {
@@ -56,25 +53,25 @@ class Pair:
         }
         assert ours == theirs, f"at tick {tick}"
 
-    def advance(self, tick: int) -> None:
+    def advance(self, tick):
         self.chip.advance(tick)
         self.naive.run_to(tick)
         self.compare(tick)
 
-    def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
+    def set_bus(self, tick, cs, rd, wr, ps, data):
         self.chip.set_bus(tick, cs, rd, wr, ps, data)
         self.naive.set_bus(tick, cs, rd, wr, ps, data)
         self.compare(tick)
 
-    def set_reset(self, tick: int, level: int) -> None:
+    def set_reset(self, tick, level):
         self.chip.set_reset(tick, level)
         self.naive.set_reset(tick, level)
         self.compare(tick)
 
-    def set_encoder(self, tick: int, a: int, b: int) -> None:
+    def set_encoder(self, tick, a, b):
         self.chip.set_encoder(tick, a, b)
         self.naive.set_encoder(tick, a, b)
 
-    def set_index(self, tick: int, level: int) -> None:
+    def set_index(self, tick, level):
         self.chip.set_index(tick, level)
         self.naive.set_index(tick, level)

@@ -3,16 +3,13 @@
 `python -m tests.robot.lm629.session ENGINE SEED STEPS` prints the digest of everything the session saw.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
-from collections.abc import Iterator
 
 from miro_exact import engine
 
 
-def numbers(seed: int) -> Iterator[int]:
+def numbers(seed):
     """A 64-bit linear congruential generator, upper half."""
     state = seed
     while True:
@@ -20,14 +17,14 @@ def numbers(seed: int) -> Iterator[int]:
         yield state >> 32
 
 
-def steps(seed: int, count: int) -> Iterator[tuple[int, ...]]:
+def steps(seed, count):
     """(kind, a, b, c, d): what the session does, one step after the other."""
     draw = numbers(seed)
     for _ in range(count):
         yield tuple(next(draw) for _ in range(5))
 
 
-def play(bench: object, step: tuple[int, ...], place: int) -> int:
+def play(bench, step, place):
     """One step on a `Bench`; returns where the wheel stands."""
     from tests.robot.lm629.bench import Bench
 
@@ -67,7 +64,7 @@ def play(bench: object, step: tuple[int, ...], place: int) -> int:
     return place
 
 
-def digest(seed: int, count: int) -> str:
+def digest(seed, count):
     from miro_exact.state import snapshot  # a hot module: not before the engine was chosen
     from tests.robot.lm629.bench import Bench
 

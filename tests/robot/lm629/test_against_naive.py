@@ -1,7 +1,5 @@
 """Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest
@@ -33,7 +31,7 @@ FLAGS = st.sampled_from([0, 0x7E, 0x3E, 0xFFFF]) | st.integers(0, 0xFFFF)
 
 
 @st.composite
-def trajectories(draw: st.DrawFn) -> tuple[object, ...]:
+def trajectories(draw):
     control = draw(CONTROLS)
     values = []
     for bit, choice in ((0x20, ACCELERATIONS), (0x08, VELOCITIES), (0x02, POSITIONS)):
@@ -130,23 +128,23 @@ OPTIONS = st.just(DEFAULT_OPTIONS) | OPTIONS
 class Session(Bench):
     """A bench for two that remembers where the wheel stands."""
 
-    def __init__(self, pair: Pair, tick: int) -> None:
-        super().__init__(pair, tick)  # type: ignore[arg-type]
+    def __init__(self, pair, tick):
+        super().__init__(pair, tick)
         self.pair = pair
         self.place = 0
 
-    def turn(self, counts: int) -> None:
+    def turn(self, counts):
         for _ in range(abs(counts)):
             self.place += 1 if counts > 0 else -1
             a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.place % 4]
             self.chip.set_encoder(self.tick, a, b)
             self.wait(30)
 
-    def index(self, level: int) -> None:
+    def index(self, level):
         self.chip.set_index(self.tick, level)
         self.wait(60)
 
-    def find_index(self, turns: int) -> None:
+    def find_index(self, turns):
         """SIP, then the index while both phases are low."""
         self.command("SIP")
         self.turn(turns - self.place)
@@ -155,7 +153,7 @@ class Session(Bench):
         self.sample()
         self.index(1)
 
-    def slow_write(self, ps: int, byte: int, ticks: int) -> None:
+    def slow_write(self, ps, byte, ticks):
         """A strobe during which the chip may become free."""
         self.drive(ps=ps, data=byte, cs=0)
         self.drive(wr=0)
@@ -163,19 +161,19 @@ class Session(Bench):
         self.drive(wr=1)
         self.drive(cs=1)
 
-    def glitches(self, levels: list[tuple[int, ...]]) -> None:
+    def glitches(self, levels):
         """Pins as they come; then the bus rests."""
         for cs, rd, wr, ps, data in levels:
             self.drive(cs=cs, rd=rd, wr=wr, ps=ps, data=data)
         self.drive(cs=1, rd=1, wr=1)
 
-    def hurry(self, name: str, byte: int) -> None:
+    def hurry(self, name, byte):
         """A command, and without a look at the busy bit a byte to each port."""
         self.command(name)
         self.write(1, byte)
         self.write(0, byte)
 
-    def half_a_word(self, first: str, second: str, *data: int) -> None:
+    def half_a_word(self, first, second, *data):
         """A command that comes between the two bytes of another one's word."""
         self.command(first)
         self.ready()
@@ -188,7 +186,7 @@ class Session(Bench):
             else:
                 self.write(1, byte)
 
-    def excess(self, threshold: int) -> None:
+    def excess(self, threshold):
         """An error that outlasts a reset of its flag."""
         self.command("LPEI", threshold)
         self.go(("load", 0x002A, 0x10000, 0x40000, self.pair.chip.real_position + 100), 12)
@@ -196,13 +194,13 @@ class Session(Bench):
             self.command("RSTI", 0)
             self.sample(2)
 
-    def index_over_reset(self) -> None:
+    def index_over_reset(self):
         self.find_index(4)
         self.command("SIP")
         self.command("RESET")
         self.wait(30_000)
 
-    def home_loaded(self, counts: int, position: int) -> None:
+    def home_loaded(self, counts, position):
         """DFH while a target is loaded and not started."""
         self.sample()
         self.turn(counts)
@@ -210,12 +208,12 @@ class Session(Bench):
         self.load(0x0002, position)
         self.command("DFH")
 
-    def ask_between_samples(self, counts: int) -> None:
+    def ask_between_samples(self, counts):
         self.sample()
         self.turn(counts)
         self.ask("RDRP")
 
-    def stress(self, error: int, kp: int, ki: int, il: int) -> None:
+    def stress(self, error, kp, ki, il):
         """A large error in a closed loop, and what the integral term makes of it."""
         self.filter(kp=kp, ki=ki, il=il)
         self.load(0x0200)
@@ -226,7 +224,7 @@ class Session(Bench):
         self.sample(3)
         self.ask("RDSUM")
 
-    def stops(self, error: int, word: int) -> None:
+    def stops(self, error, word):
         """A stop out of motion and drive, and another STT after it."""
         self.stress(error, 100, 0, 0)
         self.go(("load", 0x002A, 0x10000, 0x40000, self.pair.chip.real_position + error), 3)
@@ -234,18 +232,18 @@ class Session(Bench):
         self.command("STT")
         self.sample(2)
 
-    def nudge(self, counts: int, samples: int) -> None:
+    def nudge(self, counts, samples):
         """A relative target in mid-motion."""
         self.load(0x0003, counts)
         self.command("STT")
         self.sample(samples)
 
-    def go(self, load: tuple[int, ...], samples: int) -> None:
+    def go(self, load, samples):
         self.load(*load[1:])
         self.command("STT")
         self.sample(samples)
 
-    def go_twice(self, first: tuple[int, ...], second: tuple[int, ...]) -> None:
+    def go_twice(self, first, second):
         """Load again between STT and the sample that executes it."""
         self.load(*first[1:])
         self.sample()
@@ -255,26 +253,26 @@ class Session(Bench):
         self.command("STT")
         self.sample(2)
 
-    def retune(self, kd: int, ds: int, samples: int) -> None:
+    def retune(self, kd, ds, samples):
         """New coefficients in the midst of a derivative interval."""
         for _ in range(2):
             self.filter(kp=1, kd=kd, ds=ds)
             self.sample(samples)
 
-    def cross(self, border: int, counts: int) -> None:
+    def cross(self, border, counts):
         """Turn over the border of the position space."""
         self.jump(border)
         self.turn(counts)
         self.sample()
 
-    def pass_breakpoint(self, away: int, counts: int) -> None:
+    def pass_breakpoint(self, away, counts):
         place = self.pair.chip.real_position + away
         self.command("SBPA", place >> 16 & 0xFFFF, place & 0xFFFF)
         self.sample()
         self.turn(counts)
         self.sample()
 
-    def jump(self, position: int) -> None:
+    def jump(self, position):
         """Put the axis elsewhere, behind the chips' backs."""
         pair = self.pair
         pair.chip.real_position = position
@@ -282,11 +280,11 @@ class Session(Bench):
         pair.naive.real = position
         pair.naive.desired = Fraction(position)
 
-    def wind_up(self, error_sum: int) -> None:
+    def wind_up(self, error_sum):
         self.pair.chip.pid.error_sum = error_sum
         self.pair.naive.pid.sum = error_sum
 
-    def pulse(self, ticks: int) -> None:
+    def pulse(self, ticks):
         self.chip.set_reset(self.tick, 0)
         self.wait(ticks)
         self.chip.set_reset(self.tick, 1)

@@ -1,7 +1,5 @@
 """What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_robot.lm629.commands import BY_NAME, COMMANDS
@@ -10,7 +8,7 @@ from tests.robot.lm629.bench import Bench
 MOTOR_OFF, BREAKPOINT, EXCESS, WRAP, INDEX, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02
 
 
-def send(bench: Bench, text: str) -> None:
+def send(bench, text):
     """`opcode | word word | word ...`, words in hex; several commands parted by `;`."""
     for command in text.split(";"):
         opcode, *words = command.replace("|", " ").split()
@@ -21,7 +19,7 @@ def send(bench: Bench, text: str) -> None:
     bench.ready()
 
 
-def moving(acceleration: int = 0x8000, velocity: int = 0x20000, position: int = 1000) -> Bench:
+def moving(acceleration=0x8000, velocity=0x20000, position=1000):
     """A position move that has run for 5 samples."""
     bench = Bench.running()
     bench.load(0x002A, acceleration, velocity, position)

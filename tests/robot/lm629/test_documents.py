@@ -1,7 +1,5 @@
 """Command sequences of the data sheet, the programming guide and drivers of real chips that no other page plays."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest
@@ -92,18 +90,18 @@ def test_polling_busy_before_each_byte_does_no_harm():
     assert bytes(answer) == b"\x01\x80"
 
 
-def command_error(bench: Bench) -> None:
+def command_error(bench):
     bench.ready()
     bench.write(0, 0x55)
 
 
-def trajectory_complete(bench: Bench) -> None:
+def trajectory_complete(bench):
     bench.load(0x002A, 0x8000, 0x20000, 2)
     bench.command("STT")
     bench.sample(10)
 
 
-def index_pulse(bench: Bench) -> None:
+def index_pulse(bench):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.command("SIP")
     bench.chip.set_index(bench.tick, 0)
@@ -111,21 +109,21 @@ def index_pulse(bench: Bench) -> None:
     bench.sample()
 
 
-def wrap_around(bench: Bench) -> None:
+def wrap_around(bench):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.chip.real_position = -(2**30)
     bench.turn(-4)
     bench.sample()
 
 
-def excessive_error(bench: Bench) -> None:
+def excessive_error(bench):
     bench.command("LPEI", 1)
     bench.load(0x002A, 0x8000, 0x20000, 1000)
     bench.command("STT")
     bench.sample(5)
 
 
-def breakpoint_reached(bench: Bench) -> None:
+def breakpoint_reached(bench):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.command("SBPA", 0, 4)
     bench.turn(8)

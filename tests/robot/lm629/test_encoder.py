@@ -1,7 +1,5 @@
 """The encoder inputs: filter, counting and index capture, against a sampler that looks at every clock."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

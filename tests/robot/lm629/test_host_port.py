@@ -41,7 +41,7 @@ def test_busy_lasts_120_clocks_after_a_command_byte_and_after_the_second_byte_of
     bench = Bench.running()
     bench.ready()
 
-    def busy_span() -> int:
+    def busy_span():
         start, spans = bench.tick, 0
         while bench.chip.status_at(start + spans) & 1:
             spans += 1
@@ -236,4 +236,4 @@ def test_options_that_make_no_sense_are_refused():
     with pytest.raises(ValueError, match="busy_clocks must be"):
         Lm629Options(busy_clocks=-1)
     with pytest.raises(ValueError, match="relative_base must be one of"):
-        Lm629Options(relative_base="elsewhere")  # type: ignore[arg-type]
+        Lm629Options(relative_base="elsewhere")

@@ -1,7 +1,5 @@
 """Every rule that was chosen can be read the other way, and then the chip does otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,18 +16,18 @@ ACQUIRE_INDEX = 0x0001
 README = Path(__file__).parents[3] / "robot_fw/miro_robot/lm629/README.md"
 
 
-def flags(bench: Bench) -> int:
+def flags(bench):
     bench.ready()
     return bench.chip.status
 
 
-def busy_ticks(bench: Bench) -> int:
+def busy_ticks(bench):
     bench.ready()
     bench.write(0, 0x02)
     return sum(bench.chip.status_at(bench.tick + n) & 1 for n in range(1000))
 
 
-def lost_writes(bench: Bench) -> int:
+def lost_writes(bench):
     """A strobe that begins while the chip is busy and ends when it no longer is."""
     bench.command("DFH")
     bench.drive(ps=0, data=0x02, cs=0)
@@ -39,7 +37,7 @@ def lost_writes(bench: Bench) -> int:
     return bench.chip.writes_while_busy
 
 
-def mask_after_one_byte(bench: Bench) -> int:
+def mask_after_one_byte(bench):
     """Half a word for LPEI, then MSKI and a single byte."""
     bench.command("LPEI")
     bench.ready()
@@ -50,7 +48,7 @@ def mask_after_one_byte(bench: Bench) -> int:
     return bench.chip.signals.mask
 
 
-def threshold_after_one_byte(bench: Bench) -> int:
+def threshold_after_one_byte(bench):
     """The same with LPEI, whose value is the whole word."""
     bench.command("MSKI")
     bench.ready()
@@ -61,8 +59,8 @@ def threshold_after_one_byte(bench: Bench) -> int:
     return bench.chip.threshold
 
 
-def error_after(*steps: tuple[object, ...]) -> Callable[[Bench], int]:
-    def run(bench: Bench) -> int:
+def error_after(*steps):
+    def run(bench):
         bench.ready()
         for name, *arguments in steps:
             getattr(bench, str(name))(*arguments)
@@ -71,12 +69,12 @@ def error_after(*steps: tuple[object, ...]) -> Callable[[Bench], int]:
     return run
 
 
-def velocity_too_large(bench: Bench) -> int:
+def velocity_too_large(bench):
     bench.load(0x0008, 0x80000002)
     return bench.chip.trajectory_buffer.velocity
 
 
-def hi_when_unmasked_later(bench: Bench) -> int:
+def hi_when_unmasked_later(bench):
     bench.command("MSKI", 0)
     move(bench, position=2)
     bench.sample(10)
@@ -84,14 +82,14 @@ def hi_when_unmasked_later(bench: Bench) -> int:
     return bench.chip.hi
 
 
-def move(bench: Bench, position: int = 1000, samples: int = 5) -> Bench:
+def move(bench, position=1000, samples=5):
     bench.load(0x002A, 0x8000, 0x20000, position)
     bench.command("STT")
     bench.sample(samples)
     return bench
 
 
-def excess_again(bench: Bench) -> int:
+def excess_again(bench):
     move(bench)
     bench.command("LPEI", 1)
     bench.sample()
@@ -100,8 +98,8 @@ def excess_again(bench: Bench) -> int:
     return bench.chip.status & EXCESS
 
 
-def after_reset(what: Callable[[Bench], int], samples: int = 0) -> Callable[[Bench], int]:
-    def run(bench: Bench) -> int:
+def after_reset(what, samples=0):
+    def run(bench):
         bench.wait(1000)
         bench.reset()
         bench.sample(samples)
@@ -110,7 +108,7 @@ def after_reset(what: Callable[[Bench], int], samples: int = 0) -> Callable[[Ben
     return run
 
 
-def ticks_to_84h(bench: Bench) -> int:
+def ticks_to_84h(bench):
     bench.reset(wait=False)
     ticks = 0
     while bench.chip.status_at(bench.tick) != 0x84:
@@ -119,15 +117,15 @@ def ticks_to_84h(bench: Bench) -> int:
     return ticks
 
 
-def status_while_resetting(bench: Bench) -> int:
+def status_while_resetting(bench):
     bench.command("RESET")
     return bench.status()
 
 
-def after_software_reset(bit: int, *before: tuple[object, ...]) -> Callable[[Bench], int]:
-    def run(bench: Bench) -> int:
+def after_software_reset(bit, *before):
+    def run(bench):
         for name, *arguments in before:
-            bench.command(str(name), *arguments)  # type: ignore[arg-type]
+            bench.command(str(name), *arguments)
         bench.command("RESET")
         bench.wait(30_000)
         return bench.signals() & bit
@@ -135,14 +133,14 @@ def after_software_reset(bit: int, *before: tuple[object, ...]) -> Callable[[Ben
     return run
 
 
-def status_after_a_short_pulse(bench: Bench) -> int:
+def status_after_a_short_pulse(bench):
     bench.chip.set_reset(bench.tick, 0)
     bench.chip.set_reset(bench.tick + 28, 1)
     bench.wait(30_000)
     return bench.status()
 
 
-def target_loaded_after_stt(bench: Bench) -> int:
+def target_loaded_after_stt(bench):
     bench.load(0x002A, 0x8000, 0x20000, 1000)
     bench.sample()
     bench.command("STT")
@@ -151,14 +149,14 @@ def target_loaded_after_stt(bench: Bench) -> int:
     return bench.chip.trajectory.target
 
 
-def stop_with_new_acceleration(bench: Bench) -> int:
+def stop_with_new_acceleration(bench):
     move(bench)
     bench.load(0x0420, 0x4000)
     bench.command("STT")
     return flags(bench) & ERROR
 
 
-def velocity_at_the_second_stt(bench: Bench) -> int:
+def velocity_at_the_second_stt(bench):
     move(bench)
     bench.load(0x0400)
     bench.command("STT")
@@ -168,7 +166,7 @@ def velocity_at_the_second_stt(bench: Bench) -> int:
     return bench.chip.desired_velocity
 
 
-def velocity_not_sent(bench: Bench) -> int:
+def velocity_not_sent(bench):
     move(bench)
     bench.load(0x0008, 0x30000)
     bench.load(0x0002, 2000)
@@ -177,14 +175,14 @@ def velocity_not_sent(bench: Bench) -> int:
     return bench.chip.trajectory.max_velocity
 
 
-def relative_velocity(bench: Bench) -> int:
+def relative_velocity(bench):
     move(bench)
     bench.load(0x0008, 0x30000)
     bench.load(0x000C, 0x100)
     return bench.chip.trajectory_buffer.velocity
 
 
-def relative_position(bench: Bench) -> int:
+def relative_position(bench):
     move(bench)
     desired = bench.chip.desired_position
     bench.load(0x0003, 100)
@@ -194,21 +192,21 @@ def relative_position(bench: Bench) -> int:
     return bench.chip.trajectory.target - 100
 
 
-def turned(bench: Bench, counts: int) -> Bench:
+def turned(bench, counts):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.sample()
     bench.turn(counts)
     return bench
 
 
-def target_after_home(bench: Bench) -> int:
+def target_after_home(bench):
     turned(bench, 8).sample()
     bench.load(0x0002, 100)
     bench.command("DFH")
     return bench.chip.trajectory_buffer.position
 
 
-def held_after_an_abrupt_stop(bench: Bench) -> int:
+def held_after_an_abrupt_stop(bench):
     move(bench)
     bench.load(0x0200)
     bench.command("STT")
@@ -216,7 +214,7 @@ def held_after_an_abrupt_stop(bench: Bench) -> int:
     return bench.chip.desired_position
 
 
-def fraction_after_a_smooth_stop(bench: Bench) -> int:
+def fraction_after_a_smooth_stop(bench):
     bench.load(0x002A, 0x3000, 0x21000, 1000)
     bench.command("STT")
     bench.sample(5)
@@ -227,17 +225,17 @@ def fraction_after_a_smooth_stop(bench: Bench) -> int:
     return bench.chip.trajectory.position & 0xFFFF
 
 
-def passed_breakpoint(bench: Bench) -> int:
+def passed_breakpoint(bench):
     bench.command("SBPA", 0, 5)
     turned(bench, 8).sample()
     return bench.chip.status & BREAKPOINT
 
 
-def position_between_samples(bench: Bench) -> int:
+def position_between_samples(bench):
     return turned(bench, 8).ask("RDRP")
 
 
-def closed(bench: Bench, error: int, samples: int = 1, **coefficients: int) -> Bench:
+def closed(bench, error, samples=1, **coefficients):
     """The loop closed with a constant error."""
     bench.filter(**coefficients)
     bench.load(0x0200)
@@ -250,23 +248,23 @@ def closed(bench: Bench, error: int, samples: int = 1, **coefficients: int) -> B
     return bench
 
 
-def drive(error: int, **coefficients: int) -> Callable[[Bench], tuple[int, int]]:
-    def run(bench: Bench) -> tuple[int, int]:
+def drive(error, **coefficients):
+    def run(bench):
         closed(bench, error, **coefficients)
         return bench.chip.sign, bench.chip.pwm_magnitude
 
     return run
 
 
-def rdsum(error: int, samples: int, **coefficients: int) -> Callable[[Bench], int]:
-    def run(bench: Bench) -> int:
+def rdsum(error, samples, **coefficients):
+    def run(bench):
         closed(bench, error, samples, **coefficients)
         return bench.ask("RDSUM")
 
     return run
 
 
-def remembers_in_open_loop(bench: Bench) -> bool:
+def remembers_in_open_loop(bench):
     closed(bench, 3000, 3, ki=10, il=1000)
     bench.load(0x0100)
     bench.command("STT")
@@ -274,18 +272,18 @@ def remembers_in_open_loop(bench: Bench) -> bool:
     return bench.chip.pid.error_sum != 0
 
 
-def remembers_over_udf(bench: Bench) -> bool:
+def remembers_over_udf(bench):
     closed(bench, 300, 5, ki=10, il=1000)
     bench.command("UDF")
     bench.sample()
     return bench.chip.pid.error_sum > 1000
 
 
-def excess_beyond_16_bits(bench: Bench) -> int:
+def excess_beyond_16_bits(bench):
     return closed(bench, 40000, kp=1).chip.status & EXCESS
 
 
-def first_edges(bench: Bench) -> list[tuple[int, int]]:
+def first_edges(bench):
     closed(bench, 26, kp=10)
     start = bench.tick
     bench.edges.clear()
@@ -294,7 +292,7 @@ def first_edges(bench: Bench) -> list[tuple[int, int]]:
     return [(tick - start, pwm) for tick, pwm, _, _ in bench.edges]
 
 
-def sign_when_switched_off(bench: Bench) -> int:
+def sign_when_switched_off(bench):
     closed(bench, -26, kp=10)
     bench.load(0x0100)
     bench.command("STT")
@@ -302,12 +300,12 @@ def sign_when_switched_off(bench: Bench) -> int:
     return bench.chip.sign
 
 
-def eight_bit_output(bench: Bench) -> int:
+def eight_bit_output(bench):
     bench.command("PORT12")
     return bench.signals() & 0x0100
 
 
-def both_phases_at_once(bench: Bench) -> int:
+def both_phases_at_once(bench):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.wait(100)
     bench.chip.set_encoder(bench.tick, 1, 1)
@@ -316,7 +314,7 @@ def both_phases_at_once(bench: Bench) -> int:
     return bench.chip.real_position
 
 
-def counts_of_a_short_state(bench: Bench) -> int:
+def counts_of_a_short_state(bench):
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.wait(100)
     bench.chip.set_encoder(bench.tick, 1, 0)
@@ -328,7 +326,7 @@ def counts_of_a_short_state(bench: Bench) -> int:
 
 
 Reading = tuple[str, object, Callable[[Bench], object], object, object]
-READINGS: tuple[Reading, ...] = (
+READINGS = (
     ("busy_clocks", 160, busy_ticks, 480 - 24, 640 - 24),
     ("busy_judged", "end", lost_writes, 1, 0),
     ("command_resets_phase", False, mask_after_one_byte, 0x3E, 0x34),
@@ -409,7 +407,7 @@ def test_options_come_from_plain_values_and_say_what_they_may_be():
     with pytest.raises(msgspec.ValidationError, match="busy_clock"):
         msgspec.convert({"busy_clock": 1}, Lm629Options)
     with pytest.raises(ValueError, match="sign_of_negative must be one of 1, 0, not 2"):
-        Lm629Options(sign_of_negative=2)  # type: ignore[arg-type]
+        Lm629Options(sign_of_negative=2)
 
 
 def test_an_index_caught_before_a_reset_ends_the_wait_for_it():

@@ -1,13 +1,11 @@
 """The PWM stage: real edges, loaded at the sample, phase from the end of reset."""
 
-from __future__ import annotations
-
 from miro_exact.clock import NEVER_TICK
 from miro_robot.lm629.chip import PWM_TICKS, SAMPLE_TICKS, Lm629
 from tests.robot.lm629.bench import Bench
 
 
-def holding(kp: int = 10) -> Bench:
+def holding(kp=10):
     """A closed loop at rest; the tests set the error by hand."""
     bench = Bench.running()
     bench.filter(kp=kp)

@@ -1,7 +1,5 @@
 """The digital filter: vectors calculated by hand (rules F1 to F6), and random errors against the slow twin."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +10,7 @@ from tests.naive.lm629 import NaivePid
 from tests.robot.lm629.bench import Bench
 
 
-def loop(kp: int = 0, ki: int = 0, kd: int = 0, il: int = 0, ds: int = 0, saturates: bool = True) -> Pid:
+def loop(kp=0, ki=0, kd=0, il=0, ds=0, saturates=True):
     pid = Pid(saturates)
     pid.load(kp, ki, kd, il, ds)
     return pid
@@ -80,7 +78,7 @@ def test_products_may_be_read_as_their_bottom_16_bits():
     assert loop(kp=0x0870, saturates=False).step(0x7FFF) == 0xF790 - 0x10000
 
 
-def error_after_a_jam(saturates: bool) -> int:
+def error_after_a_jam(saturates):
     """Counts that the motor is behind its desired position, a second after something held it for 0.1 s.
 
     A motor of first order with the robot's filter, at two thirds of its top speed.

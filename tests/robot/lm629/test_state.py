@@ -1,7 +1,5 @@
 """State is data: snapshots are complete, go on identically, and both engines give the same bits."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path
@@ -21,7 +19,7 @@ from tests.robot.lm629.session import play, steps
 ROOT = Path(__file__).parents[3]
 
 
-def session(name: str, seed: int, count: int) -> str:
+def session(name, seed, count):
     command = [sys.executable, "-m", "tests.robot.lm629.session", name, str(seed), str(count)]
     done = children.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     return done.stdout

@@ -1,8 +1,5 @@
 """The profile generator: vectors calculated by hand from the README's rules, and random moves against the slow twin."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
@@ -15,7 +12,7 @@ from tests.example_count import examples
 from tests.naive.lm629 import NaiveLm629
 
 
-def generator(a: int, limit: int, target: int, **modes: int) -> ProfileGenerator:
+def generator(a, limit, target, **modes):
     trajectory = ProfileGenerator()
     trajectory.acceleration, trajectory.max_velocity, trajectory.target = a, limit, target
     for name, value in modes.items():
@@ -24,9 +21,7 @@ def generator(a: int, limit: int, target: int, **modes: int) -> ProfileGenerator
     return trajectory
 
 
-def run(
-    trajectory: ProfileGenerator, change: Callable[[ProfileGenerator], None] | None = None
-) -> tuple[list[int], list[int]]:
+def run(trajectory, change=None):
     """Velocities and whole positions until the target; `change` is done before the 7th sample."""
     velocities, positions = [], []
     while trajectory.moving:
@@ -39,11 +34,11 @@ def run(
     return velocities, positions
 
 
-def counts(text: str) -> list[int]:
+def counts(text):
     return [int(Fraction(item) * 65536) for item in text.split(",")]
 
 
-def numbers(text: str, base: int = 10) -> list[int]:
+def numbers(text, base=10):
     return [int(item, base) for item in text.split(",")]
 
 
@@ -164,7 +159,7 @@ def test_any_state_steps_like_the_slow_twin(
     for _ in range(samples):
         if not ours.moving:
             break
-        events: set[int] = set()
+        events = set()
         theirs.profile(events)
         finished = ours.step()
         assert (ours.position, ours.velocity) == (theirs.desired * 65536, theirs.speed)

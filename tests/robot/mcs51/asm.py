@@ -4,8 +4,6 @@ Lines are `label:`, or an instruction as the data sheet writes it: `MOV A,#12h`,
 Numbers are decimal or end in h; names of registers and bits are those of the AT89C52.
 """
 
-from __future__ import annotations
-
 import re
 
 from miro_robot.mcs51.names import BITS, SFRS
@@ -14,19 +12,19 @@ from miro_robot.mcs51.opcodes import TABLE
 KEYWORDS = {"A", "C", "AB", "DPTR", "@DPTR", "@A+DPTR", "@A+PC"}
 
 
-def assemble(text: str, origin: int = 0) -> bytes:
+def assemble(text, origin=0):
     """Machine code of the lines, for loading at `origin`."""
     return _two_passes(text, origin)[0]
 
 
-def labels_of(text: str, origin: int = 0) -> dict[str, int]:
+def labels_of(text, origin=0):
     """The addresses of the labels."""
     return _two_passes(text, origin)[1]
 
 
-def _two_passes(text: str, origin: int) -> tuple[bytes, dict[str, int]]:
+def _two_passes(text, origin):
     lines = [line.split(";")[0].strip() for line in text.splitlines()]
-    labels: dict[str, int] = {}
+    labels = {}
     for _ in range(2):  # the first pass finds the labels
         code = bytearray()
         for line in lines:
@@ -42,7 +40,7 @@ def _two_passes(text: str, origin: int) -> tuple[bytes, dict[str, int]]:
     return bytes(code), labels
 
 
-def _instruction(line: str, here: int, labels: dict[str, int]) -> bytes:
+def _instruction(line, here, labels):
     mnemonic, _, rest = line.partition(" ")
     operands = [part.strip() for part in rest.split(",")] if rest else []
     for first, _count, _step, name, pattern, length, _cycles in TABLE:
@@ -53,7 +51,7 @@ def _instruction(line: str, here: int, labels: dict[str, int]) -> bytes:
     raise ValueError(f"no instruction {line!r}")
 
 
-def _fits(kind: str, operand: str) -> bool:
+def _fits(kind, operand):
     if kind in KEYWORDS or operand in KEYWORDS:
         return kind == operand
     if kind == "Rn":
@@ -67,7 +65,7 @@ def _fits(kind: str, operand: str) -> bool:
     return operand[0] not in "@#/" and not (operand[0] == "R" and operand[1:].isdigit())
 
 
-def _encode(opcode: int, length: int, operands: dict[str, str], here: int, labels: dict[str, int]) -> bytes:
+def _encode(opcode, length, operands, here, labels):
     tail = bytearray()
     for kind in sorted(operands, key=lambda kind: {"src": 0, "dst": 1}.get(kind, 0)):
         operand = operands[kind]
@@ -91,7 +89,7 @@ def _encode(opcode: int, length: int, operands: dict[str, str], here: int, label
     return bytes([opcode]) + bytes(tail)
 
 
-def _bit(text: str, labels: dict[str, int]) -> int:
+def _bit(text, labels):
     if "." in text:
         byte, _, number = text.partition(".")
         address = _number(byte, labels, SFRS)
@@ -99,7 +97,7 @@ def _bit(text: str, labels: dict[str, int]) -> int:
     return _number(text, labels, BITS)
 
 
-def _number(text: str, labels: dict[str, int], names: dict[str, int] | None = None) -> int:
+def _number(text, labels, names=None):
     if names and text in names:
         return names[text]
     if re.fullmatch(r"[0-9A-F]+h", text):

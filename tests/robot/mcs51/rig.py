@@ -10,7 +10,7 @@ from tests.robot.mcs51.asm import SFRS, assemble
 class RecordingBus(Bus):
     """Remembers every call; external memory is a dictionary."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.ports: list[tuple[int, int, int]] = []
         self.reads: list[tuple[int, int]] = []
         self.writes: list[tuple[int, int, int]] = []
@@ -36,14 +36,14 @@ class RecordingBus(Bus):
         self.sent.append((value, tick))
 
 
-def cpu_with(text: str) -> Cpu:
+def cpu_with(text):
     """A CPU that has `text` assembled at 0 and a recording bus (`cpu.bus`)."""
     cpu = Cpu(RecordingBus())
     cpu.load(assemble(text))
     return cpu
 
 
-def stepped(text: str, steps: int | None = None) -> Cpu:
+def stepped(text, steps=None):
     """... after so many steps (default: as many as there are instructions)."""
     cpu = cpu_with(text)
     lines = [line.split(";")[0].strip() for line in text.splitlines()]
@@ -54,7 +54,7 @@ def stepped(text: str, steps: int | None = None) -> Cpu:
     return cpu
 
 
-def run_to_loop(text: str, cycles: int = 100_000) -> Cpu:
+def run_to_loop(text, cycles=100_000):
     """... run until it hangs in `end: SJMP $`, which is appended."""
     cpu = cpu_with(text + "\nend:\nSJMP $")
     end = len(assemble(text))
@@ -62,5 +62,5 @@ def run_to_loop(text: str, cycles: int = 100_000) -> Cpu:
     return cpu
 
 
-def sfr(cpu: Cpu, name: str) -> int:
+def sfr(cpu, name):
     return cpu.sfr(SFRS[name])

@@ -15,7 +15,7 @@ PAIRS_ONLY_COMPILED = pytest.mark.skipif(
 )
 
 
-def signatures(opcodes: str, carry: int, registers=("a", "psw"), skip_zero=False) -> list[str]:
+def signatures(opcodes, carry, registers=("a", "psw"), skip_zero=False):
     """CRC-32 of each register after the instruction, over A (outer) and B (inner); rows of B = 0 may be zero."""
     cpu = cpu_with(opcodes)
     results = {name: bytearray() for name in registers}

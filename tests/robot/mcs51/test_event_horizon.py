@@ -71,7 +71,7 @@ SJMP loop
 CYCLES = 400
 
 
-def state_after(code: bytes, levels: list[int], again: bool) -> bytes:
+def state_after(code, levels, again):
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     for number, level in enumerate(levels):

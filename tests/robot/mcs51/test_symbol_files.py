@@ -1,7 +1,6 @@
 """A symbol file of another image is refused by file and line; an unusual one of this image is not."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -22,7 +21,7 @@ MOVED_FROM = 0x400
 needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="sdcc is not installed")
 
 
-def hex_text(code: bytes, at: int = 0) -> str:
+def hex_text(code, at=0):
     """Intel HEX records of 16 bytes."""
     lines = []
     for offset in range(0, len(code), 16):
@@ -32,7 +31,7 @@ def hex_text(code: bytes, at: int = 0) -> str:
     return "\n".join([*lines, ":00000001FF\n"])
 
 
-def refusal(path: Path) -> ImageError:
+def refusal(path):
     with pytest.raises(ImageError) as caught:
         _ = load_hex(path).symbols.names
     assert caught.value.remedy == "it belongs to another image: rebuild both together, or take it away"
@@ -81,7 +80,7 @@ def test_the_same_without_debug_shows_by_functions_that_begin_nowhere(by):
     assert int(names_only[found.line - 1][5:13], 16) >= MOVED_FROM + by
 
 
-def moved_map(by: int) -> list[str]:
+def moved_map(by):
     moved = []
     for line in MAP.splitlines():
         address = line[5:13] if line.startswith("C:") else ""
@@ -141,7 +140,7 @@ def test_an_image_that_was_filled_merged_or_lost_a_little_keeps_its_symbols(fill
     assert check_cdb(parse_cdb(CDB), bytes(code), bytes(loaded)) is None
 
 
-def map_text(area: str, first: int, size: int, attributes: str, name_at: int) -> str:
+def map_text(area, first, size, attributes, name_at):
     """A page of a map: one area, five names at one address."""
     head = f"{area:<36}{first:08X}    {size:08X} = {size:>11}. bytes ({attributes})\n"
     return head + "".join(f"C:   {name_at:08X}  _name{number}      a\n" for number in range(5))
@@ -214,7 +213,7 @@ void main(void) { /* MORE */ unsigned char i; for (i = 0; i < 5; i++) printf("%l
 """
 
 
-def built(folder: Path, more: str, *options: str) -> Path:
+def built(folder, more, *options):
     folder.mkdir()
     (folder / "prog.c").write_text(PROGRAM.replace("/* MORE */", more))
     children.run(["sdcc", "-mmcs51", *options, "prog.c"], cwd=folder, check=True, capture_output=True)

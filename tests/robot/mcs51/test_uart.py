@@ -456,7 +456,7 @@ class _Twin:
             self.uart.clock_tx(now)
 
 
-def asleep_with_a_start_bit_at(fall: int, cuts: int) -> Cpu:
+def asleep_with_a_start_bit_at(fall, cuts):
     """Starts the baud rate by timer 2 while RXD may fall any moment, sleeps, and counts what it received."""
     cpu = cpu_with(
         "LJMP main\nORG 23h\nCLR RI\nINC 30h\nRETI\nmain:\nMOV RCAP2H,#FFh\nMOV RCAP2L,#B2h\nMOV TH2,#FFh\n"

@@ -1,12 +1,9 @@
 """C programs of SDCC on both machines: `python -m tests.robot.ucsim.compiled --instructions 20000000`."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 from miro_robot.image import load_hex
@@ -22,14 +19,14 @@ STRIDE = 20_000  # instructions between checkpoints
 FAR_BYTES = 512  # of external RAM, all that the program uses
 
 
-def build(model: str, folder: Path) -> bytes:
+def build(model, folder):
     """The program's code."""
     image = folder / "mix.ihx"
     children.run(["sdcc", "-mmcs51", model, str(SOURCE), "-o", str(image)], check=True)
     return load_hex(image, limit=65536).code
 
 
-def differences(code: bytes, checkpoints: int, stride: int = STRIDE) -> Iterator[str]:
+def differences(code, checkpoints, stride=STRIDE):
     """What differs at the first checkpoint where something does, a line each."""
     step, dump = f"step {stride}", f"dump /b xram 0 {FAR_BYTES - 1}"
     commands = ["fill iram 0 255 0", f"fill xram 0 {FAR_BYTES - 1} 0"]
@@ -51,7 +48,7 @@ def differences(code: bytes, checkpoints: int, stride: int = STRIDE) -> Iterator
             return
 
 
-def _compared(cpu: Cpu, cycles: int, seen: s51.Observed) -> Iterator[str]:
+def _compared(cpu, cycles, seen):
     if cpu.pc != seen.pc:
         yield f"PC ours {cpu.pc:04X}h ucsim {seen.pc:04X}h"
     if 12 * cycles != seen.ticks:
@@ -65,7 +62,7 @@ def _compared(cpu: Cpu, cycles: int, seen: s51.Observed) -> Iterator[str]:
             yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
 
 
-def main() -> int:
+def main():
     """Prints figures; exit code 1 if anything differed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--instructions", type=int, default=20_000_000, help="of each program")

@@ -6,19 +6,16 @@
 A program that SDCC refuses, that does not fit 64 KB, or that has not ended after MOST_CYCLES is counted and left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from miro_robot.bare.machine import BareMachine, Ended
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from tests import children
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, P0
@@ -43,7 +40,7 @@ SHAPE = (
 EQUAL, LEFT_OUT = "equal", "left out"
 
 
-def build(seed: int, folder: Path) -> Image | None:
+def build(seed, folder):
     """The image of the program with this seed; None where SDCC does not make one."""
     source = folder / "program.c"
     make = ["csmith", "--seed", f"{seed}", *SHAPE, "-o", str(source)]
@@ -57,11 +54,11 @@ def build(seed: int, folder: Path) -> Image | None:
     return None if done.returncode else load_hex(folder / "program.ihx", limit=0x10000)
 
 
-def differences(image: Image) -> list[str] | None:
+def differences(image):
     """What is not the same when the program has ended; None where it does not end."""
     end = image.symbols.find("_finished")
     assert end is not None
-    sent: list[bytes] = []
+    sent = []
     machine = BareMachine(image, output=sent.append, stop_on_fault=False)
     if machine.run(until=end.address, max_cycles=MOST_CYCLES) is not Ended.UNTIL:
         return None
@@ -76,9 +73,7 @@ def differences(image: Image) -> list[str] | None:
     )
 
 
-def _compared(
-    machine: BareMachine, seen: s51.Observed, xram: bytes, sent: bytes, characters: bytes
-) -> Iterator[str]:
+def _compared(machine, seen, xram, sent, characters):
     cpu = machine.cpu
     if cpu.pc != seen.pc:
         yield f"PC ours {cpu.pc:04X}h ucsim {seen.pc:04X}h"
@@ -95,7 +90,7 @@ def _compared(
         yield f"UART ours {sent.hex(' ')} ucsim {characters.hex(' ')}"
 
 
-def tried(seed: int) -> tuple[int, str]:
+def tried(seed):
     """The seed, and EQUAL, LEFT_OUT or what differs."""
     with tempfile.TemporaryDirectory() as folder:
         image = build(seed, Path(folder))
@@ -103,14 +98,14 @@ def tried(seed: int) -> tuple[int, str]:
     return seed, LEFT_OUT if found is None else "; ".join(found[:3]) or EQUAL
 
 
-def main() -> int:
+def main():
     """Prints figures; exit code 1 if anything differed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--programs", type=int, default=1000, help="that end and are compared")
     parser.add_argument("--first", type=int, default=1, metavar="SEED")
     options = parser.parse_args()
     begin = time.monotonic()
-    counts: Counter[str] = Counter()
+    counts = Counter()
     with ProcessPoolExecutor(initializer=children.reset_signals) as executor:
         seed = options.first
         while counts[EQUAL] + counts["different"] < options.programs:

@@ -22,7 +22,7 @@ class Disagreement(NamedTuple):
     held_by: str  # the test that holds ours to the sheet, beside the one in `test_disagreements.py`
 
 
-DISAGREEMENTS: tuple[Disagreement, ...] = (
+DISAGREEMENTS = (
     Disagreement(
         "bank-by-bit",
         "SETB, CLR, CPL and JBC of RS0 or RS1, and MOV RS0/RS1,C, leave the register bank as it was",
@@ -169,7 +169,7 @@ DISAGREEMENTS: tuple[Disagreement, ...] = (
 )
 
 
-def table() -> str:
+def table():
     """As Markdown, for the README."""
     lines = [
         "| name | ucsim 0.6.4 | data sheet, and ours | source | held by `tests/robot/mcs51/` |",

@@ -3,9 +3,6 @@
 The names in the comments are those of `disagreements.py`.
 """
 
-from __future__ import annotations
-
-from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, TABLE
 
 # Registers of an AT89C52 that both machines have and that hold what is written.
@@ -50,26 +47,26 @@ _CALLS = (0x12, *range(0x11, 0x100, 0x20))
 _RETURNS = (0x22, 0x32)
 
 
-def has_direct(opcode: int) -> bool:
+def has_direct(opcode):
     """Whether the byte after the opcode is a direct address."""
     return _FIRST_DIRECT[opcode]
 
 
-def has_bit(opcode: int) -> bool:
+def has_bit(opcode):
     """Whether the byte after the opcode is a bit address."""
     return _FIRST_BIT[opcode]
 
 
-def parity(value: int) -> int:
+def parity(value):
     return value.bit_count() & 1
 
 
-def peek(cpu: Cpu, address: int) -> int:
+def peek(cpu, address):
     """A direct address: internal RAM or a register, ports at their latch."""
     return cpu.peek_iram(address) if address < 0x80 else cpu.sfr(address)
 
 
-def written(cpu: Cpu, opcode: int, first: int, second: int) -> tuple[int, int, int] | None:
+def written(cpu, opcode, first, second):
     """The direct address an instruction is about to write: (address, value, ACC afterwards), or None."""
     a = cpu.a
     row = ROW[opcode]
@@ -109,7 +106,7 @@ def written(cpu: Cpu, opcode: int, first: int, second: int) -> tuple[int, int, i
     return first, value, value if first == ACC else a
 
 
-def allowed(cpu: Cpu, opcode: int, first: int, second: int) -> bool:
+def allowed(cpu, opcode, first, second):
     """Whether both machines must do the same with this instruction in this state."""
     for address in direct_addresses(opcode, first, second):
         if address >= 0x80 and address not in COMPARED:  # absent-bits; count-down (T2MOD); serial-port (SBUF)
@@ -132,7 +129,7 @@ def allowed(cpu: Cpu, opcode: int, first: int, second: int) -> bool:
     return target is None or _may_write(cpu, opcode, *target)
 
 
-def _targets(cpu: Cpu, opcode: int, last: int) -> tuple[int, ...]:
+def _targets(cpu, opcode, last):
     """Where a relative branch or JMP @A+DPTR may go, before the sum is cut to 16 bits."""
     if opcode == 0x73:
         return (cpu.dptr + cpu.a,)
@@ -141,7 +138,7 @@ def _targets(cpu: Cpu, opcode: int, last: int) -> tuple[int, ...]:
     return ()
 
 
-def direct_addresses(opcode: int, first: int, second: int) -> tuple[int, ...]:
+def direct_addresses(opcode, first, second):
     """The direct addresses that an instruction names, by byte or by bit."""
     if opcode == 0x85:
         return first, second
@@ -152,7 +149,7 @@ def direct_addresses(opcode: int, first: int, second: int) -> tuple[int, ...]:
     return ()
 
 
-def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
+def _may_write(cpu, opcode, address, value, a):
     """Whether a register may be written, given ACC after the instruction."""
     if address == PSW:
         by_bit = has_bit(opcode) and (value ^ cpu.psw()) & 0x18  # bank-by-bit
@@ -171,11 +168,11 @@ def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
     return _timers_agree(cpu, opcode, address, value) and not _interrupts(cpu, address, value)
 
 
-def _running(cpu: Cpu) -> bool:
+def _running(cpu):
     return bool(cpu.sfr(TCON) & 0x50 or cpu.sfr(T2CON) & 0x04)
 
 
-def _timers_agree(cpu: Cpu, opcode: int, address: int, value: int) -> bool:
+def _timers_agree(cpu, opcode, address, value):
     """Whether timers that run after a write, or ran before, do the same on both machines."""
     tcon, tmod, t2con, tl0, tl1 = (
         value if address == register else cpu.sfr(register) for register in (TCON, TMOD, T2CON, TL0, TL1)
@@ -188,7 +185,7 @@ def _timers_agree(cpu: Cpu, opcode: int, address: int, value: int) -> bool:
     return t2con & 0x06 != 0x06  # counted-edges
 
 
-def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
+def _interrupts(cpu, address, value):
     """interrupt-latency, -priority, -delay: whether an enabled interrupt would be pending after a write."""
     ie, tcon, scon, t2con = (
         value if address == register else cpu.sfr(register) for register in (IE, TCON, SCON, T2CON)

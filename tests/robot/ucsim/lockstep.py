@@ -12,7 +12,6 @@ import argparse
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ from miro_robot.mcs51.opcodes import disassemble
 from tests import children
 from tests.robot.ucsim import s51, states
 from tests.robot.ucsim.exclusions import COMPARED, P0
-from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
+from tests.robot.ucsim.walk import PROLOGUE, Walker
 
 _ALIGN_P0 = "set mem sfr 0x80 0xff"  # p0-after-movx
 _XRAM = "dump /b xram 0 65535"
@@ -35,7 +34,7 @@ class Outcome(NamedTuple):
     difference: str
 
 
-def compare(seed: int, steps: int) -> Outcome:
+def compare(seed, steps):
     """One walk on both machines; those of odd seeds are scattered."""
     walk = Walker(seed, scattered=bool(seed & 1)).walk(steps)
     output = s51.run(walk.code, _commands(walk))
@@ -44,7 +43,7 @@ def compare(seed: int, steps: int) -> Outcome:
     return Outcome(seed, tuple(counts[opcode] for opcode in range(256)), difference)
 
 
-def _commands(walk: Walk) -> Iterator[str]:
+def _commands(walk):
     yield f"run 0 {len(PROLOGUE):#x}"
     for step in walk.steps:
         if step.state:
@@ -58,7 +57,7 @@ def _commands(walk: Walk) -> Iterator[str]:
     yield _XRAM
 
 
-def _differences(walk: Walk, reader: s51.Reader) -> Iterator[str]:
+def _differences(walk, reader):
     for number, step in enumerate(walk.steps):
         seen = reader.observed()
         found = list(_step_differences(step, seen))
@@ -71,7 +70,7 @@ def _differences(walk: Walk, reader: s51.Reader) -> Iterator[str]:
             yield f"external RAM {address:04X}h ours {walk.xram[address]:02X}h ucsim {xram[address]:02X}h"
 
 
-def _step_differences(step: Step, seen: s51.Observed) -> Iterator[str]:
+def _step_differences(step, seen):
     if step.pc != seen.pc:
         yield f"PC ours {step.pc:04X}h ucsim {seen.pc:04X}h"
     if 12 * step.cycles != seen.ticks:
@@ -88,7 +87,7 @@ def _step_differences(step: Step, seen: s51.Observed) -> Iterator[str]:
                 yield f"internal RAM {address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
 
 
-def main() -> int:
+def main():
     """Prints figures; exit code 1 if anything differed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=2_000_000, help="instructions in all")

@@ -11,7 +11,6 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,16 +33,16 @@ class OutputError(Exception):
     """The simulator's output is not what its commands should print."""
 
 
-def installed() -> bool:
+def installed():
     return shutil.which("s51") is not None
 
 
-def version() -> str:
+def version():
     """The first line of its version, with name and number."""
     return children.run(["s51", "-V"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
-def run(code: bytes, commands: Iterable[str], heard: Path | None = None) -> bytes:
+def run(code, commands, heard=None):
     """Starts the simulator on a code image at address 0, executes `commands`, returns all it printed.
 
     `heard`: file for what the program sends.
@@ -66,7 +65,7 @@ def run(code: bytes, commands: Iterable[str], heard: Path | None = None) -> byte
         return printed.read_bytes()
 
 
-def intel_hex(code: bytes) -> str:
+def intel_hex(code):
     """An image from address 0 as Intel HEX, 32 bytes a record."""
     lines = []
     for address in range(0, len(code), 32):
@@ -80,11 +79,11 @@ def intel_hex(code: bytes) -> str:
 class Reader:
     """Cuts an output at the echoes of its commands, in order."""
 
-    def __init__(self, output: bytes) -> None:
+    def __init__(self, output):
         self.output = output
         self.at = 0
 
-    def after(self, echo: str) -> int:
+    def after(self, echo):
         """Moves behind the next echo of a command."""
         text = echo.encode() + b"\n"
         found = self.output.find(text, self.at)
@@ -93,13 +92,13 @@ class Reader:
         self.at = found + len(text)
         return self.at
 
-    def raw(self, echo: str, size: int) -> bytes:
+    def raw(self, echo, size):
         """The `size` bytes that a `dump /b` command printed."""
         first = self.after(echo)
         self.at = first + size
         return self.output[first : self.at]
 
-    def observed(self, step: str = OBSERVE[0]) -> Observed:
+    def observed(self, step=OBSERVE[0]):
         """The outputs of the commands OBSERVE; `step` where the first was another one."""
         first = self.after(step)
         stopped = _STOPPED.search(self.output, first, first + 2000)

@@ -5,8 +5,6 @@ state is an offset into the table of random bytes, passed in DPTR. Timers stand,
 such a state: what time does is the walks' task.
 """
 
-from __future__ import annotations
-
 from tests.robot.ucsim import exclusions as sfr
 
 AT = 0x0200
@@ -45,7 +43,7 @@ RANDOM_BITS = {register: kept & ~high for register, (kept, high) in _REGISTERS.i
 _REST = bytes.fromhex("857C82 857D83 857ED0 E57F")  # MOV DPL,7Ch; MOV DPH,7Dh; MOV PSW,7Eh; MOV A,7Fh
 
 
-def _moves() -> bytes:
+def _moves():
     """For each register MOV A,#place; MOVC A,@A+DPTR; ANL A,#kept; ORL A,#high; MOV register,A."""
     code = bytearray()
     for place, (register, (kept, high)) in enumerate(_REGISTERS.items()):

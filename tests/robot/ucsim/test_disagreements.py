@@ -42,7 +42,7 @@ CASES = [
 ]
 
 
-def steps_of(text: str) -> int:
+def steps_of(text):
     return sum(1 for line in text.splitlines() if not line.startswith("ORG"))
 
 

@@ -6,7 +6,6 @@ length pass, and its registers are copied to internal RAM all the time.
 
 from __future__ import annotations
 
-from random import Random
 from typing import NamedTuple
 
 from miro_robot.mcs51.cpu import Cpu
@@ -27,7 +26,7 @@ class Program(NamedTuple):
     end: int  # address of its last instruction, relative to its start
 
 
-def draw(random: Random) -> Program:
+def draw(random):
     """One timer in one mode, started near its overflow and read many times."""
     timer = random.randrange(3)
     low, high = _PAIRS[timer]
@@ -55,7 +54,7 @@ def draw(random: Random) -> Program:
     return Program(timer, bytes(code), len(code))
 
 
-def ours(programs: list[Program]) -> list[bytes]:
+def ours(programs):
     """Internal RAM after each program, run one after the other."""
     cpu = Cpu()
     cpu.load(_image(programs))
@@ -67,7 +66,7 @@ def ours(programs: list[Program]) -> list[bytes]:
     return found
 
 
-def ucsims(programs: list[Program]) -> list[bytes]:
+def ucsims(programs):
     """The same from the simulator."""
     commands = ["fill iram 0 255 0"]
     for number, program in enumerate(programs):
@@ -77,5 +76,5 @@ def ucsims(programs: list[Program]) -> list[bytes]:
     return [reader.raw("dump /b iram 32 127", 96) for _ in programs]
 
 
-def _image(programs: list[Program]) -> bytes:
+def _image(programs):
     return b"".join(program.code.ljust(SIZE, b"\x00") for program in programs)

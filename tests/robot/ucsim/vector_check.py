@@ -3,20 +3,17 @@
 Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
 """
 
-from __future__ import annotations
-
 import sys
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, PSW, allowed
-from tests.vectors.vectors import RESET, Vector, VectorRunner, decode
+from tests.vectors.vectors import RESET, VectorRunner, decode
 
 _BATCH = 2000  # vectors per start of the simulator
 
 
-def comparable(vector: Vector, bench: VectorRunner) -> bool:
+def comparable(vector, bench):
     """Whether ucsim is expected to agree."""
     state = vector.initial
     bench.prepare(state)
@@ -25,7 +22,7 @@ def comparable(vector: Vector, bench: VectorRunner) -> bool:
     return not state.pins and allowed(bench.cpu, opcode, first, second)
 
 
-def differences(vectors: list[Vector]) -> Iterator[str]:
+def differences(vectors):
     """What ucsim makes of vectors in another way, a line for each vector."""
     for begin in range(0, len(vectors), _BATCH):
         batch = vectors[begin : begin + _BATCH]
@@ -36,7 +33,7 @@ def differences(vectors: list[Vector]) -> Iterator[str]:
                 yield f"{vector.name}: " + ", ".join(found)
 
 
-def _commands(vectors: list[Vector]) -> Iterator[str]:
+def _commands(vectors):
     yield "fill iram 0 255 0"
     for vector in vectors:
         state = vector.initial
@@ -52,17 +49,17 @@ def _commands(vectors: list[Vector]) -> Iterator[str]:
         yield from _set("sfr", [(address, RESET.get(address, 0)) for address, _ in state.sfr])
 
 
-def _set(memory: str, cells: Iterable[tuple[int, int]]) -> Iterator[str]:
+def _set(memory, cells):
     for address, value in cells:
         yield f"set mem {memory} {address:#x} {value:#x}"
 
 
-def _xram(vector: Vector, reader: s51.Reader) -> list[tuple[int, int]]:
+def _xram(vector, reader):
     cells = [address for address, _ in vector.final.xram]
     return [(address, reader.raw(f"dump /b xram {address} {address}", 1)[0]) for address in cells]
 
 
-def _step_differences(vector: Vector, seen: s51.Observed, xram: list[tuple[int, int]]) -> Iterator[str]:
+def _step_differences(vector, seen, xram):
     final = vector.final
     opcode = dict(vector.initial.code)[vector.initial.pc]
     if seen.pc != final.pc:
@@ -81,11 +78,11 @@ def _step_differences(vector: Vector, seen: s51.Observed, xram: list[tuple[int, 
             yield f"{address:02X}h vector {expected:02X}h ucsim {found:02X}h"
 
 
-def load(folder: Path) -> list[Vector]:
+def load(folder):
     return [vector for path in sorted(folder.glob("*.json")) for vector in decode(path.read_bytes())]
 
 
-def main(folder: str) -> int:
+def main(folder):
     """Prints differences and figures; exit code 1 if there are any."""
     vectors = load(Path(folder))
     bench = VectorRunner()

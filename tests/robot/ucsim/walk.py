@@ -54,7 +54,7 @@ class Walk(NamedTuple):
 class Walker:
     """Draws one walk; the same seed draws the same walk."""
 
-    def __init__(self, seed: int, scattered: bool = False) -> None:
+    def __init__(self, seed, scattered=False):
         self.random = Random(seed)
         self.scattered = scattered
         self.bus = XramBus(_ignore, _ignore)
@@ -72,11 +72,11 @@ class Walker:
                 for address, value in enumerate(content, first):
                     self._define(address, value)
 
-    def walk(self, steps: int) -> Walk:
+    def walk(self, steps):
         cpu = self.cpu
         self._define(len(PROLOGUE), 0)
         cpu.run_until_pc(len(PROLOGUE), 1 << 40)
-        done: list[Step] = []
+        done = []
         moved = False
         state = 0
         while len(done) < steps:
@@ -92,7 +92,7 @@ class Walker:
             moved = False
         return Walk(cpu.code, done, self.bus.content())
 
-    def _scatter(self) -> int:
+    def _scatter(self):
         """Puts the CPU into a random state at a random place; the state's offset."""
         offset = self.random.choice(states.OFFSETS)
         self.cpu.dptr = offset
@@ -101,7 +101,7 @@ class Walker:
         self.cpu.pc = self.random.randrange(0x10000)
         return offset
 
-    def _step(self, pc: int, moved: bool, state: int) -> Step:
+    def _step(self, pc, moved, state):
         cpu = self.cpu
         self.visits[pc] += 1
         opcode = cpu.code_at(pc)
@@ -114,7 +114,7 @@ class Walker:
         changed_p0 = opcode in MOVX and p0 != 0xFF
         return Step(pc, opcode, moved, state, changed_p0, cpu.pc, cpu.cycles - begin, iram, registers)
 
-    def _settle(self, pc: int) -> bool:
+    def _settle(self, pc):
         """Makes sure there is an instruction at `pc` that may be executed now; False if that is impossible."""
         places = [(pc + offset) & 0xFFFF for offset in range(3)]
         for _ in range(TRIES):
@@ -128,7 +128,7 @@ class Walker:
                 return False
         return False
 
-    def _draw(self, places: list[int]) -> tuple[int, int, int]:
+    def _draw(self, places):
         """An instruction that agrees with what is known of these three bytes."""
         draw = self.random.randrange
         opcode, first, second = (
@@ -140,7 +140,7 @@ class Walker:
             second = self._register(opcode)
         return opcode, first, second
 
-    def _register(self, opcode: int) -> int:
+    def _register(self, opcode):
         """A register's address, or that of one of its bits."""
         while True:
             address = COMPARED[self.random.randrange(len(COMPARED))]
@@ -149,7 +149,7 @@ class Walker:
             if address & 7 == 0:
                 return address | self.random.randrange(8)
 
-    def _define_constant(self, opcode: int) -> None:
+    def _define_constant(self, opcode):
         """Draws the byte that a MOVC is about to read."""
         cpu = self.cpu
         if opcode == 0x83:
@@ -157,11 +157,11 @@ class Walker:
         elif opcode == 0x93:
             self._define((cpu.dptr + cpu.a) & 0xFFFF, self.random.randrange(256))
 
-    def _define(self, address: int, value: int) -> None:
+    def _define(self, address, value):
         if not self.known[address]:
             self.known[address] = 1
             self.cpu.write_code(address, value)
 
 
-def _ignore(*_: int) -> None:
+def _ignore(*_):
     """Faults and characters are no business of a walk."""

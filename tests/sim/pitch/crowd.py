@@ -18,7 +18,7 @@ from miro_exact.rng import Stream
 from miro_host.eye import calibration_kinds
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.patterns import PATTERNS, TEAMS
-from miro_host.eye.tracker import CentroidKind, Tracker
+from miro_host.eye.tracker import Tracker
 from miro_host.posture import Posture
 from miro_sim.pitch import ground
 from miro_sim.pitch.camera import Camera
@@ -68,7 +68,7 @@ class Counts:
 class Crowd:
     """The robots, the camera and both trackers."""
 
-    def __init__(self, seed: int, picture: PictureSettings, centroid: CentroidKind = "binary") -> None:
+    def __init__(self, seed, picture, centroid="binary"):
         self.draw = random.Random(seed)
         lens = CameraParameters()
         self.camera = Camera(lens, picture, PATTERNS["diagonal"], Stream(seed, "crowd"))
@@ -86,7 +86,7 @@ class Crowd:
         ]
         self.counts = Counts()
 
-    def step(self, frame: int, dropped: bool = False) -> None:
+    def step(self, frame, dropped=False):
         """One camera period: everybody drives on, then both teams look, unless the frame is dropped."""
         for driver in self.drivers:
             self._drive(driver)
@@ -113,7 +113,7 @@ class Crowd:
         ]
         self.counts.together += bool(near)
 
-    def _drive(self, driver: Driver) -> None:
+    def _drive(self, driver):
         driver.frames -= 1
         if driver.frames <= 0:
             self._think(driver)
@@ -128,7 +128,7 @@ class Crowd:
         driver.at, driver.v_m_s, driver.w_rad_s = after, v, w
         self.counts.fastest_m_s = max(self.counts.fastest_m_s, abs(v))
 
-    def _think(self, driver: Driver) -> None:
+    def _think(self, driver):
         """Towards another robot, or anywhere."""
         draw = self.draw
         driver.frames = draw.randint(3, 25)
@@ -142,7 +142,7 @@ class Crowd:
         else:
             driver.wants = (draw.uniform(-MOST_M_S, MOST_M_S), draw.uniform(-MOST_RAD_S, MOST_RAD_S))
 
-    def _free(self, driver: Driver, at: Posture) -> bool:
+    def _free(self, driver, at):
         if not ground.holds(at):
             return False
         for other in self.drivers:
@@ -158,7 +158,7 @@ class Crowd:
                     return False
         return True
 
-    def _judge(self, own: list[Driver], index: int, sighting: Posture | None, frame: int) -> None:
+    def _judge(self, own, index, sighting, frame):
         counts, true = self.counts, own[index].at
         if sighting is None:
             counts.lost += 1
@@ -173,11 +173,11 @@ class Crowd:
             counts.wrong_at.append(f"frame {frame}: {true} seen as {sighting}")
 
 
-def _distance(one: Posture, other: Posture) -> float:
+def _distance(one, other):
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
-def _moved(at: Posture, v: float, w: float) -> Posture:
+def _moved(at, v, w):
     """A camera period later."""
     middle = at.theta_rad + 0.5 * w * PERIOD_S
     way = v * PERIOD_S
@@ -185,7 +185,7 @@ def _moved(at: Posture, v: float, w: float) -> Posture:
     return Posture(at.x_m + way * math.cos(middle), at.y_m + way * math.sin(middle), theta)
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description="Six robots, two trackers.")
     parser.add_argument("--frames", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=0)

@@ -1,14 +1,12 @@
 """SHA-256 over windows of random scenes in one engine: `python -m tests.sim.pitch.picture_digest --engine python`."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 
 from miro_exact import engine
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--engine", choices=("compiled", "python"), required=True)
     parser.add_argument("--scenes", type=int, default=4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from typing import NamedTuple
 
 from miro_exact.rng import Stream
@@ -24,10 +23,10 @@ class Rig(NamedTuple):
     pattern: Pattern
     stream: Stream
 
-    def camera(self) -> Camera:
+    def camera(self):
         return Camera(self.lens, self.picture, self.pattern, self.stream)
 
-    def naive(self) -> NaiveCamera:
+    def naive(self):
         return NaiveCamera(self.lens, self.picture, self.pattern, self.stream)
 
 
@@ -40,7 +39,7 @@ class Scene(NamedTuple):
     tick: int
     window: tuple[int, int, int, int]
 
-    def put(self, camera: Camera) -> None:
+    def put(self, camera):
         """Into the camera's view, and takes the frame."""
         camera.clear()
         if self.ball is not None:
@@ -49,13 +48,13 @@ class Scene(NamedTuple):
             camera.robot(*body)
         camera.begin(self.frame, self.tick)
 
-    def drawn_by(self, naive: NaiveCamera) -> bytearray:
+    def drawn_by(self, naive):
         """The window, from the slow twin."""
         naive.bodies, naive.ball = self.bodies, self.ball
         return naive.window(*self.window, self.frame, self.tick)
 
 
-def rig(draw: random.Random) -> Rig:
+def rig(draw):
     """A camera that hangs somewhere above the pitch and has any settings."""
     lens = CameraParameters(
         x_m=draw.uniform(0.4, 0.7),
@@ -84,7 +83,7 @@ def rig(draw: random.Random) -> Rig:
     return Rig(lens, picture, pattern, Stream(draw.randrange(1 << 40), "scene"))
 
 
-def scene(draw: random.Random, lens: CameraParameters) -> Scene:
+def scene(draw, lens):
     """Up to five robots, which may touch and hide each other, and perhaps the ball, around a window."""
     width, height = draw.choice(SIZES)
     left = draw.choice((0, 320 - width, draw.randrange(321 - width)))

@@ -3,8 +3,6 @@
 Windows are compared with the whole picture in every scene, 200 of them; with the slow twin once a scene.
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys
@@ -17,13 +15,13 @@ SCENES = 5
 """With one camera."""
 
 
-def cut(whole: bytearray, left: int, top: int, width: int, height: int) -> bytes:
+def cut(whole, left, top, width, height):
     """The window of a picture of 320 x 240."""
     lines = [3 * (320 * row + left) for row in range(top, top + height)]
     return b"".join(bytes(whole[at : at + 3 * width]) for at in lines)
 
 
-def check_rig(draw: random.Random, windows: int = WINDOWS) -> int:
+def check_rig(draw, windows=WINDOWS):
     """Scenes of one camera. Returns how many windows were compared; raises AssertionError for one that differs."""
     drawn = rig(draw)
     camera, naive = drawn.camera(), drawn.naive()
@@ -40,7 +38,7 @@ def check_rig(draw: random.Random, windows: int = WINDOWS) -> int:
     return SCENES * (windows + 1)
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description="Windows beside the whole picture and the slow twin.")
     parser.add_argument("--count", type=int, default=100_000, help="windows (default 100000)")
     parser.add_argument("--seed", type=int, default=0)

@@ -6,7 +6,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
-from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
+from miro_sim.radio.params import Bursts, Dropouts, SlicerParams
 from miro_sim.radio.uplink import Uplink
 from tests.naive.radio import wire_bits
 from tests.sim.radio.radios import clean
@@ -31,7 +31,7 @@ EVERYTHING = clean(
 )
 
 
-def exercise(seed: int, radio: Radio) -> str:
+def exercise(seed, radio):
     """Everything that three robots and their PC hear, with a neighbour on the frequency."""
     down, up = Downlink(radio, seed, "down"), Uplink(radio, seed, "up")
     neighbour = Downlink(EVERYTHING, seed, "neighbour")

@@ -1,31 +1,22 @@
 """Worlds saved at every tick of a window, and run on: `python -m tests.sim.world.every_tick --window-ms 2`."""
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys
-from collections.abc import Callable
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 
 SETTINGS = ("duration_s=1.0", "network.radio.profile=lossy")
 
 
-def differing(
-    first_tick: int,
-    count: int,
-    seed: int,
-    image: Image,
-    progress: Callable[[int], object] = lambda tick: None,
-) -> list[int]:
+def differing(first_tick, count, seed, image, progress=lambda tick: None):
     """The ticks at which a world that is saved and goes on in another one does not end as one that never stopped."""
 
-    def fresh() -> World:
+    def fresh():
         return World(load("fig6", SETTINGS).scenario, seed, image)
 
     end_tick = (first_tick + count) // CONTROL_PERIOD_TICKS * CONTROL_PERIOD_TICKS + CONTROL_PERIOD_TICKS
@@ -42,7 +33,7 @@ def differing(
     return found
 
 
-def main() -> int:
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--window-ms", type=float, default=2.0)
     parser.add_argument("--seed", type=int, default=7, help="of the world, and of where the window is")
@@ -50,7 +41,7 @@ def main() -> int:
     count = ticks(given.window_ms / 1000.0)
     first_tick = random.Random(given.seed).randrange(ticks(0.9))
 
-    def progress(tick: int) -> None:
+    def progress(tick):
         if tick % 100 == 0 or tick == first_tick + count - 1:
             print(f"\r{tick - first_tick + 1} of {count} ticks  ", end="", file=sys.stderr, flush=True)
 

@@ -4,17 +4,14 @@ Input that is announced early keeps a frame of the station off the air which lat
 host is told at random moments; a controller is told everything at the begin.
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys
-from collections.abc import Callable
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 
@@ -41,7 +38,7 @@ reference.kind = "arc"
 HOSTS, PROFILES = ("silent", "controller"), ("wire", "late", "fade10", "slicer", "lossy")
 
 
-def drawn_input(draw: random.Random) -> list[tuple[int, bytes]]:
+def drawn_input(draw):
     """(tick, characters) that do not overlap: frames, half of them with something else in front, and garbage."""
     found, tick = [], 100_000
     for seq in range(INJECTIONS):
@@ -52,7 +49,7 @@ def drawn_input(draw: random.Random) -> list[tuple[int, bytes]]:
     return [(tick, data) for tick, data in found if tick < (PERIODS - 2) * CONTROL_PERIOD_TICKS]
 
 
-def told(world: World, tick: int, data: bytes) -> None:
+def told(world, tick, data):
     """Injects what the transmitter can send then."""
     try:
         world.inject(data, at_tick=tick)
@@ -60,7 +57,7 @@ def told(world: World, tick: int, data: bytes) -> None:
         assert world.scenario.networks[0].host == "controller"
 
 
-def in_one_piece(world: World, sent: list[tuple[int, bytes]]) -> str:
+def in_one_piece(world, sent):
     """The digest of a run that is told everything at its start."""
     for tick, data in sent:
         told(world, tick, data)
@@ -68,7 +65,7 @@ def in_one_piece(world: World, sent: list[tuple[int, bytes]]) -> str:
     return world.digest
 
 
-def in_pieces(fresh: Callable[[], World], sent: list[tuple[int, bytes]], draw: random.Random) -> str:
+def in_pieces(fresh, sent, draw):
     """The same run, stopped `CUTS` times, sometimes saved and gone on with in another world."""
     world = fresh()
     early = world.scenario.networks[0].host == "controller"
@@ -86,7 +83,7 @@ def in_pieces(fresh: Callable[[], World], sent: list[tuple[int, bytes]], draw: r
     return world.digest
 
 
-def differing(count: int, seed: int, image: Image, progress: Callable[[int], object]) -> list[str]:
+def differing(count, seed, image, progress):
     """Runs whose digests differ, among as many as have `count` stops and injections together."""
     found, done, number = [], 0, 0
     while done < count:
@@ -94,7 +91,7 @@ def differing(count: int, seed: int, image: Image, progress: Callable[[int], obj
         host, profile = draw.choice(HOSTS), draw.choice(PROFILES)
         scenario = parse(SCENARIO.format(host=host, profile=profile), "cuts")
 
-        def fresh(scenario=scenario, number=number) -> World:  # type: ignore[no-untyped-def]
+        def fresh(scenario=scenario, number=number):
             return World(scenario, number, image)
 
         sent = drawn_input(draw)
@@ -106,7 +103,7 @@ def differing(count: int, seed: int, image: Image, progress: Callable[[int], obj
     return found
 
 
-def main() -> int:
+def main():
     """Prints what differs; exit code 1 if anything does."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=10_000, help="stops and injections together")
@@ -114,7 +111,7 @@ def main() -> int:
     options = parser.parse_args()
     image = load_hex(image_path())
 
-    def progress(done: int) -> None:
+    def progress(done):
         print(f"\r{done} stops and injections", end="", file=sys.stderr, flush=True)
 
     found = differing(options.count, options.seed, image, progress)

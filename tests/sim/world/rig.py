@@ -1,10 +1,8 @@
 """Worlds for the tests of waiting and injecting: the built-in line, with other hosts and more robots."""
 
-from __future__ import annotations
-
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.scenario import file
 from miro_sim.world.world import World
 
@@ -31,18 +29,18 @@ reference.kind = "arc"
 slot = 1
 reference.kind = "line"
 """
-_IMAGES: list[Image] = []
+_IMAGES = []
 
 
-def image() -> Image:
+def image():
     if not _IMAGES:
         _IMAGES.append(load_hex(image_path()))
     return _IMAGES[0]
 
 
-def fig6(seed: int = SEED, **options) -> World:
+def fig6(seed=SEED, **options):
     return World(file.load("fig6").scenario, seed, image(), **options)
 
 
-def two_networks(host: str = "", seed: int = SEED, **options) -> World:
+def two_networks(host="", seed=SEED, **options):
     return World(file.parse(TWO_NETWORKS.format(host=host), "two"), seed, image(), **options)

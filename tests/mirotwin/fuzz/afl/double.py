@@ -15,7 +15,7 @@ WORD = b"DUCK"
 class Found:
     """A failure of the double."""
 
-    def __init__(self, check: str, pc: int) -> None:
+    def __init__(self, check, pc):
         self.check, self.tick, self.pc, self.what = check, 24, pc, f"found at {pc}"
 
 
@@ -31,18 +31,16 @@ class Double:
     map_size = MAP_SIZE
     image: Any = None
 
-    def __init__(
-        self, kind: int = 2, raises: bool = False, sleeps: bool = False, always: bool = False
-    ) -> None:
+    def __init__(self, kind=2, raises=False, sleeps=False, always=False):
         self.kind, self.raises, self.sleeps, self.always = kind, raises, sleeps, always
         self.edges: Any = bytearray(MAP_SIZE)
         self.failure: Any = None
         self.frames_fed = self.characters_fed = self.executions = 0
 
-    def use_map(self, edges: Any) -> None:
+    def use_map(self, edges):
         self.edges = edges
 
-    def run(self, data: Any) -> int:
+    def run(self, data):
         self.executions += 1
         self.characters_fed += len(data)
         if data[:1] == b"!":
@@ -61,21 +59,21 @@ class Double:
             return self.kind
         return 0
 
-    def _count(self, edge: int) -> None:
+    def _count(self, edge):
         self.edges[edge] = (self.edges[edge] + 1) & 0xFF
 
-    def script(self, data: bytes) -> list[Any]:
+    def script(self, data):
         return []
 
-    def describe(self, data: bytes) -> str:
+    def describe(self, data):
         return data.hex(" ")
 
 
-def double_of(spec: TargetSpec) -> Any:
+def double_of(spec):
     """A double with the parameters of the specification."""
     return Double(**spec.parameters)
 
 
-def spec(**parameters: Any) -> TargetSpec:
+def spec(**parameters):
     """The specification of a double."""
     return TargetSpec(maker=MAKER, parameters=parameters)

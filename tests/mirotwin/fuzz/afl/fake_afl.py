@@ -1,17 +1,13 @@
 """The other end of the fork-server protocol: what AFL++ does with a target process, by pipes and shared memory."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal
 import struct
 import sys
 from pathlib import Path
-from typing import Any
 
 from mirotwin.fuzz.afl.serve import CASES_VARIABLE, CONTROL_FD, MAP_VARIABLE, STATUS_FD, attach
-from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 
 ROOT = Path(__file__).parents[4]
@@ -22,25 +18,25 @@ CASES_BYTES = 4096
 class Segment:
     """A segment of shared memory, removed at the end."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size):
         self._library = ctypes.CDLL(None, use_errno=True)
         self.number = self._library.shmget(PRIVATE, ctypes.c_size_t(size), CREATE | 0o600)
         assert self.number >= 0, os.strerror(ctypes.get_errno())
         self.memory = attach(self.number)
 
-    def remove(self) -> None:
+    def remove(self):
         self._library.shmctl(self.number, REMOVE, None)
 
 
 class FakeAfl:
     """Starts the server of `spec` and speaks to it. `without`: a variable that it does not get."""
 
-    def __init__(self, spec: TargetSpec, beside: str = "", without: str = "") -> None:
+    def __init__(self, spec, beside="", without=""):
         self.edges, self.cases = Segment(65536), Segment(CASES_BYTES)
         to_server, self.control = os.pipe()
         self.status, from_server = os.pipe()
 
-        def prepare() -> None:
+        def prepare():
             os.dup2(to_server, CONTROL_FD)
             os.dup2(from_server, STATUS_FD)
 
@@ -58,21 +54,21 @@ class FakeAfl:
         os.close(to_server)
         os.close(from_server)
 
-    def hello(self) -> int:
+    def hello(self):
         """The first word of the server, answered as AFL++ does."""
         said = os.read(self.status, 4)
         if said:
             os.write(self.control, said)
         return struct.unpack("<I", said)[0] if said else 0
 
-    def run(self, data: bytes) -> tuple[int, int]:
+    def run(self, data):
         """Process id and wait status for an input; the edge map is cleared before."""
         self.edges.memory[:] = bytes(len(self.edges.memory))
         self.cases.memory[: 4 + len(data)] = struct.pack("<I", len(data)) + data
         os.write(self.control, bytes(4))
         return struct.unpack("<iI", self._read(8))
 
-    def _read(self, count: int) -> bytes:
+    def _read(self, count):
         found = b""
         while len(found) < count:
             piece = os.read(self.status, count - len(found))
@@ -81,17 +77,17 @@ class FakeAfl:
             found += piece
         return found
 
-    def end(self) -> int:
+    def end(self):
         """Ends as AFL++ does; the exit code of the server."""
         os.close(self.control)
-        code: int = self.server.wait(20)
+        code = self.server.wait(20)
         os.close(self.status)
         return code
 
-    def __enter__(self) -> FakeAfl:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, *_):
         self.edges.remove()
         self.cases.remove()
         if self.server.poll() is None:

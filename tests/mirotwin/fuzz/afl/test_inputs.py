@@ -1,7 +1,6 @@
 """Seeds and dictionaries."""
 
 import ast
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -16,7 +15,7 @@ from mirotwin.fuzz.afl.inputs import LONGEST_TOKEN, message_tokens, wire_tokens,
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES
 
 
-def read_back(path: Path) -> list[bytes]:
+def read_back(path):
     """The strings of a dictionary, by Python's reader of byte strings."""
     lines = path.read_text(encoding="ascii").splitlines()
     return [ast.literal_eval("b" + line.split("=", 1)[1]) for line in lines]

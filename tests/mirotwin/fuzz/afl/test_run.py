@@ -5,9 +5,7 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -33,14 +31,14 @@ def _modules_for_the_target(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
 
 
-def campaign(folder: Path, inputs: dict[str, bytes] | None = None, **named: Any) -> AflRun:
+def campaign(folder, inputs=None, **named):
     """A campaign in `folder`; what is named for the double goes to it."""
     write_seeds(folder / "seeds", inputs or {"hello": b"hello"})
     own = {key: named.pop(key) for key in ("kind", "raises", "sleeps", "always") if key in named}
     return AflRun([spec(**own).text()], folder / "seeds", folder / "out", seed=1, **named)
 
 
-def until(true: Callable[[], Any], what: str) -> Any:
+def until(true, what):
     """Waits for it, and returns what it is."""
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
@@ -157,7 +155,7 @@ def test_a_robot_is_fuzzed_from_one_frame(tmp_path):
 # ---- what cannot be done -----------------------------------------------------------------------------------
 
 
-def error_of(run: AflRun) -> str:
+def error_of(run):
     """What a campaign that ends at once is told to have ended of."""
     with run, pytest.raises(BadInput) as error:
         until(lambda: not run.running, "the end")
@@ -215,7 +213,7 @@ def test_a_folder_of_seeds_that_is_none_is_refused(tmp_path):
 NEEDED = {"AFL_MAP_SIZE": "8192", "AFL_SKIP_BIN_CHECK": "1", "AFL_QUIET": "1"}
 
 
-def showmap(*options: str, data: bytes = b"") -> int:
+def showmap(*options, data=b""):
     """The exit code of afl-showmap."""
     target = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", spec().text()]
     command = ["afl-showmap", "-t", "60000", *options, "--", *target]
@@ -244,7 +242,7 @@ def test_afl_tmin_keeps_what_fails(tmp_path):
     assert (tmp_path / "out").read_bytes() == WORD
 
 
-def processes_of(folder: Path) -> list[int]:
+def processes_of(folder):
     """Processes that have the folder on their command line."""
     found = []
     for line in Path("/proc").glob("[0-9]*/cmdline"):

@@ -18,13 +18,12 @@ from mirotwin.fuzz.afl.serve import (
     kind_of_signal,
     wait_status,
 )
-from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 from tests.mirotwin.fuzz.afl.double import MAP_SIZE, WORD, Double, spec
 from tests.mirotwin.fuzz.afl.fake_afl import CASES_BYTES, ROOT, FakeAfl
 
 
-def by_hand(specification: TargetSpec | str, data: bytes) -> tuple[int, str, str]:
+def by_hand(specification, data):
     """Exit code, standard output and standard error of a run without AFL++."""
     text = specification if isinstance(specification, str) else specification.text()
     command = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", text]
@@ -87,7 +86,7 @@ def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does():
 
         @settings(max_examples=1000, database=None, deadline=None)
         @given(st.binary(max_size=8) | st.binary(max_size=4).map(lambda tail: WORD + tail))
-        def one(data: bytes) -> None:
+        def one(data):
             status = afl.run(data)[1]
             assert status == wait_status(own.run(data))
             seen.setdefault(data, status)

@@ -88,7 +88,7 @@ def test_a_campaign_of_no_job_is_refused(tmp_path, jobs, said):
 # ---- cores -------------------------------------------------------------------------------------------------
 
 
-def process(proc: Path, number: int, allowed: str, kernel: bool = False) -> None:
+def process(proc, number, allowed, kernel=False):
     """A process as `man 5 proc` describes its status."""
     (proc / str(number)).mkdir(parents=True)
     memory = "" if kernel else "VmSize:\t    8548 kB\n"
@@ -129,7 +129,7 @@ OS_ERROR = """\
 """
 
 
-def said(folder: Path, output: str, complaint: str = "") -> str:
+def said(folder, output, complaint=""):
     (folder / "main.log").write_text(output)
     (folder / "main.target").write_text(complaint)
     return f"{why_ended(folder / 'main.log', folder / 'main.target')}"

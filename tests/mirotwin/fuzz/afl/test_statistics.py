@@ -1,7 +1,5 @@
 """What afl-fuzz writes about itself, whole, in part, and damaged."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,12 +31,12 @@ saved_hangs, max_depth, execs_per_sec, total_execs, edges_found
 SAID = Statistics(550438, 54857.29, 4, 1, 4, 99.5, 10.0)
 
 
-def stats(folder: Path, text: str) -> Statistics | None:
+def stats(folder, text):
     (folder / "fuzzer_stats").write_text(text)
     return read_statistics(folder / "fuzzer_stats")
 
 
-def plot(folder: Path, text: str) -> list[Statistics]:
+def plot(folder, text):
     (folder / "plot_data").write_text(text)
     return read_plot(folder / "plot_data")
 

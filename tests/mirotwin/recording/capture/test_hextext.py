@@ -38,7 +38,7 @@ TEXTS = st.lists(
 ).map("".join)
 
 
-def naive(text: str) -> tuple[bytes, tuple[int, int] | None]:
+def naive(text):
     """Bytes and the place of the first thing that is not one, character by character."""
     found = bytearray()
     place = 0
@@ -59,7 +59,7 @@ def naive(text: str) -> tuple[bytes, tuple[int, int] | None]:
     return bytes(found), None
 
 
-def read(pieces: list[bytes]) -> tuple[bytes, tuple[int, int] | None]:
+def read(pieces):
     reader, found = HexText("a.hex"), b""
     try:
         for piece in pieces:

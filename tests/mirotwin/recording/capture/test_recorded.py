@@ -1,7 +1,6 @@
 """The characters in a recording: every one, in the order of time, also when the file was cut short."""
 
 import re
-from collections.abc import Callable
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -28,7 +27,7 @@ ANSWER = encode(TelemetryFrame(3, 1), 3)
 TEXT = load("fig6").text
 
 
-def recording(wires: list[tuple[Transmission, ...]], text: str = TEXT) -> bytes:
+def recording(wires, text=TEXT):
     stream = BytesIO()
     source = RunSource(scenario_name="x", scenario_text=text, seed=1, firmware=b"", firmware_sha256="")
     with Recorder(stream, source) as recorder:
@@ -37,20 +36,18 @@ def recording(wires: list[tuple[Transmission, ...]], text: str = TEXT) -> bytes:
     return stream.getvalue()
 
 
-def foreign_mcap() -> bytes:
+def foreign_mcap():
     stream = BytesIO()
     writer = Writer(stream)
     writer.start()
     writer.add_metadata("foreign", {"format": "1"})
-    writer.finish()  # type: ignore[no-untyped-call]
+    writer.finish()
     return stream.getvalue()
 
 
-def read(
-    path: Path, tell: Callable[[str], None] = lambda text: None
-) -> tuple[list[Transmission], dict[int, int], RecordingError | None]:
-    robots: dict[int, int] = {}
-    found: list[Transmission] = []
+def read(path, tell=lambda text: None):
+    robots = {}
+    found = []
     with Input(str(path)) as given:
         try:
             for run in recorded.transmissions(given, robots, tell):
@@ -60,11 +57,11 @@ def read(
     return found, robots, None
 
 
-def down(tick: int, data: bytes = b"down", network: int = 0) -> Transmission:
+def down(tick, data=b"down", network=0):
     return Transmission(tick, ">", data, network)
 
 
-def up(tick: int, data: bytes, network: int = 0, bad_stop: tuple[int, ...] = ()) -> Transmission:
+def up(tick, data, network=0, bad_stop=()):
     return Transmission(tick, "<", data, network, bad_stop)
 
 
@@ -133,7 +130,7 @@ def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tm
     counts = []
     for size in range(8, len(whole), 97):
         path.write_bytes(whole[:size])
-        notes: list[str] = []
+        notes = []
         found, _, error = read(path, notes.append)
         said = str(error) if error is not None else notes[0]
         assert re.search("the file ends in the middle of a record|the recording has no end", said)
@@ -173,7 +170,7 @@ def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at, bit):
         (lambda data: foreign_mcap(), "not a recording of this program"),
     ],
 )
-def test_what_is_no_whole_recording_is_named_with_its_place(tmp_path, change, message):  # type: ignore[no-untyped-def]
+def test_what_is_no_whole_recording_is_named_with_its_place(tmp_path, change, message):
     path = tmp_path / "run.mcap"
     path.write_bytes(change(recording([(down(5),)])))
     error = read(path)[2]

@@ -1,8 +1,6 @@
 """Transmissions as rows: nothing is lost, memory stays small, freshness is the robot's, pauses end frames."""
 
 import tracemalloc
-from collections.abc import Iterable
-from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,17 +16,17 @@ from mirotwin.recording.capture.source import READ_ERRORS, open_source
 CHARACTER = 25_000
 
 
-def team(seq: int, n: int = 3) -> bytes:
+def team(seq, n=3):
     return encode(TeamFrame(0, seq, ((seq, -seq),) * n), n)
 
 
-def decoded(sent: Iterable[Transmission], n: int = 3) -> list[DecodedRow]:
+def decoded(sent, n=3):
     return list(rows(sent, lambda network: n))
 
 
-def read(path: Path, format: str) -> tuple[list[DecodedRow], Exception | None]:
+def read(path, format):
     """Everything in a file, and the error it ends with."""
-    found: list[DecodedRow] = []
+    found = []
     with Input(str(path)) as given:
         try:
             for row in rows(open_source(given, format, print).sent, lambda network: 3):
@@ -40,7 +38,7 @@ def read(path: Path, format: str) -> tuple[list[DecodedRow], Exception | None]:
 
 @settings(deadline=None)
 @given(st.binary(max_size=400))
-def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):  # type: ignore[no-untyped-def]
+def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("raw") / "a"
     path.write_bytes(data)
     found, error = read(path, "raw")
@@ -58,7 +56,7 @@ def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):  # type: 
     st.sampled_from([b"", b"\x89MCAP0\r\n", b"\x0a\x0d\x0d\x0a"]),
     st.sampled_from(FORMATS),
 )
-def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(  # type: ignore[no-untyped-def]
+def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(
     tmp_path_factory, data, magic, format
 ):
     path = tmp_path_factory.mktemp("any") / "a"

@@ -1,7 +1,6 @@
 """A recording lists an answer as valid exactly where the PC took it: stop bits are recorded."""
 
 import io
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -15,7 +14,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.recorded import transmissions, transmissions_of
-from mirotwin.recording.capture.rows import DecodedRow, rows
+from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.rerun import runner
@@ -26,7 +25,7 @@ __all__ = ["mirotwin"]
 PERIODS = 150
 
 
-def noisy_world(seed: int) -> World:
+def noisy_world(seed):
     text = load("fig6")
     network = text.scenario.networks[0]
     radio = msgspec.structs.replace(network.radio, bit_error_rate=5e-3)
@@ -34,7 +33,7 @@ def noisy_world(seed: int) -> World:
     return World(msgspec.structs.replace(text.scenario, networks=(network,)), seed, image())
 
 
-def recorded(seed: int) -> tuple[bytes, list[tuple[int, bytes]]]:
+def recorded(seed):
     """The recording of a noisy run, and start and body of the answers that the PC took."""
     world = noisy_world(seed)
     stream = io.BytesIO()
@@ -45,7 +44,7 @@ def recorded(seed: int) -> tuple[bytes, list[tuple[int, bytes]]]:
     return stream.getvalue(), [(answer.start_tick, answer.body) for answer in answers if answer is not None]
 
 
-def listed(path: Path) -> list[DecodedRow]:
+def listed(path):
     with Input(str(path)) as given:
         return [row for row in rows(transmissions(given, {}), lambda network: 3) if row.direction == UP]
 

@@ -1,7 +1,5 @@
 """One recording of two teams for all tests here."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.mirotwin.conftest import mirotwin

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import io
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 from mcap.reader import make_reader
 
-from mirotwin.report.foxglove.convert import Converted, convert
-from tests.mirotwin.conftest import Result
+from mirotwin.report.foxglove.convert import convert
 
 TWO_TEAMS = """name = "teams"
 title = "Two teams"
@@ -56,9 +54,9 @@ class Read(NamedTuple):
     content: Any
 
 
-def read(data: bytes) -> list[Read]:
+def read(data):
     """All messages in the order of time."""
-    schemas: dict[int, dict[str, Any]] = {}
+    schemas = {}
     found = []
     for schema, channel, message in make_reader(io.BytesIO(data)).iter_messages():
         assert schema is not None
@@ -70,7 +68,7 @@ def read(data: bytes) -> list[Read]:
     return found
 
 
-def exported(data: bytes) -> tuple[bytes, Converted]:
+def exported(data):
     """A recording with Foxglove's topics, and what is said of it."""
     stream = io.BytesIO()
     result = convert(data, "run.mcap", stream)
@@ -78,11 +76,11 @@ def exported(data: bytes) -> tuple[bytes, Converted]:
 
 
 @cache
-def teams(folder: Path, mirotwin: Any) -> bytes:
+def teams(folder, mirotwin):
     """The recording of the two teams, with frames."""
     scenario = folder / "teams.toml"
     scenario.write_text(TWO_TEAMS)
-    done: Result = mirotwin(
+    done = mirotwin(
         *("run", scenario, "--seed", 3, "--out", folder / "out", "-q", "--no-figure", "--record-frames")
     )
     assert (done[0], done[2]) == (0, "")

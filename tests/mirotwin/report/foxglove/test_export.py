@@ -1,14 +1,10 @@
 """`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file."""
 
-from __future__ import annotations
-
 import base64
 import io
 import math
 from collections import Counter
-from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -21,7 +17,6 @@ from mirotwin.recording.container import RecordingError
 from mirotwin.recording.recorder import Recorder
 from tests.mirotwin import synthetic
 from tests.mirotwin.report.foxglove import rig
-from tests.mirotwin.report.foxglove.rig import Read
 
 FRAMES = {
     *("net0/robot0", "net0/robot0/measured", "net0/robot0/reference"),
@@ -31,11 +26,11 @@ FRAMES = {
 }
 
 
-def of(shown: list[Read], topic: str) -> list[Read]:
+def of(shown, topic):
     return [one for one in shown if one.topic == topic]
 
 
-def stamp_ns(time: dict[str, int]) -> int:
+def stamp_ns(time):
     return time["sec"] * 1_000_000_000 + time["nsec"]
 
 
@@ -82,7 +77,7 @@ def test_every_message_has_the_time_of_what_it_tells(shown):
 
 
 def test_the_frames_of_reference_are_one_tree(shown):
-    parents: dict[str, str] = {}
+    parents = {}
     for one in of(shown, "/foxglove/transforms"):
         for part in one.content["transforms"]:
             assert parents.setdefault(part["child_frame_id"], part["parent_frame_id"]) == "pitch"
@@ -93,7 +88,7 @@ def test_the_frames_of_reference_are_one_tree(shown):
     assert used <= {"pitch", *FRAMES}
 
 
-def quaternions(content: Any) -> list[dict[str, float]]:
+def quaternions(content):
     """Every one in a message, however deep."""
     if isinstance(content, list):
         return [found for part in content for found in quaternions(part)]
@@ -189,7 +184,7 @@ def test_the_log_tells_of_lost_robots_and_frames(shown):
     assert len(told) == begins > 0
 
 
-def recorded(count: int, add: Callable[[Recorder], object], scenario: str = "") -> bytes:
+def recorded(count, add, scenario=""):
     """A recording of synthetic periods, whose scenario says nothing unless told."""
     source = reader.RunSource("none", scenario, 0, b":00000001FF\n", "0" * 64)
     stream = io.BytesIO()
@@ -203,7 +198,7 @@ def recorded(count: int, add: Callable[[Recorder], object], scenario: str = "") 
 class Fault:
     kind, tick, pc, symbol = 3, 5 * CONTROL_PERIOD_TICKS + 7, 0x123, "main"
 
-    def __str__(self) -> str:
+    def __str__(self):
         return "writes to a busy LM629 at main+3"
 
 
@@ -216,7 +211,7 @@ def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
 
 
 def test_what_was_done_to_a_robot_stands_in_the_log():
-    def add(recorder: Recorder) -> None:
+    def add(recorder):
         recorder._add("/net0/actions", 800_800 * 3 + 5, ActionMessage(800_800 * 3 + 5, 0, "reset", 1))
         for period in list(synthetic.periods(4))[3:]:
             recorder.write(period)
@@ -257,7 +252,7 @@ def test_a_file_that_has_the_topics_already_is_refused(recording):
 
 
 def test_a_damaged_frame_is_bad_input():
-    def add(recorder: Recorder) -> None:
+    def add(recorder):
         recorder.write_image(0, 5, b"png")
         recorder.flush()
         recorder._writer.add_message(recorder._channels["/net0/camera/image"], 250, b'{"tick":')

@@ -1,18 +1,14 @@
 """`examples/foxglove.json`: every topic and field in it is in an export, and every setting is one that Foxglove has."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
 
 layouts = pytest.importorskip("foxglove.layouts", reason="needs the extra develop")
 LAYOUT = msgspec.json.decode((Path(__file__).parents[4] / "examples" / "foxglove.json").read_bytes())
-PANELS: dict[str, dict[str, Any]] = LAYOUT["configById"]
+PANELS = LAYOUT["configById"]
 CONFIGS = {
     "3D": layouts.ThreeDeeConfig,
     "Image": layouts.ImageConfig,
@@ -24,7 +20,7 @@ TITLE = {"foxglovePanelTitle"}
 TOPIC = re.compile(r"(/[a-z0-9_/]+)((?:\.[a-z0-9_]+)*)")
 
 
-def topics(node: Any) -> Iterator[str]:
+def topics(node):
     """Every text and every key that begins like a topic."""
     if isinstance(node, str) and node.startswith("/"):
         yield node
@@ -33,7 +29,7 @@ def topics(node: Any) -> Iterator[str]:
             yield from topics(one)
 
 
-def placed(node: Any) -> Iterator[str]:
+def placed(node):
     """The panels in a tree of splits, and in the tabs of these."""
     if isinstance(node, dict):
         for place in ("first", "second"):

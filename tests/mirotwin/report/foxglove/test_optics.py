@@ -1,13 +1,11 @@
 """The camera in Foxglove's words draws a point where our lens draws it."""
 
-from __future__ import annotations
-
 import pytest
 
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
 from mirotwin.report.foxglove import frames
-from mirotwin.report.foxglove.messages import CameraCalibration, FrameTransform, time_of
+from mirotwin.report.foxglove.messages import time_of
 
 LENSES = (
     CameraParameters(),
@@ -18,9 +16,7 @@ LENSES = (
 POINTS = ((0.0, 0.0, 0.0), (1.1, 0.0, 0.075), (0.2, 0.7, 0.05), (0.6, 0.3, 0.0))
 
 
-def drawn(
-    message: CameraCalibration, at: FrameTransform, point: tuple[float, float, float]
-) -> tuple[float, float]:
+def drawn(message, at, point):
     """Where OpenCV's model `plumb_bob` draws a point of the pitch."""
     q, place = at.rotation, at.translation
     away = (point[0] - place.x, point[1] - place.y, point[2] - place.z)
@@ -37,7 +33,7 @@ def drawn(
     return k[0] * x + k[1] * y + k[2], k[3] * x + k[4] * y + k[5]
 
 
-def turned(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+def turned(q, v):
     """v' = v + 2 w (u x v) + 2 u x (u x v)."""
     u, w = q[:3], q[3]
     once = cross(u, v)
@@ -46,7 +42,7 @@ def turned(q: tuple[float, float, float, float], v: tuple[float, float, float]) 
     return x, y, z
 
 
-def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
+def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

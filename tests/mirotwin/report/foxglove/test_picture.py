@@ -12,7 +12,6 @@ import pytest
 from PIL import Image
 
 from mirotwin.report.foxglove.messages import LINE_LIST, CameraCalibration, FrameTransform
-from tests.mirotwin.report.foxglove.rig import Read
 from tests.mirotwin.report.foxglove.test_optics import drawn
 
 Point = tuple[float, float, float]
@@ -21,7 +20,7 @@ Point = tuple[float, float, float]
 class Frame:
     """One recorded frame of network 0, and where points are drawn in it."""
 
-    def __init__(self, shown: list[Read], number: int) -> None:
+    def __init__(self, shown, number):
         found = [one for one in shown if one.topic == "/foxglove/net0/image"][number]
         self.image = Image.open(io.BytesIO(base64.b64decode(found.content["data"]))).convert("RGB")
         transforms = next(
@@ -36,13 +35,13 @@ class Frame:
         (scene, *_) = [one.content["entities"] for one in shown if one.topic == "/foxglove/scene"]
         self.scene: dict[str, Any] = {entity["id"]: entity for entity in scene}
 
-    def colour(self, frame: str, point: Point) -> tuple[int, int, int]:
+    def colour(self, frame, point):
         """Of the pixel that shows a point; (0, 0) of OpenCV is the middle of the first pixel."""
         u, v = drawn(self.optics, self.camera, self._on_pitch(frame, point))
-        found: Any = self.image.getpixel((round(u), round(v)))
+        found = self.image.getpixel((round(u), round(v)))
         return found[0], found[1], found[2]
 
-    def _on_pitch(self, frame: str, point: Point) -> Point:
+    def _on_pitch(self, frame, point):
         if frame == "pitch":
             return point
         at, q = self.frames[frame]["translation"], self.frames[frame]["rotation"]
@@ -60,7 +59,7 @@ def frame(shown):
     return Frame(shown, 20)
 
 
-def places(line: dict[str, Any]) -> list[Point]:
+def places(line):
     """Points along a line; off the ends of its pieces, where others meet them."""
     points = [(at["x"], at["y"], at["z"]) for at in line["points"]]
     if line["type"] != LINE_LIST:

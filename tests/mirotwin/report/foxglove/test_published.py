@@ -1,12 +1,9 @@
 """Each derived message is what Foxglove published: by its JSON schema, and field for field by its protobuf classes."""
 
-from __future__ import annotations
-
 import base64
 import copy
 import importlib
 from collections import Counter
-from typing import Any
 
 import msgspec
 import pytest
@@ -19,20 +16,20 @@ NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration
 FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
 
 
-def of_protobuf(name: str) -> Any:
+def of_protobuf(name):
     """The class of that schema in Foxglove's package."""
     return getattr(importlib.import_module(f"foxglove_schemas_protobuf.{name}_pb2"), name)
 
 
-def many(field: Any) -> bool:
+def many(field):
     """Whether a field is repeated; how to ask a descriptor depends on its version."""
     proto = DescriptorProto()
     field.containing_type.CopyToProto(proto)
-    found: bool = proto.field[field.index].label == FieldDescriptorProto.LABEL_REPEATED
+    found = proto.field[field.index].label == FieldDescriptorProto.LABEL_REPEATED
     return found
 
 
-def schema_fields(schema: dict[str, Any], descriptor: Any, place: str) -> list[str]:
+def schema_fields(schema, descriptor, place):
     """Where a JSON schema and the protobuf message of that name differ in their fields, or in what is in these."""
     names = [field.name for field in descriptor.fields]
     found = [] if list(schema["properties"]) == names else [f"{place}: {list(schema['properties'])}, {names}"]
@@ -53,7 +50,7 @@ def schema_fields(schema: dict[str, Any], descriptor: Any, place: str) -> list[s
     return found
 
 
-def fill(message: Any, content: dict[str, Any]) -> None:
+def fill(message, content):
     """Puts JSON into a protobuf message, by the names of its fields; a name that it has not raises."""
     for name, value in content.items():
         field = message.DESCRIPTOR.fields_by_name[name]
@@ -73,9 +70,9 @@ def fill(message: Any, content: dict[str, Any]) -> None:
             setattr(message, name, raw)
 
 
-def back(message: Any) -> dict[str, Any]:
+def back(message):
     """The same fields out of a protobuf message, as JSON."""
-    found: dict[str, Any] = {}
+    found = {}
     for field in message.DESCRIPTOR.fields:
         value = getattr(message, field.name)
         if field.message_type is not None and field.message_type.file.package == "google.protobuf":
@@ -104,7 +101,7 @@ def test_each_message_fits_its_schema(shown):
 
 
 def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown):
-    counts: Counter[str] = Counter()
+    counts = Counter()
     for one in shown:
         if one.name in FOXGLOVE and one.topic.startswith("/foxglove/"):
             kind = of_protobuf(one.name.removeprefix("foxglove."))

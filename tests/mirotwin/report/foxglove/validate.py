@@ -3,17 +3,13 @@
 Knows the words that Foxglove's schemas use and refuses every other word, so that none goes unchecked.
 """
 
-from __future__ import annotations
-
 import base64
-from collections.abc import Iterator
-from typing import Any
 
 ABOUT = {"title", "description", "$comment"}
 TYPES = {"string": str, "boolean": bool, "array": list, "object": dict}
 
 
-def problems(value: Any, schema: dict[str, Any], place: str = "") -> Iterator[str]:
+def problems(value, schema, place=""):
     """What is wrong with `value`, a line each."""
     words = set(schema) - ABOUT
     if "oneOf" in schema:

@@ -3,16 +3,12 @@
 python -m tests.mirotwin.report.page.browser          makes the pictures in `pictures/` again
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 from PIL import Image, ImageFilter
 
@@ -37,7 +33,7 @@ SHOWN = 20
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium():
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -53,7 +49,7 @@ def chromium() -> Iterator[Any]:
         driver.quit()
 
 
-def open_page(driver: Any, page: Path, theme: str = "light", width: int = 1400, height: int = 900) -> None:
+def open_page(driver, page, theme="light", width=1400, height=900):
     """Opens a page as a reader has it whose system is light or dark, and waits until it is all there."""
     from selenium.webdriver.support.ui import WebDriverWait
 
@@ -99,7 +95,7 @@ return { name: one.outerHTML.slice(0, 90), at: [ring.left, ring.top + scrollY].m
 """What the ring around the element with the focus looks like."""
 
 
-def rings(driver: Any) -> list[dict[str, Any]]:
+def rings(driver):
     """The ring of each element that the tabulator key reaches, from the top of the page to its end."""
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -107,7 +103,7 @@ def rings(driver: Any) -> list[dict[str, Any]]:
     driver.execute_script(
         "document.activeElement.blur(); scrollTo(0, 0); getSelection().collapse(document.body, 0)"
     )
-    found: list[dict[str, Any]] = []
+    found = []
     for _ in range(200):
         ActionChains(driver).send_keys(Keys.TAB).perform()
         ring = driver.execute_script(FOCUSED)
@@ -117,24 +113,24 @@ def rings(driver: Any) -> list[dict[str, Any]]:
     return found
 
 
-def picture(driver: Any, selector: str) -> Image.Image:
+def picture(driver, selector):
     """What an element looks like."""
     element = driver.find_element("css selector", selector)
     return Image.open(BytesIO(element.screenshot_as_png)).convert("RGB")
 
 
-def small(of: Image.Image) -> Image.Image:
+def small(of):
     """So small that hinting and smoothing do not count."""
     return of.filter(ImageFilter.GaussianBlur(2)).resize(SMALL, Image.Resampling.BOX)
 
 
-def apart(one: Image.Image, other: Image.Image) -> float:
+def apart(one, other):
     """The mean difference of two pictures of one size, of 255."""
     pairs = list(zip(one.tobytes(), other.tobytes(), strict=True))
     return sum(abs(here - there) for here, there in pairs) / len(pairs)
 
 
-def _renew() -> None:
+def _renew():
     from tests.mirotwin.report.page.conftest import SEED, called
 
     PICTURES.mkdir(exist_ok=True)

@@ -1,7 +1,5 @@
 """What the tests of pages share: recordings, the pages made of them, and a way to call the program in this process."""
 
-from __future__ import annotations
-
 import pytest
 from click.testing import CliRunner
 
@@ -24,7 +22,7 @@ reference.kind = "arc"
 Called = tuple[int, str]
 
 
-def called(*arguments: object) -> Called:
+def called(*arguments):
     """Exit code and what stderr said. Anything but a clean exit fails the test."""
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])
     if result.exception is not None and not isinstance(result.exception, SystemExit):

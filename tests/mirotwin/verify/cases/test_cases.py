@@ -1,7 +1,6 @@
 """Cases: what is left of a failure gives it again, to the tick."""
 
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -29,7 +28,7 @@ def test_a_scenario_comes_back_from_its_tables(name):
     assert of_table(tables_of(scenario), name) == without_expectations(scenario)
 
 
-def failing(tmp_path: Path, expect: str = "failsafe_stop_ms = 100.0") -> Path:
+def failing(tmp_path, expect="failsafe_stop_ms = 100.0"):
     """A case of the shipped firmware, of which something else is expected than it does."""
     world, checks = silent_world(expect)
     trace = Trace(world)

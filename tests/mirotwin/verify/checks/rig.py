@@ -1,16 +1,12 @@
 """For the tests of the checks: a silent host whose frames a test sends, and firmware with one mistake planted."""
 
-from __future__ import annotations
-
 import shutil
-from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.frames import Message, TeamFrame, encode
+from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
@@ -40,13 +36,11 @@ reference.kind = "line"
 
 
 @cache
-def own_image() -> Image:
+def own_image():
     return load_hex(image_path())
 
 
-def silent_world(
-    expect: str, image: Image | None = None, squelch: bool = True, stop: bool = True
-) -> tuple[World, Checks]:
+def silent_world(expect, image=None, squelch=True, stop=True):
     """One robot in slot 1 of 3 whose host sends nothing, and its checks (lines of `[expect]`)."""
     flags = {"squelch": str(squelch).lower(), "stop": str(stop).lower()}
     scenario = parse(SILENT.format(expect=expect, **flags), "silent", (), expectations_of)
@@ -54,19 +48,19 @@ def silent_world(
     return world, Checks(world)
 
 
-def team(seq: int, left: int, right: int, ask: bool = False) -> TeamFrame:
+def team(seq, left, right, ask=False):
     """Velocities for the robot in slot 1."""
     return TeamFrame(3 if ask else 0, seq, ((11, 22), (left, right), (33, 44)))
 
 
-def send(world: World, messages: Sequence[Message | bytes], period_ticks: int = CONTROL_PERIOD_TICKS) -> None:
+def send(world, messages, period_ticks=CONTROL_PERIOD_TICKS):
     """Sends each so long after the one before, the first one period from now."""
     for message in messages:
         world.run_to(world.tick + period_ticks)
         world.inject(message if isinstance(message, bytes) else encode(message, 3))
 
 
-def finish(world: World, checks: Checks) -> dict[str, str]:
+def finish(world, checks):
     """Runs to the end; the verdicts by name."""
     while not world.finished:
         world.step()
@@ -75,14 +69,14 @@ def finish(world: World, checks: Checks) -> dict[str, str]:
 
 
 @cache
-def planted(mistake: str) -> Image:
+def planted(mistake):
     """The firmware with a mistake of the table `tests.mutants.planted`."""
     one = PLANTED[mistake]
     return built(one.file, one.right, one.wrong)
 
 
 @cache
-def built(file: str, right: str, wrong: str) -> Image:
+def built(file, right, wrong):
     """The firmware with `right` in a source file, where it stands once, replaced by `wrong`."""
     text = source_files()[file]
     assert text.count(right) == 1
@@ -91,7 +85,7 @@ def built(file: str, right: str, wrong: str) -> Image:
     return load_hex(found.image)
 
 
-def built_in(folder: Path, file: str, right: str, wrong: str) -> Image:
+def built_in(folder, file, right, wrong):
     """The same as files of one's own: the sources in `firmware`, the image with its symbols in `out`."""
     image = built(file, right, wrong)
     shutil.copytree(SOURCE, folder / "firmware")

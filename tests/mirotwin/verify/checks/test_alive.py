@@ -1,10 +1,7 @@
 """Dead, deaf and lame robots fail any run that sends them frames; robots that nothing reaches are not judged."""
 
-from __future__ import annotations
-
 import pytest
 
-from miro_robot.image import Image
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
@@ -18,11 +15,11 @@ OTHER_BAUD = ("uart.c", "SCON = MODE_1_RECEIVE;", "SCON = MODE_1_RECEIVE; RCAP2L
 NO_FILTER = ("motion.c", "    lm629_command(UDF);", "    ;")
 
 
-def judged(scenario: World) -> dict[str, str]:
+def judged(scenario):
     return finish(scenario, Checks(scenario))
 
 
-def world(image: Image, *settings: str, name: str = "line", seed: int = 0) -> World:
+def world(image, *settings, name="line", seed=0):
     return World(load(name, ("duration_s=1.0", *settings)).scenario, seed, image)
 
 

@@ -7,7 +7,6 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, Tracks
-from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
 from tests.mirotwin.verify.checks.rig import MS, own_image
 
@@ -17,7 +16,7 @@ WEAK = "network.robot.drive.battery.voltage_v=0.7"
 FEW = f"duration_s={PERIODS * CONTROL_PERIOD_TICKS / 24e6}"
 
 
-def judged(*settings: str, name: str = "line") -> tuple[list[Failure], Tracks, dict[str, str]]:
+def judged(*settings, name="line"):
     world = World(load(name, [FEW, *settings]).scenario, 2, own_image())
     checks, tracks = Checks(world), Tracks()
     while not world.finished:
@@ -26,7 +25,7 @@ def judged(*settings: str, name: str = "line") -> tuple[list[Failure], Tracks, d
     return checks.failures, tracks, {one.name: one.verdict for one in checks.verdicts()}
 
 
-def errors(tracks: Tracks):
+def errors(tracks):
     (track,) = tracks.robots.values()
     return list(track.errors)
 

@@ -29,7 +29,7 @@ reference.kind = "arc"
 """
 
 
-def names(all_: str, one: str = "") -> dict[tuple[int, int], list[str]]:
+def names(all_, one=""):
     scenario = parse(TWO.format(all=all_, one=one), "two")
     return {
         place: [check.name for check in checks] for place, checks in expectations_of(scenario, "two").items()

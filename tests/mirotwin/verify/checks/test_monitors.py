@@ -11,7 +11,7 @@ from miro_sim.world import conditions
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.interface import Check, Monitor, Subject
+from mirotwin.verify.checks.interface import Check, Monitor
 from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
 from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
@@ -34,7 +34,7 @@ robot = [{{ slot = 4, reference.kind = "line", start_error_x_cm = 3.0 }}]
 """
 
 
-def judged(seed: int, advance, text: str = TWO):
+def judged(seed, advance, text=TWO):
     scenario = parse(text, "two", (), expectations_of)
     world = World(scenario, seed, own_image())
     checks = Checks(world)
@@ -59,7 +59,7 @@ def test_a_run_with_all_checks_has_the_digest_of_one_without(seed):
 def test_stops_and_waits_at_any_tick_change_no_verdict(seed):
     draw = random.Random(seed)
 
-    def wander(world: World) -> None:
+    def wander(world):
         if draw.random() < 0.5:
             world.run_to(world.tick + draw.randrange(1, 900_000))
         else:
@@ -122,14 +122,14 @@ def test_events_that_the_log_no_longer_holds_leave_nothing_judged():
 class Raising(Check, frozen=True, kw_only=True, tag="raising"):
     KIND = "safety"
 
-    def monitor(self, subject: Subject) -> Monitor[Check]:
+    def monitor(self, subject):
         return RaisingMonitor(self, subject)
 
 
 class RaisingMonitor(Monitor[Raising]):
     EVENTS = ("received",)
 
-    def event(self, event: Event) -> None:
+    def event(self, event):
         raise KeyError("speed")
 
 
@@ -148,18 +148,18 @@ def test_what_a_check_raises_is_told_with_robot_and_name():
 class Listing(Check, frozen=True, kw_only=True, tag="listing"):
     KIND = "safety"
 
-    def monitor(self, subject: Subject) -> Monitor[Check]:
+    def monitor(self, subject):
         return ListingMonitor(self, subject)
 
 
 class ListingMonitor(Monitor[Listing]):
     EVENTS = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
 
-    def __init__(self, check: Listing, subject: Subject) -> None:
+    def __init__(self, check, subject):
         super().__init__(check, subject)
         self.heard: list[Event] = []
 
-    def event(self, event: Event) -> None:
+    def event(self, event):
         self.heard.append(event)
 
 

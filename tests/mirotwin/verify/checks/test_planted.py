@@ -3,7 +3,6 @@
 import pytest
 
 from miro_protocol.frames import ServiceFrame, encode
-from miro_robot.image import Image
 from tests.mirotwin.verify.checks.rig import built, finish, needs_sdcc, planted, send, silent_world, team
 
 ALL = """
@@ -47,7 +46,7 @@ ALWAYS = {
 }
 
 
-def verdicts(image: Image | None) -> dict[str, str]:
+def verdicts(image):
     """After a run in which the host says all kinds of things and then falls silent."""
     world, checks = silent_world(ALL, image)
     damaged = bytearray(encode(team(7, 4000, 3000), 3))

@@ -1,14 +1,12 @@
 """A question that comes while the robot still answers need not be answered; the one before it must."""
 
 from miro_protocol.frames import encode
-from miro_robot.image import Image
-from miro_sim.world.world import World
 from tests.mirotwin.verify.checks.rig import finish, needs_sdcc, planted, silent_world, team
 
 ANSWERS = "answers_within_ms = true\nanswers_only_in_turn = true"
 
 
-def ask_twice(world: World) -> None:
+def ask_twice(world):
     """The second question, without its preamble, ends 17.7 ms after the first: the answer takes 20 ms."""
     world.run_for(24_000 * 50)
     world.inject(encode(team(1, 100, 100, ask=True), 3))
@@ -16,7 +14,7 @@ def ask_twice(world: World) -> None:
     world.run_for(24_000 * 200)
 
 
-def verdicts(image: Image | None) -> dict[str, str]:
+def verdicts(image):
     world, checks = silent_world(ANSWERS, image)
     ask_twice(world)
     return finish(world, checks)

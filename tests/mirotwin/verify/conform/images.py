@@ -1,10 +1,8 @@
 """Programs that are no firmware for the robot: each is some bytes of 8051 code, from address 0 on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-from miro_robot.image import Image, parse_hex
+from miro_robot.image import parse_hex
 
 HANGS = bytes.fromhex("80 fe")  # SJMP $
 FAULTS = bytes.fromhex("a5 80 fd")  # the undefined opcode, again and again
@@ -17,16 +15,16 @@ POKES = bytes.fromhex("75 a0 e6 75 80 01 b2 a2 80 fc")  # writes to both LM629 w
 READS_BOTH = bytes.fromhex("75 a0 e4 b2 a1 80 fc")
 
 
-def hex_of(code: bytes) -> str:
+def hex_of(code):
     """Intel HEX."""
     records = [_record(at, 0, code[at : at + 16]) for at in range(0, len(code), 16)]
     return "\n".join([*records, _record(0, 1, b"")]) + "\n"
 
 
-def _record(address: int, kind: int, data: bytes) -> str:
+def _record(address, kind, data):
     body = bytes([len(data), address >> 8, address & 0xFF, kind]) + data
     return f":{body.hex().upper()}{-sum(body) & 0xFF:02X}"
 
 
-def image_of(code: bytes) -> Image:
+def image_of(code):
     return parse_hex(hex_of(code).encode(), Path("program.ihx"))

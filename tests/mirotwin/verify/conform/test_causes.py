@@ -1,10 +1,6 @@
 """Which rule is judged, what `mirotwin conform` begins with, and what it says of usual mistakes."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -13,7 +9,6 @@ from hypothesis import strategies as st
 
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform import run
-from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.run import Outcome, try_all, with_faults
 from mirotwin.verify.conform.table import RULES, find, presupposed
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
@@ -31,7 +26,7 @@ LINES = 3
 def test_presuppositions_are_rules_and_no_rule_presupposes_itself():
     by_id = {rule.id: rule for rule in RULES}
 
-    def walk(id: str, path: tuple[str, ...]) -> None:
+    def walk(id, path):
         assert id not in path, f"{' -> '.join((*path, id))} is a circle"
         for other in by_id[id].presupposes:
             walk(other, (*path, id))
@@ -62,7 +57,7 @@ def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(
     tried = []
     whole = run.try_rule
 
-    def noted(rule: Any, *others: Any) -> Any:
+    def noted(rule, *others):
         tried.append(rule.id)
         return whole(rule, *others)
 
@@ -78,7 +73,7 @@ def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(
 def test_no_rule_that_would_fail_passes_and_each_that_is_not_judged_has_a_cause_that_failed(failing, chosen):
     rules = [msgspec.structs.replace(rule, probe=None) for rule in RULES if rule in chosen]
 
-    def tried(rule: Rule, *others: Any) -> Outcome:
+    def tried(rule, *others):
         failed = (Failure("conforms_to", 0, 1, 7, "one", "another"),) if rule.id in failing else ()
         return Outcome(rule.id, failed)
 
@@ -140,7 +135,7 @@ def test_the_table_begins_with_the_rule_that_hides_most_and_folds_those_that_it_
     assert len(rows) == others
 
 
-def planted_image(name: str) -> Path:
+def planted_image(name):
     one = FIRST_LINES[name]
     file, right, wrong = one.source or PLANTED[name][1:4]
     sources = source_files()

@@ -1,7 +1,5 @@
 """`mirotwin conform`: table, exit codes, files, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from xml.etree import ElementTree
@@ -23,13 +21,13 @@ from tests.mirotwin.verify.conform.images import (
 from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 
-def program(folder: Path, code: bytes) -> Path:
+def program(folder, code):
     path = folder / "program.ihx"
     path.write_text(hex_of(code))
     return path
 
 
-def planted_file(folder: Path, name: str) -> Path:
+def planted_file(folder, name):
     mistake = MISTAKES[name]
     built_in(folder, mistake.file, mistake.right, mistake.wrong)
     return folder / "out" / "miro.ihx"

@@ -1,13 +1,11 @@
 """Frames that are sealed in usual wrong ways, and what is told of a robot by them."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_protocol.frames import seal
-from miro_protocol.table import DOWNLINK, TELEMETRY, Format
+from miro_protocol.table import DOWNLINK, TELEMETRY
 from mirotwin.verify.checks.orders import Order
 from mirotwin.verify.conform.hints import wheels_instead
 from mirotwin.verify.conform.sealing import MISTAKES, Sealing, mistake_in
@@ -18,7 +16,7 @@ ENDS = st.integers(-16633, 16633)
 PAIRS = st.tuples(ENDS, ENDS)
 
 
-def bodies(form: Format) -> st.SearchStrategy[bytes]:
+def bodies(form):
     return st.binary(min_size=form.body_size, max_size=form.body_size)
 
 
@@ -61,11 +59,11 @@ def test_the_mistake_in_an_answer_is_found_by_its_characters_alone(data):
     )
 
 
-def told(pair: tuple[int, int]) -> list[Order]:
+def told(pair):
     return [Order(0, side, "drive", word << 8) for side, word in zip(("left", "right"), pair, strict=True)]
 
 
-def frame(*words: tuple[int, int]) -> Frame:
+def frame(*words):
     return Frame(0, 0, 0, 1, words, "team frame")
 
 

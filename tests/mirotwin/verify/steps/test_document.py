@@ -1,7 +1,5 @@
 """The page of the steps: its example runs, its tables have every verb, kind and key."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,13 +1,10 @@
 """Mistakes that are planted in the firmware's source are found by the example's steps files, without Python."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
-from miro_robot.image import Image
-from mirotwin.verify.steps.running import Outcome, run_test
+from mirotwin.verify.steps.running import run_test
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
 
 EXAMPLES = Path(__file__).parents[4] / "examples" / "hil-steps"
@@ -36,7 +33,7 @@ MISTAKES = {
 }
 
 
-def run(path: Path, image: Image) -> Outcome:
+def run(path, image):
     return run_test(str(path), image)
 
 

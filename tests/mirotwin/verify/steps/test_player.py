@@ -1,17 +1,13 @@
 """Steps are done in virtual time: actions take none, waits end at their event and lose nothing."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import msgspec
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Action
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.transmission import DOWN, Transmission
-from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.world import World
 from mirotwin.verify.cases.case import Trace
@@ -31,13 +27,13 @@ network = [{{ host = "silent", robot = [
 """
 
 
-def sent_by(player: Player) -> list[Transmission]:
+def sent_by(player):
     """What the hosts had sent when the run was over: the run is made again, and looked at."""
-    found: list[Transmission] = []
+    found = []
     scenario = player.world.scenario
     world = World(scenario, player.world.seed, player.world.image)
 
-    def look(period: Period) -> None:
+    def look(period):
         found.extend(one for one in period.wire if one.direction == DOWN)
 
     world.observers.append(look)
@@ -47,7 +43,7 @@ def sent_by(player: Player) -> list[Transmission]:
     return found
 
 
-def frames_of(sent: list[Transmission]) -> list[Received]:
+def frames_of(sent):
     decoder = Decoder(3)
     found = [event for one in sent for event in decoder.feed_symbols(one.symbols())]
     return [event for event in found if isinstance(event, Received)]
@@ -280,7 +276,7 @@ def test_what_a_step_saves_is_loaded_and_goes_on_to_the_same_digest():
     assert world.digest == player.world.digest
 
 
-def ticks_of(time_ms: float) -> int:
+def ticks_of(time_ms):
     return round(time_ms * MS)
 
 
@@ -351,7 +347,7 @@ def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_or
     assert world.digest == player.world.digest
 
 
-def actions_of(player: Player) -> list[Action]:
+def actions_of(player):
     """What was done in the run, which is made again."""
     world = World(player.world.scenario, player.world.seed, player.world.image)
     trace = Trace(world)

@@ -1,7 +1,5 @@
 """Tables of steps are read, and whatever is wrong with one is one line with its place."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 import tomli_w
@@ -223,4 +221,4 @@ def test_steps_say_what_their_tables_say(tables):
             assert step.within_ms == table.get("within_ms")
             assert msgspec.to_builtins(step.condition).get("accepted") == table.get("accepted")
         else:
-            assert step.condition == WheelSpeeds(left_m_s=table["left_m_s"])  # type: ignore[attr-defined]
+            assert step.condition == WheelSpeeds(left_m_s=table["left_m_s"])
