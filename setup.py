@@ -186,7 +186,7 @@ class BuildHot(build_ext):
 
     def _stamp(self, target):
         """Copies packages to `target` , hot modules with their stamp; unchanged files keep their time."""
-        hashes = hot_modules().source_hashes(package_dirs())
+        hashes = hot_modules().source_hashes(package_dirs(), hot_modules().hot_sources(package_dirs()))
         hot = {}
         for package, folder in package_dirs().items():
             for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.pyx"), *folder.rglob("*.pxd")]):

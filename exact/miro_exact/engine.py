@@ -60,10 +60,17 @@ def installed_dirs() -> dict[str, Path]:
 
 
 @cache
+def _installed_sources() -> dict[str, Path]:
+    from miro_exact.hot_modules import hot_sources
+
+    return hot_sources(installed_dirs())
+
+
+@cache
 def _installed_hashes() -> dict[str, str]:
     from miro_exact.hot_modules import source_hashes
 
-    return source_hashes(installed_dirs())
+    return source_hashes(installed_dirs(), _installed_sources())
 
 
 def refuse_if_stale(name: str, stamp: str) -> None:
@@ -82,11 +89,10 @@ class EngineFinder:
     @cached_property
     def sources(self) -> dict[str, Path]:
         """Dotted name -> source file of every hot module that is installed, and of what they share."""
-        from miro_exact.hot_modules import SHARED, hot_sources
+        from miro_exact.hot_modules import SHARED
 
-        dirs = installed_dirs()
         package, _, name = SHARED.partition(".")
-        return {SHARED: dirs[package] / name, **hot_sources(dirs)}
+        return {SHARED: installed_dirs()[package] / name, **_installed_sources()}
 
     def missing(self) -> list[str]:
         """Hot modules that have no compiled twin."""
@@ -104,6 +110,8 @@ class EngineFinder:
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """A spec for the source of a hot module when the engine is `python`, else None: others find it."""
+        if self.engine == "compiled":
+            return None
         package, _, stem = fullname.rpartition(".")
         if path is None or package.partition(".")[0] not in PACKAGES:
             return None
@@ -113,8 +121,8 @@ class EngineFinder:
         if self.engine is None:
             check_arithmetic()
             self.engine = "python" if self.missing() else "compiled"
-        if self.engine == "compiled":
-            return None
+            if self.engine == "compiled":
+                return None
         from importlib.util import spec_from_file_location
 
         return spec_from_file_location(fullname, source, loader=SourceFileLoader(fullname, source))

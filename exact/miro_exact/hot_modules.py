@@ -34,12 +34,12 @@ def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-def source_hashes(package_dirs: dict[str, Path]) -> dict[str, str]:
+def source_hashes(package_dirs: dict[str, Path], sources: dict[str, Path]) -> dict[str, str]:
     """Dotted name -> SHA-256 over the module's source, its `.pxd` and every `.pxd` that this one builds upon.
 
     These files fix the C layout that a compiled module relies on. `places.py` counts too: it adds to each of them.
+    `sources`: what `hot_sources` found in these folders, which takes as long as all of this.
     """
-    sources = hot_sources(package_dirs)
     texts = {name: _text(source.with_suffix(".pxd")) for name, source in sources.items()}
     import hashlib  # slow to load
 

@@ -35,8 +35,9 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from operator import attrgetter
-from struct import Struct
+from struct import Struct, calcsize
 from typing import Any, NamedTuple, Protocol
 
 from miro_exact import engine
@@ -108,6 +109,7 @@ def table(cls: type) -> dict[str, Any]:
     return found
 
 
+@cache
 def kind_of(declared: Any) -> Kind:
     """What a table says of a field that is no part."""
     if isinstance(declared, str):
@@ -359,7 +361,7 @@ def _memory_field(
     count = kind.room if isinstance(kind, Queue) else max(kind.count, 1)
     if CODES.get(c_type) != kind.code or size % count or (kind.bounds and kind.code not in "iqBd"):
         raise TypeError(f"{field.path}: {c_type} of {size} bytes is declared as {count} {kind.code}")
-    if size // count != Number(kind.code).layout.size:
+    if size // count != calcsize(f"<{kind.code}"):
         raise TypeError(f"{field.path}: {size} bytes are declared as {count} {kind.code}")
     low, high = kind.bounds or (None, None)
     end = (places[kind.end][0], places[kind.end][2]) if isinstance(kind, Queue) else None

@@ -47,10 +47,11 @@ def package(tmp_path):
     ],
 )
 def test_a_module_is_stale_after_a_change_of_its_source_or_of_a_layout_it_builds_upon(package, file, stale):
-    before = hot_modules.source_hashes({"house": package})
+    dirs = {"house": package}
+    before = hot_modules.source_hashes(dirs, hot_modules.hot_sources(dirs))
     with (package / file).open("a") as changed:
         changed.write("# changed\n")
-    after = hot_modules.source_hashes({"house": package})
+    after = hot_modules.source_hashes(dirs, hot_modules.hot_sources(dirs))
     assert {name for name in after if after[name] != before[name]} == stale
 
 
