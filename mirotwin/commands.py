@@ -149,5 +149,5 @@ def main() -> None:
     """A bit-exact twin of a vision-guided soccer robot.
 
     Exit codes: 0 done, 1 expectation failed, 2 bad input, 3 firmware fault, 4 divergence,
-    42 cycle limit reached; 70 internal error, 130 and 143 ended by Ctrl-C and SIGTERM.
+    5 nothing judged, 42 cycle limit reached; 70 internal error, 130 and 143 ended by Ctrl-C and SIGTERM.
     """

@@ -25,7 +25,7 @@ def described(error: BaseException) -> str:
 
 def raised(error: BaseException) -> str:
     """Type, message and place of what a plug-in raised, in one line."""
-    return at_place(described(error), raised_at(error))
+    return at_place(described(error), raised_at(error) or _raised_by_ours(error))
 
 
 def at_place(what: str, place: str) -> str:
@@ -47,6 +47,20 @@ def raised_at(error: BaseException) -> str:
             found = _place(code, trace.tb_lineno)
         trace = trace.tb_next
     return found
+
+
+def _raised_by_ours(error: BaseException) -> str:
+    """Where our own code raised it, below who caught it: in a plug-in of this tree."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if (
+        trace is None
+        or trace is error.__traceback__
+        or not _is_ours(trace.tb_frame.f_globals.get("__name__"))
+    ):
+        return ""
+    return _place(trace.tb_frame.f_code, trace.tb_lineno)
 
 
 def defined_at(function: Any) -> str:

@@ -14,7 +14,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.world.world import World
-from mirotwin.ports.live import live_scenario
+from mirotwin.ports.serve_command import live_scenario
 from mirotwin.ports.url import UrlOptions
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.rerun import runner

@@ -35,7 +35,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK, seconds, ticks
 from miro_robot.faults import FirmwareFault
 from miro_sim.world.world import World
-from mirotwin.ports.byte_fifo import ByteFifo
+from mirotwin.ports.endpoint import ByteFifo
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.recorded_world import RecordedWorld, open_world
 from mirotwin.ports.time_policy import RealTime, TimePolicy, VirtualTime

@@ -9,7 +9,7 @@ from typing import Protocol
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
 from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
-from mirotwin.ports.byte_fifo import ByteFifo
+from mirotwin.ports.endpoint import ByteFifo
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.rerun.pacing import Pace
 

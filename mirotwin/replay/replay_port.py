@@ -23,7 +23,7 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.desk.compare import PortComparison, compare
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort, realtime_priority
-from mirotwin.ports.live import live_settings
+from mirotwin.ports.serve_command import live_settings
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json

@@ -35,6 +35,8 @@ EXPECTATION_FAILED = 1
 BAD_INPUT = 2
 FIRMWARE_FAULT = 3
 DIVERGENCE = 4
+NOTHING_JUDGED = 5
+"""As pytest's, where no test was collected."""
 LIMIT_REACHED = 42
 INTERNAL_ERROR = 70
 """EX_SOFTWARE of sysexits.h."""

@@ -24,7 +24,15 @@ from mirotwin.shell.options import (
     choose_engine,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
-from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
+from mirotwin.shell.program import (
+    BAD_INPUT,
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    NOTHING_JUDGED,
+    show_line,
+    tell_notes,
+)
 from mirotwin.testing.case_test import CaseTests
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_debug_line, case_line, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
@@ -45,7 +53,7 @@ CODES: dict[Verdict, int] = {
     "fault": FIRMWARE_FAULT,
     "failed": EXPECTATION_FAILED,
     "passed": DONE,
-    "not observable": DONE,
+    "not observable": NOTHING_JUDGED,
 }
 """In the order of precedence."""
 
@@ -112,7 +120,7 @@ def test(options: TestOptions) -> int:
     recording. A case is refused.
 
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
-    none. Where several apply: 2, then 3, then 1.
+    none. Where several apply: 2, then 3, then 1. 5: nothing was judged, because a port shows none of it.
     """
     choose_engine(options.engine)
     word, junit, desk = options.word, options.junit, options.desk

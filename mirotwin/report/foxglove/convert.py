@@ -6,6 +6,8 @@ Foxglove's form. So what reads recordings reads it too. The same recording gives
 
 from __future__ import annotations
 
+from functools import cache
+from importlib import resources
 from io import BytesIO
 
 import msgspec
@@ -17,7 +19,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording import reader
+from mirotwin.recording import reader, schemas
 from mirotwin.recording.channels import FaultMessage
 from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.images import ImageMessage
@@ -25,9 +27,24 @@ from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.topics import IMAGE, PERIOD, Topic, image_topic, topic_of
 from mirotwin.recording.writer import McapWriter, Writable
-from mirotwin.report.foxglove import derived, notes
+from mirotwin.report.foxglove import derived, messages, notes
 from mirotwin.report.foxglove.derived import Derived, Said
-from mirotwin.report.foxglove.published import schema_of
+
+PREFIX = "foxglove."
+
+
+def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
+    """Name and text of a message's schema: Foxglove's for its messages, ours for all others."""
+    if type(message).__module__ != messages.__name__:
+        return schemas.schema_name(message), msgspec.json.encode(schemas.schema(message))
+    name = type(message).__name__
+    return PREFIX + name, _published(name)
+
+
+@cache
+def _published(name: str) -> bytes:
+    return (resources.files("mirotwin.report.foxglove") / "schemas" / f"{name}.json").read_bytes()
+
 
 FAULT = "fault"
 

@@ -30,7 +30,14 @@ from mirotwin.shell.options import (
     choose_engine,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
-from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
+from mirotwin.shell.program import (
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    NOTHING_JUDGED,
+    complain,
+    show_line,
+)
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
@@ -93,7 +100,8 @@ def conform(options: ConformOptions) -> int:
     observable, one that needs times which the PC cannot keep, or motion that is not allowed, is not judged; neither is
     passed.
 
-    Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials.
+    Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials; 5: no rule
+    was judged.
     """
     choose_engine(options.engine)
     every = EVERY_RULE if options.long or options.listing else RULES
@@ -140,8 +148,9 @@ def conform(options: ConformOptions) -> int:
         _tell(outcomes, rules, options, properties)
     if lost is not None:
         raise lost
-    wrong = any(one.failures or one.cause for one in outcomes)
-    return _report_faults(outcomes) or (EXPECTATION_FAILED if wrong else DONE)
+    if any(one.failures or one.cause for one in outcomes):
+        return _report_faults(outcomes) or EXPECTATION_FAILED
+    return _report_faults(outcomes) or (DONE if any(one.passed for one in outcomes) else NOTHING_JUDGED)
 
 
 def _tell(

@@ -77,7 +77,7 @@ def test_waits_inside_the_robot_are_passed_over_and_counted(at_port):
 
 def test_a_file_of_which_nothing_can_be_seen_does_not_pass(at_port):
     code, out, _ = at_port(INSIDE)
-    assert (code, out.startswith("not observable ")) == (0, True)
+    assert (code, out.startswith("not observable ")) == (5, True)
     assert "passed" not in out
 
 
@@ -106,7 +106,7 @@ def test_a_step_that_moves_is_refused_unless_it_is_allowed(at_port):
 
 def test_a_controller_needs_more_than_a_port(at_port):
     code, out, _ = at_port("".replace("", ""), "--set", 'network.host="controller"')
-    assert (code, "a controller, which needs a camera: not observable on a port" in out) == (0, True)
+    assert (code, "a controller, which needs a camera: not observable on a port" in out) == (5, True)
 
 
 def test_the_recording_of_a_test_is_compared_with_its_twin(at_port, mirotwin, tmp_path):

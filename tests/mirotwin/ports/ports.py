@@ -7,8 +7,8 @@ from typing import TypeVar
 
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, PortContext
-from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.serve_command import live_scenario
 from tests.mirotwin.ports.rig import own_image
 
 Port = TypeVar("Port", bound=Endpoint)

@@ -9,8 +9,8 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import source_text
 from miro_sim.world.world import World
-from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
+from mirotwin.ports.serve_command import live_scenario
 from mirotwin.rerun.script import script_of
 from tests.mirotwin.ports.rig import own_image, question
 

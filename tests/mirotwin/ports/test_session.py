@@ -4,10 +4,9 @@ import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_sim.world.world import World
-from mirotwin.ports.byte_fifo import ByteFifo
-from mirotwin.ports.endpoint import Endpoint, PortContext
-from mirotwin.ports.live import live_scenario
+from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.serve_command import live_scenario
 from mirotwin.ports.session import Session
 from mirotwin.rerun import runner
 from mirotwin.rerun.script import script_of

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
-from mirotwin.report.foxglove import messages, published
+from mirotwin.report.foxglove import convert, messages
 from tests.mirotwin.report.foxglove.validate import problems
 
 NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
@@ -88,7 +88,7 @@ def back(message):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_messages(name):
-    schema = msgspec.json.decode(published._published(name))
+    schema = msgspec.json.decode(convert._published(name))
     assert schema["title"] == f"foxglove.{name}"
     assert schema_fields(schema, of_protobuf(name).DESCRIPTOR, name) == []
 
@@ -126,7 +126,7 @@ def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown):
     ],
 )
 def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage):
-    schema = msgspec.json.decode(published._published("Log"))
+    schema = msgspec.json.decode(convert._published("Log"))
     line = messages.Log(messages.time_of(1), messages.INFO, "words", "net0")
     good = msgspec.to_builtins(line)
     assert list(problems(good, schema)) == []
