@@ -1,5 +1,7 @@
 """Runs and debuggers for the tests of this folder."""
 
+import json
+
 from miro_robot.firmware import source_folder
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
@@ -8,13 +10,19 @@ from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.rerun.inspected_run import RobotRun
 from mirotwin.shell.firmware_image import load_firmware
+from tests.sim.digests import GOLDEN
 
 SECOND = 24_000_000
 
 
-def robot_run(scenario="fig6", seed=3, firmware=None, index=0):
+def robot_run(scenario="fig6", seed=7, firmware=None, index=0, settings=()):
     """A run of a scenario at its first tick."""
-    return RobotRun(World(load(scenario, ()).scenario, seed, load_firmware(firmware)), 0, index)
+    return RobotRun(World(load(scenario, settings).scenario, seed, load_firmware(firmware)), 0, index)
+
+
+def golden_digest(name):
+    """The digest at the end of a run that is frozen, as `fig6 6 s seed 7`."""
+    return json.loads(GOLDEN.read_text())[name]
 
 
 def debugger_of(run, everyone=False):

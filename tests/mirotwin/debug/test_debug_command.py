@@ -5,6 +5,7 @@ import shutil
 import pytest
 
 from miro_robot.firmware import image_path
+from tests import children
 from tests.mirotwin.debug.runs import robot_run
 from tests.robot.mcs51.asm import assemble
 
@@ -81,7 +82,7 @@ def test_a_saved_world_is_gone_on_from(mirotwin, tmp_path):
     saved = tmp_path / "at.world"
     saved.write_bytes(world.save())
     code, out, err = mirotwin(
-        "debug", "fig6", "--seed", 3, "--resume", saved, *commands("print tick", "rcontinue")
+        "debug", "fig6", "--seed", 7, "--resume", saved, *commands("print tick", "rcontinue")
     )
     assert (code, err) == (0, "")
     assert "tick = 1200" in out
@@ -157,6 +158,20 @@ def test_debug_files_of_another_image_are_refused(mirotwin, bare, tmp_path):
     code, _, err = mirotwin("debug", image, *commands("where"))
     assert code == 2
     assert "it belongs to another image" in err
+
+
+@pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
+def test_debug_files_of_an_image_that_differs_in_a_constant_are_refused(mirotwin, tmp_path):
+    for limit in (110, 125):
+        text = f"unsigned char age; void main(void) {{ while (1) if (age == {limit}) age = 0; }}"
+        (tmp_path / f"{limit}").mkdir()
+        (tmp_path / f"{limit}" / "late.c").write_text(text)
+        children.run(["sdcc", "-mmcs51", "--debug", "late.c"], cwd=tmp_path / f"{limit}", check=True)
+    shutil.copy(tmp_path / "125" / "late.ihx", tmp_path / "110" / "late.ihx")
+    code, _, err = mirotwin("debug", tmp_path / "110" / "late.ihx", *commands("where"))
+    assert code == 2
+    assert "late.rst" in err
+    assert "is the listing of another image" in err
 
 
 def test_lines_from_another_firmware_are_refused(mirotwin, finished, bare):

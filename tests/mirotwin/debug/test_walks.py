@@ -4,7 +4,7 @@ import pytest
 
 from mirotwin.debug import timeline as timelines
 from mirotwin.debug.timeline import Timeline, Trap
-from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
+from tests.mirotwin.debug.runs import SECOND, debugger_of, golden_digest, robot_run
 from tests.mirotwin.debug.walks import differences, walk
 
 
@@ -16,13 +16,11 @@ def test_states_of_a_random_walk_are_those_of_an_unbroken_run(seed):
     assert differences(stops, robot_run()) == []
 
 
-def test_the_digest_behind_a_walk_is_that_of_a_plain_run():
-    debugger = debugger_of(robot_run())
+def test_the_digest_at_the_end_of_a_walk_is_the_golden_one():
+    debugger = debugger_of(robot_run(settings=["duration_s=0.5"]))
     list(walk(debugger, 20, SECOND // 4, 3))
-    debugger.go_to(SECOND)
-    plain = robot_run()
-    plain.to(debugger.timeline.tick)
-    assert debugger.timeline.run.world.digest == plain.world.digest
+    debugger.go_to(debugger.timeline.run.end_tick)
+    assert debugger.timeline.run.world.digest == golden_digest("fig6 0.5 s seed 7")
 
 
 def test_checkpoints_stay_within_their_budget_and_any_moment_can_be_gone_to(monkeypatch):
