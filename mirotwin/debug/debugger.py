@@ -20,7 +20,7 @@ from miro_robot.mcs51.opcodes import LENGTH, is_call
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
-from mirotwin.rerun.inspected_run import BareRun
+from mirotwin.rerun.inspected_run import RobotRun
 
 How = Literal["into", "over", "out"]
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
@@ -131,7 +131,7 @@ class Debugger:
     def _writers(self, written: Bytes) -> Collection[int]:
         """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""
         run, unwinder = self.timeline.run, self.symbols.unwinder
-        if isinstance(run, BareRun) and run.machine.bus.code_of is not None:
+        if not isinstance(run, RobotRun) and run.machine.bus.code_of is not None:
             return self.timeline.everywhere
         first, last = self.symbols.image.symbols.stack()
         on_stack = written.first <= last and written.end > first
@@ -246,8 +246,8 @@ class Debugger:
         if not self.timeline.run.over:
             return ""
         faults = [core.board.faults[-1] for core in self.timeline.cores if core.board and core.board.faults]
-        if isinstance(self.timeline.run, BareRun):
-            faults = self.timeline.run.machine.faults[-1:]
+        if not isinstance(self.timeline.run, RobotRun):
+            faults = list(self.timeline.run.machine.faults[-1:])
         return f"firmware fault: {faults[-1]}" if faults else "the run ends here"
 
     # By instruction

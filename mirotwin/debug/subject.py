@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Annotated, Any
 
 import click
@@ -12,20 +13,24 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
-from miro_robot.image import Image
+from miro_robot.image import SPACE_BYTES
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run
 from mirotwin.replay.firmwares import LinesFrom, debugged_image, load_images
-from mirotwin.rerun.inspected_run import BareRun, RobotRun
+from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import AT, RESUME, choose_engine
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
+from mirotwin.verify.bare.case import rerun_bare_case
+from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
+from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
@@ -79,9 +84,9 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
     if os.path.isdir(subject):
         subject = file_in(subject, (*RECORDINGS, *CASES))
         options = msgspec.structs.replace(options, subject=subject)
-    case = _case(options)
-    run = open_run(options) if case is None else _run_of(*case, options)
-    assert isinstance(run, RobotRun | BareRun)
+    case, judge = _opened(options)
+    run = case if case is not None else open_run(options)
+    assert isinstance(run, RobotRun | BareRun | CaseRun)
     if options.resume is not None:
         _resume(run, options.resume)
     image, folders = debugged_image(
@@ -92,9 +97,9 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
     session = Session(Debugger(timeline, symbols, everyone), [], "begin")
     if not image.symbols.names:
         session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
-    if case is not None:
+    if judge is not None:
         session.why = "case"
-        verdict, failure = _judge(case[0], timeline, subject)
+        verdict, failure = judge(timeline)
         session.said.append(verdict)
         if failure is not None:
             _stand_at(timeline, failure, options.slot)
@@ -104,40 +109,60 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
     return session
 
 
-def _case(options: DebugSubject) -> tuple[Job, Image] | None:
-    """The job and the image of a case; None for what is not one."""
+Judge = Callable[[Timeline], tuple[str, Failure | None]]
+"""Says what the check of a case says this time, and gives its failure."""
+
+
+def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | None]:
+    """A case and how it is judged; None for what is not one."""
     path = options.subject
     if not os.path.isfile(path) or path.lower().endswith((*IMAGE_SUFFIXES, ".toml")):
-        return None
+        return None, None
     with open(path, "rb") as file:
         if file.read(1) != b"#":
-            return None
+            return None, None
+    if is_bare_case(path):
+        return _bare_case(options)
     choose_engine(options.engine)
     job, image = load_job(path, options.firmware, options.engine, options.settings)
-    return (job, image) if job.case.verdict else None
-
-
-def _run_of(job: Job, image: Image, options: DebugSubject) -> RobotRun:
+    if not job.case.verdict:
+        return None, None
     run = RobotRun(job.world(image), options.network or 0)
-    if options.slot is None:
-        return run
-    slots = [robot.slot for robot in run.world.networks[run.network].robots]
-    return RobotRun(run.world, run.network, slots.index(options.slot))
+    if options.slot is not None:
+        slots = [robot.slot for robot in run.world.networks[run.network].robots]
+        run = RobotRun(run.world, run.network, slots.index(options.slot))
+    return run, partial(_judge, job, options.subject)
 
 
-def _judge(job: Job, timeline: Timeline, path: str) -> tuple[str, Failure | None]:
-    """What the check of a case says this time, and its failure."""
+def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
+    choose_engine(options.engine)
+    path = options.subject
+    if options.firmware is None:
+        what = "is for a bare processor, which has no firmware of its own"
+        raise BadInput(path, "", what, "give --firmware IMAGE.ihx")
+    image = load_firmware(options.firmware, SPACE_BYTES)
+    again, header = rerun_bare_case(path, image)
+    failures = [] if again.failure is None else [again.failure]
+    end_tick = max([again.end_tick, *(one.tick for one in failures)])
+    playback = BarePlayback(image, again.line, again.script, end_tick, path)
+    return CaseRun(playback), lambda timeline: _verdict(header.verdict or "", failures)
+
+
+def _judge(job: Job, path: str, timeline: Timeline) -> tuple[str, Failure | None]:
     assert isinstance(timeline.run, RobotRun)
     world = timeline.run.world
     checks = Checks(world, expectations_of(job.scenario, path))
     timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
     checks.finish()
-    again = [one for one in checks.failures if str(one) == job.case.verdict]
-    failures = again or checks.failures
-    if not failures:
-        return f"does not fail; recorded: {job.case.verdict}", None
-    how = "fails as recorded" if again else "fails, but not as recorded"
-    return f"{how}: {failures[0]}", failures[0]
+    return _verdict(job.case.verdict, checks.failures)
+
+
+def _verdict(recorded: str, failures: Sequence[Failure]) -> tuple[str, Failure | None]:
+    again = [one for one in failures if str(one) == recorded] or failures
+    if not again:
+        return f"does not fail; recorded: {recorded}", None
+    how = "fails as recorded" if str(again[0]) == recorded else "fails, but not as recorded"
+    return f"{how}: {again[0]}", again[0]
 
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
@@ -147,7 +172,7 @@ def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
     timeline.go_to(failure.tick)
 
 
-def _resume(run: RobotRun | BareRun, path: str) -> None:
+def _resume(run: RobotRun | BareRun | CaseRun, path: str) -> None:
     if not isinstance(run, RobotRun):
         raise BadInput(path, "--resume", "is a world, and SUBJECT is none", "leave it out")
     try:

@@ -25,7 +25,7 @@ from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event, HostLog
 from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
-from mirotwin.rerun.inspected_run import BareRun, RobotRun
+from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 
 BUDGET_BYTES = 16 << 20
 CLOSE_TICKS = 48_000  # 2 ms
@@ -66,7 +66,9 @@ class _Checkpoint(NamedTuple):
 class Timeline:
     """`run` from its start on. `interrupted` is asked between pieces: true ends a search where it is."""
 
-    def __init__(self, run: RobotRun | BareRun, interrupted: Callable[[], bool] = lambda: False) -> None:
+    def __init__(
+        self, run: RobotRun | BareRun | CaseRun, interrupted: Callable[[], bool] = lambda: False
+    ) -> None:
         self.run = run
         self.interrupted = interrupted
         self.robots: list[Robot] = []
@@ -112,7 +114,7 @@ class Timeline:
     @property
     def everywhere(self) -> Collection[int]:
         """Where instructions may be."""
-        if isinstance(self.run, BareRun) and self.run.machine.bus.code_of is not None:
+        if not isinstance(self.run, RobotRun) and self.run.machine.bus.code_of is not None:
             return range(0x10000)
         return [address for first, end in self.run.image.used for address in range(first, end)]
 
@@ -148,7 +150,7 @@ class Timeline:
             log.cut(end)
         for robot in self.robots:
             del robot.board.faults[robot.board.fault_count :]
-        if isinstance(self.run, BareRun):
+        if not isinstance(self.run, RobotRun):
             self.run.resume()
 
     def _before(self, tick: int) -> int:
@@ -309,13 +311,9 @@ class Timeline:
         events = (event for _, event in log.since(0, heard=False))
         return [event for event in events if event.what in ("sent", "answer") and event.tick <= self.tick]
 
-    def _marks_of_bare(self) -> Collection[int]:
-        assert isinstance(self.run, BareRun)
-        return (*self.run.machine.ends, -1 if self.run.until is None else self.run.until)
-
     @contextmanager
     def _asking(self, traps: Mapping[int, Trap], tell: Callable[[Hit], bool]) -> Iterator[None]:
-        others = None if isinstance(self.run, RobotRun) else self._marks_of_bare
+        others = None if isinstance(self.run, RobotRun) else self.run.marks
         asking = []
         for at, trap in traps.items():
             core = self.cores[at]

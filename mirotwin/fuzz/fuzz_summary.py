@@ -15,7 +15,6 @@ from mirotwin.fuzz.fuzz_progress import clock, counted
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
-from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
 COVERAGE = "coverage.info"
@@ -94,8 +93,7 @@ def _print_crash(crash: Crash, more: int, out: Path, image: Image, check: str | 
     in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
     stream = out / crash.folder / f"{crash.name}.stream"
     show_line(f"    {replay_line(stream, foreign_path(image), in_file)}")
-    if not is_bare_case(stream):
-        show_line(f"    {debug_line(stream, foreign_path(image))}")
+    show_line(f"    {debug_line(stream, foreign_path(image))}")
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:

@@ -12,6 +12,7 @@ from miro_robot.image import Image
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.world import World
+from mirotwin.verify.bare.run import BarePlayback
 
 PIECE_TICKS = CONTROL_PERIOD_TICKS
 
@@ -99,6 +100,42 @@ class BareRun:
     def resume(self) -> None:
         """The machine was put back to an earlier moment."""
         self.ended = Ended.PAUSED
+
+    def marks(self) -> tuple[int, ...]:
+        """Where it may end: the machine marks these addresses itself."""
+        return (*self.machine.ends, *(() if self.until is None else (self.until,)))
+
+
+class CaseRun:
+    """A case of a bare processor: what it heard is played to it."""
+
+    def __init__(self, playback: BarePlayback) -> None:
+        self.playback = playback
+        self.machine = playback.processor
+        self.board: Board | None = None
+        self.cpu = playback.processor.cpu
+        self.image = playback.processor.image
+        self.end_tick: int | None = playback.end_tick
+        self.tick_hz = playback.line.crystal_hz
+
+    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
+        """Nothing but the serial port hears something."""
+
+    @property
+    def over(self) -> bool:
+        return bool(self.machine.bus.fault_kind) or self.cpu.cycles * CYCLE_TICKS >= self.playback.end_tick
+
+    def to(self, tick: int) -> None:
+        if not self.over:
+            self.playback.to(min(tick, self.playback.end_tick))
+
+    def resume(self) -> None:
+        """The processor was put back to an earlier moment."""
+        self.playback.put_back()
+
+    def marks(self) -> tuple[int, ...]:
+        """It ends nowhere by itself."""
+        return ()
 
 
 def watch(

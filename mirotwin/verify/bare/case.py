@@ -85,7 +85,7 @@ def rerun_bare(
     source: str = "",
 ) -> BareRerun:
     """Plays a script from power-on to `until_tick`, under the check `name`; a fault goes before what that says."""
-    run = BarePlayback(image, line, script, until_tick, source)
+    run = BarePlayback(image, line, script, until_tick, source).play()
     fault = run.processor.fault()
     what, tick = "", 12 * run.processor.cpu.cycles
     if fault is not None:
@@ -138,14 +138,21 @@ def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Cas
 
     Raises BadInput for what is no such case.
     """
+    again, header = rerun_bare_case(path, image, check)
+    changed = header.firmware_sha256 not in (None, image.sha256)
+    return verdict_of(header.verdict or "", [] if again.failure is None else [again.failure], changed)
+
+
+def rerun_bare_case(
+    path: str | Path, image: Image, check: str | None = None
+) -> tuple[BareRerun, stream.Header]:
+    """The same as what it did, and what the case says of itself."""
     case = stream.read(path)
     name, line, header = _name(case), _line(case), case.header
     judge = None if name in (NO_FAULT, NEVER_SLEEPS) else _check(case, name, check)
     script = _heard(case)
     end_tick = header.end_tick or max((one.tick for one in script), default=0)
-    failure = rerun_bare(image, line, script, end_tick, name, judge, case.source).failure
-    changed = header.firmware_sha256 not in (None, image.sha256)
-    return verdict_of(header.verdict or "", [] if failure is None else [failure], changed)
+    return rerun_bare(image, line, script, end_tick, name, judge, case.source), header
 
 
 def _name(case: stream.StreamFile) -> str:

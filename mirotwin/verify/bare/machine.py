@@ -82,6 +82,11 @@ class BareProcessor:
         symbol = self.image.symbols.name_at(bus.fault_pc)
         return FirmwareFault(FaultKind(bus.fault_kind), bus.fault_tick, bus.fault_pc, symbol)
 
+    @property
+    def faults(self) -> list[FirmwareFault]:
+        found = self.fault()
+        return [] if found is None else [found]
+
     def exchange(self) -> Exchange:
         """What went in and out since `RecordingBus.begin`, and the memories as they are now."""
         return Exchange(

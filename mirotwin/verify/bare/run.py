@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import NEVER_TICK
@@ -21,37 +22,57 @@ _LOOK = 2_000  # cycles between two looks at whether firmware sleeps
 
 
 class BarePlayback:
-    """`image` from power-on to `end_tick`, and on until it has sent what it had if it sleeps.
+    """`image` from power-on, which hears a script. `play` goes to `end_tick`, and on until it has sent what it had if
+    it sleeps.
 
     `idle`: it slept within the last 30 ms (at 24 MHz) before the end, or `sleeps` says that it never does.
     """
 
     def __init__(
-        self,
-        image: Image,
-        line: BareLine,
-        heard: Sequence[ScriptItem],
-        end_tick: int,
-        source: str = "",
+        self, image: Image, line: BareLine, heard: Sequence[ScriptItem], end_tick: int, source: str = ""
     ) -> None:
         self.processor = BareProcessor(image)
         self.line = line
         self.source = source
+        self.end_tick = end_tick
         self.idle = True
         self.sleeps = False
         self._end_of_last = 0
+        self._next = 0
+        starts = [one.tick - AHEAD_TICKS if isinstance(one, Transmission) else one.tick for one in heard]
         first = min((one.tick - AHEAD_TICKS for one in heard), default=line.begin_tick)
-        if not self._to(max(0, min(line.begin_tick, first))):
-            return
-        self._begin()
-        for one in heard:
-            if not self._to(one.tick - AHEAD_TICKS if isinstance(one, Transmission) else one.tick):
-                return
-            if isinstance(one, Transmission):
-                self._characters(one)
-            elif isinstance(one, Reset):
-                self._reset(one)
-        self._end(end_tick)
+        hears = [partial(self._hear, one) for one in heard]
+        begins = max(0, min(line.begin_tick, first))
+        self._inputs: list[tuple[int, Callable[[], None]]] = [
+            (begins, self._begin),
+            *zip(starts, hears, strict=True),
+        ]
+
+    def play(self) -> BarePlayback:
+        """To the end."""
+        if self.to(self._inputs[-1][0]):
+            self._end(self.end_tick)
+        return self
+
+    def to(self, tick: int) -> bool:
+        """Runs on to `tick`, and hears what comes up to there; False after a fault."""
+        while self._next < len(self._inputs):
+            at, hear = self._inputs[self._next]
+            if at > max(tick, 12 * self.processor.cpu.cycles):
+                break
+            if not self._to(at):
+                return False
+            self._next += 1
+            hear()
+        return self._to(tick)
+
+    def put_back(self) -> None:
+        """Its processor was put back to an earlier moment."""
+        bus, now = self.processor.bus, 12 * self.processor.cpu.cycles
+        self._next = sum(at <= now for at, _ in self._inputs)
+        self._end_of_last = 0
+        if bus.fault_tick > now:
+            bus.fault_kind = 0
 
     def verdict(self, check: NamedCheck | None) -> str:
         """What the check says is wrong, or the empty string. Without a check, faults count."""
@@ -72,6 +93,12 @@ class BarePlayback:
         self.processor.begin_tick = 12 * cpu.cycles
         self.sleeps = bool(cpu.idle or cpu.idle_cycles)
         self.processor.bus.begin()
+
+    def _hear(self, one: ScriptItem) -> None:
+        if isinstance(one, Transmission):
+            self._characters(one)
+        elif isinstance(one, Reset):
+            self._reset(one)
 
     def _characters(self, sent: Transmission) -> None:
         if sent.tick < self._end_of_last:

@@ -7,6 +7,8 @@ import pytest
 from miro_robot.firmware import image_path
 from tests import children
 from tests.mirotwin.debug.runs import robot_run
+from tests.mirotwin.verify.bare.firmwares import SLEEPS
+from tests.mirotwin.verify.bare.test_case import case as bare_case
 from tests.robot.mcs51.asm import assemble
 
 ASM = """
@@ -118,6 +120,28 @@ def test_a_case_stands_at_its_failed_check(mirotwin, finished, tmp_path):
     assert (code, err) == (0, "")
     assert out.startswith("fails as recorded: frames_accepted_min: net0/robot0: tick ")
     assert "  case: main.c:" in out
+
+
+def test_a_case_of_a_bare_processor_stands_at_its_fault_and_goes_back(mirotwin, tmp_path):
+    firmware = tmp_path / "sleeps.ihx"
+    firmware.write_text(hex_text(assemble(SLEEPS)))
+    file = bare_case(tmp_path, b"ab!")
+    code, out, err = mirotwin(
+        "debug",
+        file,
+        "--firmware",
+        firmware,
+        *commands("print tick", "rstepi", "rcontinue", "c", "print tick"),
+    )
+    assert (code, err) == (0, "")
+    verdict = out.splitlines()[1]
+    assert verdict.startswith("fails as recorded: no_fault: tick ")
+    tick = verdict.split("tick ")[1].split()[0]
+    assert f"firmware fault: firmware executed outside the loaded image at 0x4000, tick {tick}" in out
+    assert "the run begins here: 0x0000 in reset" in out
+    code, _, err = mirotwin("debug", file, *commands("where"))
+    assert code == 2
+    assert err.endswith("give --firmware IMAGE.ihx\n")
 
 
 @pytest.mark.parametrize(

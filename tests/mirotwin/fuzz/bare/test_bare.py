@@ -112,7 +112,9 @@ def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, f
     code = target.run(data)
     run = target.exchange()
     beyond = 240 if code == NO_FAULT_CODE else 0
-    again = BarePlayback(target.image, target.line, target.script(data), run.end_tick + beyond).processor
+    again = (
+        BarePlayback(target.image, target.line, target.script(data), run.end_tick + beyond).play().processor
+    )
     whole = again.exchange()
     assert whole.received == run.received
     assert whole.sent[: len(run.sent)] == run.sent

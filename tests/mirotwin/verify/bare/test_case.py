@@ -147,7 +147,7 @@ def test_a_reset_starts_the_firmware_anew(tmp_path):
     line = BareTarget(image(SLEEPS), "bytes").line
     resets = [Reset(40_000, 0, 0, 1), Reset(40_048, 0, 0, 0)]
     said = [Transmission(5000, DOWN, b"a?"), *resets, Transmission(80_000, DOWN, b"b")]
-    run = BarePlayback(image(SLEEPS), line, said, 200_000)
+    run = BarePlayback(image(SLEEPS), line, said, 200_000).play()
     assert run.processor.exchange().sent_bytes == b"ab"
     assert run.idle
 
