@@ -5,7 +5,7 @@ Every message carries its tick; a period's messages are closed by its `/period` 
 Where a channel stands: `topics`.
 """
 
-from collections.abc import Iterator
+from functools import cache
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -223,17 +223,19 @@ def message_type(topic: topics.Topic) -> type[msgspec.Struct] | None:
     return OTHER_CHANNELS.get(topic.channel)
 
 
-def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
+def messages(period: Period) -> list[tuple[str, int, msgspec.Struct]]:
     """(topic, tick, message) of everything in a period, in the order of a recording."""
+    found: list[tuple[str, int, msgspec.Struct]] = []
     tick = period.tick
     for robot in period.robots:
-        yield from _robot_messages(robot, topics.robot_topic(robot.network, robot.slot, ""), tick)
+        _add_robot(found, robot, tick)
     for sent in period.wire:
         message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-        yield topics.wire_topic(sent.network), sent.tick, message
+        found.append((topics.wire_topic(sent.network), sent.tick, message))
     for action in period.actions:
-        yield topics.actions_topic(action.network), action.tick, _action_message(action)
-    yield topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)
+        found.append((topics.actions_topic(action.network), action.tick, _action_message(action)))
+    found.append((topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)))
+    return found
 
 
 def _action_message(action: Action) -> ActionMessage:
@@ -255,25 +257,34 @@ def action(network: int, message: ActionMessage) -> Action:
     return RadioState(message.tick, network, message.what)
 
 
-def _robot_messages(robot: RobotPeriod, head: str, tick: int) -> Iterator[tuple[str, int, msgspec.Struct]]:
-    """The same for one robot, whose topics begin with `head`."""
-    at, truth, seen, control = robot.reference, robot.truth, robot.measurement, robot.control
-    yield head + "reference", tick, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)
+@cache
+def _robot_topics(network: int, slot: int) -> list[str]:
+    """Of what a robot leaves behind in each period, made once: a long recording has a thousand messages a second."""
+    names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
+    return [topics.robot_topic(network, slot, name) for name in names]
+
+
+def _add_robot(found: list[tuple[str, int, msgspec.Struct]], robot: RobotPeriod, tick: int) -> None:
+    """The same for one robot."""
+    names = _robot_topics(robot.network, robot.slot)
+    reference, truth, measurement, control, firmware, lm629, pwm = names
+    at, true, seen, answer = robot.reference, robot.truth, robot.measurement, robot.control
+    found.append((reference, tick, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)))
     speeds = robot.v_m_s, robot.w_rad_s
-    yield head + "truth", tick, TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, *speeds)
+    found.append((truth, tick, TruthMessage(tick, true.x_m, true.y_m, true.theta_rad, *speeds)))
     if seen is not None:
         of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
-        place = seen.x_m, seen.y_m, seen.theta_rad
-        yield head + "measurement", tick, MeasurementMessage(tick, *place, *of_picture)
-    if control is not None:
-        yield head + "control", tick, ControlMessage(tick, *msgspec.structs.astuple(control))
+        message = MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture)
+        found.append((measurement, tick, message))
+    if answer is not None:
+        found.append((control, tick, ControlMessage(tick, *msgspec.structs.astuple(answer))))
     accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
     if accepted is not None and rejected is not None and stale is not None:
-        yield head + "firmware", tick, FirmwareMessage(tick, accepted, rejected, stale)
+        found.append((firmware, tick, FirmwareMessage(tick, accepted, rejected, stale)))
     left, right = robot.left, robot.right
-    yield head + "lm629", tick, Lm629Message(tick, _registers(left), _registers(right))
+    found.append((lm629, tick, Lm629Message(tick, _registers(left), _registers(right))))
     duties = DutyMessage(left.pwm_sign, left.pwm_magnitude), DutyMessage(right.pwm_sign, right.pwm_magnitude)
-    yield head + "pwm", tick, PwmMessage(tick, *duties)
+    found.append((pwm, tick, PwmMessage(tick, *duties)))
 
 
 def _registers(axis: Axis) -> RegistersMessage:
@@ -282,7 +293,7 @@ def _registers(axis: Axis) -> RegistersMessage:
         axis.real_position,
         axis.desired_velocity,
         axis.status,
-        tuple(CommandMessage(*command) for command in axis.commands),
+        tuple([CommandMessage(*command) for command in axis.commands]),
     )
 
 

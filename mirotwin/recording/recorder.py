@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Protocol
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels, schemas, topics
@@ -167,22 +166,20 @@ class Recorder:
             self._waiting.append((topics.robot_topic(network, slot, "theory"), message.tick, message))
 
     def _write_waiting(self) -> None:
-        add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels
         waiting, self._waiting = self._waiting, []
+        found: list[_Message] = []
         for period in waiting:
             if isinstance(period, tuple):
-                self._add(*period)
-                continue
-            period_ns = nanoseconds(period.tick)
-            for topic, tick, message in channels.messages(period):
-                channel = numbers.get(topic) or self._register(topic, message)
-                add(channel, period_ns if tick == period.tick else nanoseconds(tick), encode(message))
+                found.append(period)
+            else:
+                found += channels.messages(period)
+        self._add(found)
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
         with self._undisturbed:
             self._write_waiting()
-            self._add(topics.robot_topic(network, slot, "samples"), sample.tick, sample)
+            self._add([(topics.robot_topic(network, slot, "samples"), sample.tick, sample)])
 
     def write_faults(self, network: int, slot: int, faults: Sequence[AnyFault]) -> None:
         """Adds a robot's firmware faults."""
@@ -193,26 +190,36 @@ class Recorder:
                 message = channels.FaultMessage(
                     fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
                 )
-                self._add(topic, fault.tick, message)
+                self._add([(topic, fault.tick, message)])
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
         """Adds a frame of a network's camera, behind all that was added before."""
         with self._undisturbed:
             self._write_waiting()
-            self._add(topics.image_topic(network), tick, image_message(network, tick, png))
+            self._add([(topics.image_topic(network), tick, image_message(network, tick, png))])
 
-    def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
-        channel = self._channels.get(topic) or self._register(topic, message)
-        self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
+    def _add(self, found: Iterable[_Message]) -> None:
+        """Writes messages, all that are of known channels at once."""
+        numbers = self._channels
+        heads: list[tuple[int, int]] = []
+        contents: list[msgspec.Struct] = []
+        for topic, tick, message in found:
+            channel = numbers.get(topic)
+            if channel is None:
+                self._write(heads, contents)
+                heads, contents = [], []
+                channel = numbers[topic] = self._writer.add_channel(topic, "json", self._schema(message))
+            heads.append((channel, tick * 125 // 3))  # `nanoseconds`
+            contents.append(message)
+        self._write(heads, contents)
 
-    def _register(self, topic: str, message: msgspec.Struct) -> int:
-        channel = self._writer.add_channel(topic, "json", self._schema(message))
-        self._channels[topic] = channel
-        return channel
+    def _write(self, heads: Sequence[tuple[int, int]], contents: Sequence[msgspec.Struct]) -> None:
+        lines = self._encoder.encode_lines(contents).split(b"\n")
+        self._writer.add_messages(heads, lines[:-1])  # each ends a line
 
     def _schema(self, message: msgspec.Struct) -> int:
         """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
-        text = msgspec.json.encode(schemas.schema(message))
+        text = schemas.schema_text(message)
         if text not in self._schemas:
             name = schemas.schema_name(message)
             number = self._named[name] = self._named.get(name, 0) + 1

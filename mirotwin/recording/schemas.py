@@ -1,5 +1,6 @@
 """The JSON schemas of a recording's messages, which viewers read."""
 
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -8,19 +9,28 @@ from mirotwin.recording import images
 from mirotwin.recording.channels import ControlMessage
 
 
-def schema(message: msgspec.Struct) -> dict[str, object]:
-    """The JSON schema of a message, with references resolved: viewers want one plain tree.
+def schema_text(message: msgspec.Struct) -> bytes:
+    """The JSON schema of a message, as text."""
+    return _text(type(message), tuple(message.inner) if isinstance(message, ControlMessage) else None)
 
-    The keys of a map become properties, because viewers offer nothing else to choose from.
+
+@cache
+def _text(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> bytes:
+    """Made once: it takes longer than some control periods, and many robots have the same channels."""
+    return msgspec.json.encode(images.SCHEMA if kind is images.ImageMessage else _schema(kind, inner))
+
+
+def _schema(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> dict[str, object]:
+    """The schema with references resolved: viewers want one plain tree.
+
+    The keys of a map, `inner`, become properties, because viewers offer nothing else to choose from.
     """
-    if isinstance(message, images.ImageMessage):
-        return images.SCHEMA
-    (tree,), parts = msgspec.json.schema_components([type(message)], ref_template="{name}")
+    (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
     resolved: dict[str, object] = _resolved(tree, parts)
-    if isinstance(message, ControlMessage):
-        names = {name: {"type": "number"} for name in message.inner}
-        inner = {"type": "object", "properties": names, "required": list(names)}
-        resolved["properties"] = {**resolved["properties"], "inner": inner}  # type: ignore[dict-item]
+    if inner is not None:
+        names = {name: {"type": "number"} for name in inner}
+        named = {"type": "object", "properties": names, "required": list(names)}
+        resolved["properties"] = {**resolved["properties"], "inner": named}  # type: ignore[dict-item]
     return resolved
 
 

@@ -11,6 +11,7 @@ flushing changes no byte of a finished file.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from typing import Protocol
 from zlib import crc32
 
@@ -111,20 +112,26 @@ class McapWriter:
 
     def add_message(self, channel: int, time_ns: int, data: bytes) -> None:
         """Adds a message; `time_ns` is both when it was logged and published."""
-        chunk = self._chunk
-        index = self._indexes.get(channel)
-        if index is None:
-            index = self._indexes[channel] = []
-        index += (time_ns, len(chunk))
-        if time_ns < self._first_ns:
-            self._first_ns = time_ns
-        if time_ns > self._last_ns:
-            self._last_ns = time_ns
-        length = _BEFORE_CONTENT + len(data)
-        chunk += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, 0, time_ns, time_ns)
-        chunk += data
-        if len(chunk) > CHUNK_SIZE:
-            self._end_chunk()
+        self.add_messages([(channel, time_ns)], [data])
+
+    def add_messages(self, heads: Iterable[tuple[int, int]], contents: Iterable[bytes]) -> None:
+        """Adds messages in a row: channel and time of each, and its content."""
+        chunk, indexes = self._chunk, self._indexes
+        pack, opcode = _MESSAGE.pack, _MESSAGE_OPCODE
+        for (channel, time_ns), data in zip(heads, contents, strict=True):
+            index = indexes.get(channel)
+            if index is None:
+                index = indexes[channel] = []
+            index += (time_ns, len(chunk))
+            if time_ns < self._first_ns:
+                self._first_ns = time_ns
+            if time_ns > self._last_ns:
+                self._last_ns = time_ns
+            chunk += pack(opcode, _BEFORE_CONTENT + len(data), channel, 0, time_ns, time_ns)
+            chunk += data
+            if len(chunk) > CHUNK_SIZE:
+                self._end_chunk()
+                chunk, indexes = self._chunk, self._indexes
 
     def flush(self) -> None:
         """Brings everything so far into the file, so that it outlives this process."""

@@ -212,7 +212,7 @@ def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
 
 def test_what_was_done_to_a_robot_stands_in_the_log():
     def add(recorder):
-        recorder._add("/net0/actions", 800_800 * 3 + 5, ActionMessage(800_800 * 3 + 5, 0, "reset", 1))
+        recorder._add([("/net0/actions", 800_800 * 3 + 5, ActionMessage(800_800 * 3 + 5, 0, "reset", 1))])
         for period in list(synthetic.periods(4))[3:]:
             recorder.write(period)
 
