@@ -27,3 +27,17 @@ cdef class Memory:
     cpdef put(self)
     cdef Py_ssize_t size(self) except -1
     cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1
+
+
+cdef class Attributes:
+    cdef list fields
+    cdef object slow
+    cdef char *buffer
+    cdef Py_ssize_t used, capacity
+
+    cpdef bytes pack(self)
+    cdef int add(self, value, int shape, bytes codes, Py_ssize_t count, split) except -1
+    cdef int add_row(self, row, bytes codes, split) except -1
+    cdef int add_length(self, Py_ssize_t length) except -1
+    cdef int add_cell(self, value, char code) except -1
+    cdef char *room(self, Py_ssize_t size) except NULL

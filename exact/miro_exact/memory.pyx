@@ -1,14 +1,15 @@
-"""Copies the fields of compiled parts to flat bytes and back.
+"""Copies the fields of compiled parts to flat bytes and back, and packs those of other parts.
 
-What belongs here: memory. What does not: which fields there are and in what order (`state.py`), and parts that are not
-compiled, whose fields `state.py` packs itself. Used by the compiled engine only, so it has no uncompiled twin:
+What does not belong here: which fields there are and in what order, and what is wrong with a value (`state.py`). Used by the compiled engine only, so it has no uncompiled twin:
 tests/exact/test_state.py compares the bytes with those of `state.py`.
 
 The parts must outlive a Memory, which therefore holds them. A part's fields stay where they are as long as it lives.
 """
 
 from cpython.bytes cimport PyBytes_AS_STRING, PyBytes_FromStringAndSize
-from cpython.mem cimport PyMem_Calloc, PyMem_Free
+from cpython.long cimport PyLong_AsLongLong, PyLong_Check
+from cpython.mem cimport PyMem_Calloc, PyMem_Free, PyMem_Realloc
+from cpython.tuple cimport PyTuple_Check, PyTuple_GET_ITEM, PyTuple_GET_SIZE
 from libc.string cimport memcpy
 
 import sys
@@ -205,3 +206,120 @@ cdef class Memory:
                 set_length(place.end, place.end_size, count)
             copy(place.at, source, place.size, count)
             source += place.size * count
+
+
+NUMBER, ITEMS, OCTETS, ROW, ROWS = range(5)
+cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW
+
+
+cdef class Attributes:
+    """Fields that are Python objects, packed in one go.
+
+    Each is (part, name, shape, codes, number of items, split): the shape is NUMBER or one of its neighbours, the codes
+    are those of the cells, a number that is no array has 0 items. `slow` packs the same fields, and says what is wrong
+    with one: where a value is odd, it is asked.
+    """
+
+    def __cinit__(self, list fields, slow):
+        self.fields = [
+            (part, name, shape, codes.encode(), count, split) for part, name, shape, codes, count, split in fields
+        ]
+        self.slow = slow
+
+    def __dealloc__(self):
+        PyMem_Free(self.buffer)
+
+    cpdef bytes pack(self):
+        """The fields as flat bytes. Raises what `slow` raises."""
+        cdef tuple field
+        self.used = 0
+        try:
+            for field in self.fields:
+                if self.add(getattr(field[0], field[1]), field[2], field[3], field[4], field[5]):
+                    return self.slow()
+        except Exception:
+            return self.slow()
+        return PyBytes_FromStringAndSize(self.buffer, self.used)
+
+    cdef int add(self, value, int shape, bytes codes, Py_ssize_t count, split) except -1:
+        """Appends a field; 1 if there is something about it."""
+        cdef char code = PyBytes_AS_STRING(codes)[0]
+        cdef Py_ssize_t length
+        if shape == _NUMBER and not count:
+            return self.add_cell(value, code)
+        if shape == _OCTETS:
+            return self.add_cell(value, c"s")
+        if shape == _ROW:
+            return self.add_row(value, codes, split)
+        length = len(value)
+        if length > count or (shape == _NUMBER and length != count):
+            return 1
+        if shape != _NUMBER:
+            self.add_length(length)
+        if shape == _NUMBER or shape == _ITEMS:
+            for item in value:
+                if self.add_cell(item, code):
+                    return 1
+            return 0
+        for item in value:
+            if self.add_row(item, codes, split):
+                return 1
+        return 0
+
+    cdef int add_row(self, row, bytes codes, split) except -1:
+        cells = row if split is None else split(row)
+        cdef Py_ssize_t index
+        if not PyTuple_Check(cells) or PyTuple_GET_SIZE(cells) != len(codes):
+            return 1
+        for index in range(len(codes)):
+            if self.add_cell(<object>PyTuple_GET_ITEM(cells, index), PyBytes_AS_STRING(codes)[index]):
+                return 1
+        return 0
+
+    cdef int add_length(self, Py_ssize_t length) except -1:
+        cdef unsigned int written = <unsigned int>length
+        copy(self.room(4), <char *>&written, 4, 1)
+        return 0
+
+    cdef int add_cell(self, value, char code) except -1:
+        cdef double real
+        cdef long long big
+        cdef int small
+        cdef unsigned char byte
+        if code == c"d":
+            real = value
+            copy(self.room(8), <char *>&real, 8, 1)
+            return real != real
+        if code == c"s":
+            self.add_length(len(value))
+            memcpy(self.room(len(value)), PyBytes_AS_STRING(<bytes?>value), len(value))
+            return 0
+        if code == c"?":
+            self.room(1)[0] = <bint>value
+            return 0
+        if not PyLong_Check(value):
+            return 1
+        big = PyLong_AsLongLong(value)
+        if code == c"q":
+            copy(self.room(8), <char *>&big, 8, 1)
+            return 0
+        if code == c"B":
+            self.room(1)[0] = <char>big
+            return not 0 <= big <= 0xFF
+        small = <int>big
+        copy(self.room(4), <char *>&small, 4, 1)
+        if code == c"i":
+            return big != small
+        return code != c"I" or not 0 <= big <= 0xFFFFFFFF
+
+    cdef char *room(self, Py_ssize_t size) except NULL:
+        """Where the next `size` bytes belong."""
+        cdef char *larger
+        if self.used + size > self.capacity:
+            larger = <char *>PyMem_Realloc(self.buffer, 2 * (self.used + size))
+            if larger == NULL:
+                raise MemoryError
+            self.buffer = larger
+            self.capacity = 2 * (self.used + size)
+        self.used += size
+        return self.buffer + self.used - size

@@ -34,8 +34,9 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
+from itertools import groupby
 from operator import attrgetter
 from struct import Struct, calcsize
 from typing import Any, NamedTuple, Protocol
@@ -84,6 +85,10 @@ CODES = {
 """C types of fields and their codes."""
 
 
+_PACKED_CODES = frozenset("qidB?Is()[]0123456789")
+"""Letters in the forms of fields that `memory.pyx` packs without help."""
+
+
 class StateField(NamedTuple):
     """A field of a part that exists; `path` names it from the root on."""
 
@@ -125,6 +130,7 @@ class One:
 
     def __init__(self, field: StateField, before: Block | None) -> None:
         self.field = field
+        self.fields = [field]
         self.value: Any = None
         self.sibling: One | None = None
         if isinstance(before, One) and isinstance(before.field.kind, Queue) and isinstance(field.kind, Queue):
@@ -206,12 +212,14 @@ class Flat:
         self._close()
         if not self.fields:
             raise TypeError(f"{type(root).__name__} declares no state")
+        self._packed = _together(self._blocks) if self._compiled else self._blocks
+        self._hashed = _together(self._hashed) if self._compiled else self._hashed
 
     def save(self) -> bytes:
         """The state as it is. Raises DomainError with the field's name for NaN."""
         for settle in self._before:
             settle()
-        return b"".join([block.pack() for block in self._blocks])
+        return b"".join([block.pack() for block in self._packed])
 
     def hashed(self) -> bytes:
         """The part of the state that a digest is made of: all but what tables name in `NOT_HASHED`."""
@@ -347,6 +355,50 @@ class Flat:
         self._blocks.append(block)
         if self._counts:
             self._hashed.append(block)
+
+
+def _together(blocks: list[Block]) -> list[Block]:
+    """The same blocks for packing alone: neighbours that are Python objects become one."""
+    from miro_exact.memory import Attributes
+
+    found: list[Block] = []
+    for simple, group in groupby(blocks, _is_simple):
+        together: list[Any] = list(group)
+        if simple:
+            fields = [field for block in together for field in block.fields]
+            packed = Attributes([_attribute(field) for field in fields], partial(_pack_each, together))
+            together = [packed]
+        found += together
+    return found
+
+
+def _is_simple(block: Block) -> bool:
+    """Whether `Attributes` can pack it."""
+    kinds = [field.kind for field in block.fields] if isinstance(block, One | Some) else []
+    return bool(kinds) and all(
+        not isinstance(kind, Queue) and set(kind.form) <= _PACKED_CODES for kind in kinds
+    )
+
+
+def _attribute(field: StateField) -> tuple[Any, ...]:
+    """What `memory.pyx` has to know of a field that is a Python object."""
+    from miro_exact import memory
+
+    part, name, kind, _ = field
+    if isinstance(kind, Number):
+        return (part, name, memory.NUMBER, kind.code, kind.count, None)
+    if isinstance(kind, Items):
+        return (part, name, memory.ITEMS, kind.code, kind.room, None)
+    if isinstance(kind, Octets):
+        return (part, name, memory.OCTETS, "s", 0, None)
+    row: Row = kind.row if isinstance(kind, Rows) else kind  # type: ignore[assignment]
+    if isinstance(kind, Rows):
+        return (part, name, memory.ROWS, row.form, kind.room, row.split)
+    return (part, name, memory.ROW, row.form, 0, row.split)
+
+
+def _pack_each(blocks: Sequence[Block]) -> bytes:
+    return b"".join([block.pack() for block in blocks])
 
 
 def _numbered(parts: Any) -> Iterator[tuple[Any, Any]]:

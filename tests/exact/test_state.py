@@ -167,6 +167,30 @@ def test_nan_cannot_be_saved():
         Flat(cart).save()
 
 
+ODD = st.one_of(
+    st.integers(-(1 << 65), 1 << 65), st.floats(), st.booleans(), st.none(), st.binary(max_size=3)
+)
+
+
+def packed(pack):
+    try:
+        return pack()
+    except Exception as error:
+        return type(error), str(error)
+
+
+@given(
+    st.sampled_from(["tick", "moving", "levels", "waiting", "pose", "text", "edges"]),
+    st.one_of(ODD, st.lists(ODD, max_size=5), st.lists(st.tuples(ODD, ODD), max_size=4), st.tuples(ODD, ODD)),
+)
+def test_fields_that_are_packed_together_give_the_bytes_or_the_error_of_each_alone(name, value):
+    cart = Cart()
+    flat = Flat(cart)
+    setattr(cart, name, value)
+    alone = packed(lambda: b"".join([block.pack() for block in flat._blocks]))
+    assert packed(flat.save) == packed(flat.hashed) == alone
+
+
 def test_a_state_that_holds_nan_can_be_left():
     cart = Cart()
     flat = Flat(cart)

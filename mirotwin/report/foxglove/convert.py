@@ -36,7 +36,7 @@ PREFIX = "foxglove."
 def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
     """Name and text of a message's schema: Foxglove's for its messages, ours for all others."""
     if type(message).__module__ != messages.__name__:
-        return schemas.schema_name(message), msgspec.json.encode(schemas.schema(message))
+        return schemas.schema_name(message), schemas.schema_text(message)
     name = type(message).__name__
     return PREFIX + name, _published(name)
 
