@@ -154,9 +154,9 @@ class Link(FrameSender):
             raise BadInput(
                 "", "link.expect", f"{wanted!r} is no kind of answer", "give Telemetry, or use expect_bytes"
             )
-        wrong = [name for name in fields if name not in TelemetryFrame.__slots__]
+        wrong = [name for name in fields if name not in TelemetryFrame.__struct_fields__]
         if wrong:
-            names = ", ".join(TelemetryFrame.__slots__)
+            names = ", ".join(TelemetryFrame.__struct_fields__)
             raise BadInput("", "link.expect", f"telemetry has no field {wrong[0]!r}", f"it has {names}")
         filters = ", ".join(f"{name}={value}" for name, value in fields.items())
         what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"

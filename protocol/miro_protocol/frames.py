@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Collection, Iterable, Mapping, Set
-from dataclasses import dataclass
 from operator import index
 from reprlib import repr as brief
 from typing import Any
+
+import msgspec
 
 from miro_protocol.crc import crc16
 from miro_protocol.table import (
@@ -44,6 +45,12 @@ _VELOCITIES = {
 }
 
 
+_TELEMETRY_TYPE = int(FrameType.TELEMETRY)
+_TELEMETRY = struct.Struct("<" + "".join(_CODES[field.size].upper() for field in TELEMETRY_FIELDS))
+assert all((field.low, field.high + 1) == (0, 1 << 8 * field.size) for field in TELEMETRY_FIELDS)
+_FLAGS = sum(Flags)
+
+
 class EncodeError(ValueError):
     """A message that may not be sent, the caller's mistake: the field, its value, and what is allowed."""
 
@@ -52,8 +59,7 @@ class ContentError(Exception):
     """A frame with a good CRC that says nothing the table knows: the sender, not the link, is wrong."""
 
 
-@dataclass(frozen=True, slots=True)
-class TeamFrame:
+class TeamFrame(msgspec.Struct, frozen=True):
     """Velocities of all robots, slot 0 first: (left, right) in 1/256 count per LM629 sample.
 
     With `type` TEAM_ASK, robot (seq mod N) answers with telemetry.
@@ -64,8 +70,7 @@ class TeamFrame:
     velocities: tuple[tuple[int, int], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ServiceFrame:
+class ServiceFrame(msgspec.Struct, frozen=True):
     """One setting of one robot; `values` in the order of `table.SERVICE_DATA[opcode]`."""
 
     seq: int
@@ -88,8 +93,7 @@ class ServiceFrame:
         return cls(seq, slot, Opcode.ACCELERATION, (value,))
 
 
-@dataclass(frozen=True, slots=True)
-class TelemetryFrame:
+class TelemetryFrame(msgspec.Struct, frozen=True):
     """One robot's answer. Positions are the low 16 bits of counts, the counters wrap at 256."""
 
     seq: int
@@ -215,9 +219,13 @@ def decode_fields(body: bytes, n: int) -> Message:
         raise ContentError("the body is empty: it has a header and a payload")
     kind, seq = divmod(body[0], SEQ_MODULUS)
     payload = bytes(body[1:])
-    if kind == FrameType.TELEMETRY:
-        first, *rest = unpack(TELEMETRY_FIELDS, payload)
-        message: Message = TelemetryFrame(seq, first & SLOT_MASK, first & ~SLOT_MASK, *rest)
+    if kind == _TELEMETRY_TYPE:
+        size = _TELEMETRY.size
+        first, *rest = _TELEMETRY.unpack(payload[:size].ljust(size, b"\0"))
+        slot, flags = first & SLOT_MASK, first & ~SLOT_MASK
+        message: Message = TelemetryFrame(seq, slot, flags, *rest)
+        if len(payload) == size and slot < n and n in ROBOT_COUNTS and not flags & ~_FLAGS:
+            return message  # the other fields may have any value
     elif kind == FrameType.SERVICE:
         message = _service_message(seq, payload)
     else:
@@ -308,9 +316,8 @@ def _service_message(seq: int, payload: bytes) -> ServiceFrame:
 
 def _telemetry_payload(message: TelemetryFrame, n: int) -> bytes:
     slot = checked(SERVICE[0], message.slot, high=n - 1)
-    allowed = sum(Flags)
-    flags = _whole("flags", message.flags, f"of bits of {allowed:#04x}")
-    if flags & ~allowed:
-        raise EncodeError(f"flags = {flags:#04x}: only bits of {allowed:#04x} are defined")
+    flags = _whole("flags", message.flags, f"of bits of {_FLAGS:#04x}")
+    if flags & ~_FLAGS:
+        raise EncodeError(f"flags = {flags:#04x}: only bits of {_FLAGS:#04x} are defined")
     values = (slot | flags, *(getattr(message, field.name) for field in TELEMETRY_FIELDS[1:]))
     return b"".join(pack(*pair) for pair in zip(TELEMETRY_FIELDS, values, strict=True))
