@@ -68,7 +68,7 @@ class Pilot:
         "estimator": Estimator,
         "numbers": Items("d", 0xFFFF, -_LARGEST, _LARGEST),
     }
-    NOT_STATE = ("reference", "reference_lead_s", "dead_s", "wheels", "command")
+    NOT_STATE = ("reference", "reference_lead_s", "dead_s", "wheels", "units_per_m_s", "command")
 
     def __init__(
         self,
@@ -86,6 +86,7 @@ class Pilot:
         self.law = law
         self.estimator: Estimator[Any] = NoEstimator().estimator() if estimator is None else estimator
         self.wheels = Wheels() if wheels is None else wheels
+        self.units_per_m_s = self.wheels.units_per_m_s
         self.reference_lead_s = reference_lead_s
         self.dead_s = dead_s
         self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
@@ -104,7 +105,7 @@ class Pilot:
 
         Raises PluginError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
-        z, units = self.integrator, self.wheels.units_per_m_s
+        z, units = self.integrator, self.units_per_m_s
         sent = self.command.left / units, self.command.right / units
         estimate = self._estimate(
             EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, telemetry, self.dead_s)

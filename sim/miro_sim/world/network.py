@@ -106,17 +106,16 @@ class Network:
         """Camera, PC and station, in this order."""
         measured = self.sight.expose(tick)
         self.sent = []
-        commands: list[WheelCommand | None] = [None] * len(self.robots)
-        if self.host == "controller":
-            commands = [
-                robot.steer(posture, self.telemetry.last[robot.spec.slot], tick)
-                for robot, posture in zip(self.robots, measured, strict=True)
-            ]
+        steered = self.host == "controller"
+        commands: list[WheelCommand | None] = []
+        for place, robot in enumerate(self.robots):
+            answer = self.telemetry.last[robot.slot]
+            commands.append(robot.steer(measured[place], answer, tick) if steered else None)
+        if steered:
             self._transmit(tick + self.compute_ticks + self.keyup_ticks, commands)
-        self.seen = [
-            robot.record(tick, posture, command)
-            for robot, posture, command in zip(self.robots, measured, commands, strict=True)
-        ]
+        self.seen = []
+        for place, robot in enumerate(self.robots):
+            self.seen.append(robot.record(tick, measured[place], commands[place]))
 
     def show(self, bodies: Sequence[Robot]) -> None:
         """Lets this network's camera see the robots of all networks."""
@@ -180,9 +179,11 @@ class Network:
 
     def _transmit(self, start_tick: int, commands: Sequence[WheelCommand | None]) -> None:
         wheels = [(0, 0)] * self.spec.robots
-        for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
+        for place, robot in enumerate(self.robots):
+            command = commands[place]
             if command is not None:
-                wheels[robot.spec.slot] = noise.wheels_of(command, self.sight.frame)
+                noise = self.noisy_commands[place]
+                wheels[robot.slot] = noise.wheels_of(command, self.sight.frame)
         sent = Transmission(start_tick, DOWN, self.station.frame(wheels), self.index)
         self.outbox.post(sent, self.downlink.free_tick)
 
@@ -194,8 +195,10 @@ class Network:
         content alone, so the PC hears the same however the run is cut.
         """
         while True:
-            reasons = [robot.run(tick) for robot in self.robots]
-            if STOPPED in reasons:
+            stopped = False
+            for robot in self.robots:
+                stopped = robot.run(tick) == STOPPED or stopped
+            if stopped:
                 return True
             full_tick = self.uplink.full_tick()
             if full_tick >= tick:

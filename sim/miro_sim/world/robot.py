@@ -180,7 +180,7 @@ def _control(command: WheelCommand | None) -> Control | None:
 
 
 def _axis(chip: Lm629) -> Axis:
-    commands = tuple((tick, opcode, data.hex()) for tick, opcode, data in chip.commands)
+    commands = tuple([(tick, opcode, data.hex()) for tick, opcode, data in chip.commands])
     chip.commands.clear()
     return Axis(
         desired_position=chip.desired_position,

@@ -1,0 +1,29 @@
+# C layout of miro_sim.world.network.
+cimport cython
+from miro_sim.radio.uplink cimport Uplink
+from miro_sim.world.robot cimport Robot
+
+cdef long long SETTLE_TICKS
+
+
+cdef class Network:
+    cdef readonly object spec, index, station, downlink, telemetry, actions, outbox, log
+    cdef public object sight
+    cdef readonly Uplink uplink
+    cdef readonly list robots, noisy_commands
+    cdef readonly str host
+    cdef readonly long long compute_ticks, keyup_ticks
+    cdef public long long frames_sent
+    cdef public list heard, sent, seen
+
+    @cython.locals(robot=Robot, commands=list, measured=object)
+    cpdef begin_period(self, long long tick)
+    cpdef do_due(self, long long tick)
+    cpdef send_due(self, long long rendezvous_tick)
+    cpdef settle(self, long long rendezvous_tick)
+    @cython.locals(robot=Robot)
+    cdef _transmit(self, long long start_tick, list commands)
+    @cython.locals(robot=Robot, stopped=cython.bint, full_tick=cython.longlong)
+    cpdef bint run(self, long long tick) except -1
+    cpdef hear(self, long long tick)
+    cpdef list end_period(self)

@@ -1,0 +1,28 @@
+# C layout of miro_sim.world.robot.
+cimport cython
+from miro_host.pilot cimport Pilot
+from miro_robot.board cimport Board
+from miro_robot.lm629.chip cimport Lm629
+from miro_sim.plant.drive cimport DifferentialDrive
+
+cdef long long CYCLE_TICKS
+
+
+cdef class Robot:
+    cdef readonly object spec, network, slot, reference, log
+    cdef readonly Board board
+    cdef readonly Pilot pilot
+    cdef readonly DifferentialDrive drive
+    cdef readonly list counter_addresses
+    cdef public tuple marks
+    cdef public list asked
+
+    cpdef int run(self, long long tick) except -1
+    cpdef steer(self, measured, telemetry, long long tick)
+    cpdef counter(self, int index)
+    cpdef record(self, long long tick, measured, command)
+
+
+@cython.locals(chip=Lm629)
+cdef _axis(chip)
+cdef _control(command)
