@@ -110,16 +110,16 @@ class AdamsBashforth(Integrator):
         v_dot = clamp(v_dot_m_s2, limits.max_v_dot_m_s2)
         w_dot = clamp(w_dot_rad_s2, limits.max_w_dot_rad_s2)
         if self.begun:
-            super().step(1.5 * v_dot - 0.5 * self.last_v_dot, 1.5 * w_dot - 0.5 * self.last_w_dot)
+            Integrator.step(self, 1.5 * v_dot - 0.5 * self.last_v_dot, 1.5 * w_dot - 0.5 * self.last_w_dot)
         else:
-            super().step(v_dot, w_dot)
+            Integrator.step(self, v_dot, w_dot)
         self.last_v_dot = v_dot
         self.last_w_dot = w_dot
         self.begun = 1
 
     def go_to(self, v_m_s: float, w_rad_s: float) -> None:
         """Take over the velocities of a law; nothing is integrated."""
-        super().go_to(v_m_s, w_rad_s)
+        Integrator.go_to(self, v_m_s, w_rad_s)
         self.begun = 0
 
 

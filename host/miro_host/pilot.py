@@ -173,6 +173,8 @@ class Pilot:
 
     @numbers.setter
     def numbers(self, numbers: list[float]) -> None:
+        if len(numbers) < 6:
+            raise ValueError(f"a command has not enough values: {len(numbers)}")
         left, right, left_factor, right_factor, v_m_s, w_rad_s, *inner = numbers
         if not all(abs(wheel) <= _FASTEST and wheel == int(wheel) for wheel in (left, right)):
             raise ValueError(f"no frame carries the command ({left}, {right})")

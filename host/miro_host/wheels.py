@@ -14,6 +14,7 @@ TICKS_PER_S = 24_000_000
 TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
 COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1
 UNITS_PER_COUNT = 256
+_PER_TURN = UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / (TICKS_PER_S / TICKS_PER_SAMPLE)
 MIN_WORD_BITS = 5
 MAX_WORD_BITS = 16
 
@@ -54,8 +55,7 @@ class Wheels(msgspec.Struct, frozen=True):
     @property
     def units_per_m_s(self) -> float:
         """1/256 count per sample in one m/s: 11392.75 for the default radius."""
-        samples_per_s = TICKS_PER_S / TICKS_PER_SAMPLE
-        return UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / samples_per_s / (2.0 * PI * self.radius_m)
+        return _units_per_m_s(self.radius_m)
 
     def split(self, v_m_s: float, w_rad_s: float) -> tuple[float, float]:
         """(left, right) rim speeds in m/s of a body that moves with v and turns with w."""
@@ -64,23 +64,14 @@ class Wheels(msgspec.Struct, frozen=True):
 
     def limit(self, left_m_s: float, right_m_s: float) -> tuple[float, float]:
         """Both speeds scaled by one factor so that none exceeds the limit: the path keeps its curvature."""
-        greatest = max(abs(left_m_s), abs(right_m_s))
-        if greatest <= self.limit_m_s:
-            return left_m_s, right_m_s
-        # the quotient first: the greater one becomes +-1 exactly, hence never above the limit
-        return self.limit_m_s * (left_m_s / greatest), self.limit_m_s * (right_m_s / greatest)
+        return _limited(left_m_s, right_m_s, self.limit_m_s)
 
     def counts(self, speed_m_s: float) -> int:
         """A rim speed in 1/256 count per sample, rounded half away from zero; in short words, to a multiple of a step.
 
         Of a short word's steps none beyond the speed limit is taken.
         """
-        units = speed_m_s * self.units_per_m_s
-        step = 1 << (MAX_WORD_BITS - self.word_bits)
-        if step == 1:
-            return nearest(units)
-        most = int(self.limit_m_s * self.units_per_m_s / step)
-        return step * max(-most, min(most, nearest(units / step)))
+        return _counts(speed_m_s, self.limit_m_s, self.units_per_m_s, self.word_bits)
 
     def command(
         self, v_m_s: float, w_rad_s: float, left_factor: float = 1.0, right_factor: float = 1.0
@@ -89,6 +80,50 @@ class Wheels(msgspec.Struct, frozen=True):
 
         A wheel whose radius is the nominal one times a factor has to turn slower by that factor.
         """
-        left, right = self.split(v_m_s, w_rad_s)
-        left, right = self.limit(left / left_factor, right / right_factor)
-        return self.counts(left), self.counts(right)
+        return _words(
+            v_m_s,
+            w_rad_s,
+            left_factor,
+            right_factor,
+            self.track_m,
+            self.limit_m_s,
+            self.radius_m,
+            self.word_bits,
+        )
+
+
+def _units_per_m_s(radius_m: float) -> float:
+    return _PER_TURN / (2.0 * PI * radius_m)
+
+
+def _limited(left: float, right: float, limit_m_s: float) -> tuple[float, float]:
+    greatest = max(abs(left), abs(right))
+    if greatest <= limit_m_s:
+        return left, right
+    # the quotient first: the greater one becomes +-1 exactly, hence never above the limit
+    return limit_m_s * (left / greatest), limit_m_s * (right / greatest)
+
+
+def _counts(speed_m_s: float, limit_m_s: float, units_per_m_s: float, word_bits: int) -> int:
+    units = speed_m_s * units_per_m_s
+    step = 1 << (MAX_WORD_BITS - word_bits)
+    if step == 1:
+        return nearest(units)
+    most = int(limit_m_s * units_per_m_s / step)
+    return step * max(-most, min(most, nearest(units / step)))
+
+
+def _words(
+    v_m_s: float,
+    w_rad_s: float,
+    left_factor: float,
+    right_factor: float,
+    track_m: float,
+    limit_m_s: float,
+    radius_m: float,
+    word_bits: int,
+) -> tuple[int, int]:
+    half = 0.5 * track_m * w_rad_s
+    left, right = _limited((v_m_s - half) / left_factor, (v_m_s + half) / right_factor, limit_m_s)
+    units = _units_per_m_s(radius_m)
+    return _counts(left, limit_m_s, units, word_bits), _counts(right, limit_m_s, units, word_bits)

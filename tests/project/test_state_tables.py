@@ -189,5 +189,6 @@ def test_the_build_finds_every_plain_field_of_the_layouts():
         layout = path.read_text()
         found = [name for fields in places.fields_of(layout).values() for name, _, _ in fields]
         lines = re.findall(r"^    cdef (?:public |readonly )?([^(\n]+)$", layout, re.M)
-        plain = [line.partition("#")[0] for line in lines if line.split()[0] in words and "[::" not in line]
+        data = [line.partition("#")[0] for line in lines if "[::" not in line and "*" not in line]
+        plain = [line for line in data if line.split()[0] in words]
         assert len(found) == sum(line.count(",") + 1 for line in plain), path.name

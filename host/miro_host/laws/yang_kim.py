@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
-from miro_exact.dmath import atan2, sincos, wrap_pi
+from miro_exact import dmath
 from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters
 from miro_host.posture import Posture
 from miro_host.references.interface import Reference
@@ -144,50 +144,57 @@ class YangKim(Law[Gains]):
 
         ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
         """
-        g, r = self.parameters, reference
-        rho = math.sqrt(measured.x_m * measured.x_m + measured.y_m * measured.y_m)
-        phi = atan2(measured.y_m, measured.x_m)
-        sin_alpha, cos_alpha = sincos(phi - measured.theta_rad)
-        rho_floor = max(rho, g.rho_floor_m)
-        rho_e = rho - r.rho_m
-        phi_e = wrap_pi(phi - r.phi_rad)
-        theta_e = wrap_pi(measured.theta_rad - r.posture.theta_rad)
-        # rates by equation (9)
-        rho_e_rate = v_m_s * cos_alpha - r.rho_rate_m_s
-        phi_e_rate = -(v_m_s / rho_floor) * sin_alpha - r.phi_rate_rad_s
-        theta_e_rate = w_rad_s - r.w_rad_s
-        abs_phi_e_rate = sign(phi_e) * phi_e_rate  # d|phi_e|/dt, not |phi_e'|
-        side = self._switch(theta_e, g.layer_theta_rad)
-        s1 = rho_e_rate + g.gamma1_per_s * rho_e  # (13)
-        s2 = theta_e_rate + g.gamma2_per_s * theta_e + side * abs(phi_e)  # (13)
-        braces = (
-            -g.q1_per_s * s1
-            - g.p1_m_s2 * self._switch(s1, g.layer_s1_m_s)
-            - g.gamma1_per_s * rho_e_rate
-            + r.rho_accel_m_s2  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
-            - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
-        )
-        u1 = self._inverse(cos_alpha) * braces - r.v_dot_m_s2  # (16)
-        u2 = (  # (16)
-            -g.q2_per_s * s2
-            - g.p2_rad_s2 * self._switch(s2, g.layer_s2_rad_s)
-            - g.gamma2_per_s * theta_e_rate
-            - side * abs_phi_e_rate
-        )
-        if g.layer_derivative and abs(theta_e) < g.layer_theta_rad:
-            u2 -= theta_e_rate / g.layer_theta_rad * abs(phi_e)
-        return YangKimControl(rho_e, phi_e, theta_e, s1, s2, u1, u2)
+        return _control(self.parameters, reference, measured, v_m_s, w_rad_s)
 
-    def _switch(self, x: float, width: float) -> float:
-        if self.parameters.switching == "sign":
-            return sign(x)
-        return saturation(x, width)
 
-    def _inverse(self, cos_alpha: float) -> float:
-        """The factor 1/cos(phi_c - theta_c) of equation (16), guarded."""
-        d = self.parameters.cosine_guard
-        if d == 0.0:
-            if cos_alpha == 0.0:
-                raise ValueError("cos(phi_c - theta_c) = 0: assumption 3 (equation 12) is violated")
-            return 1.0 / cos_alpha
-        return cos_alpha * (1.0 + d * d) / (cos_alpha * cos_alpha + d * d)
+def _control(g: Gains, r: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> YangKimControl:
+    x, y, theta = measured.x_m, measured.y_m, measured.theta_rad
+    gamma1, gamma2, layer, v_dot = g.gamma1_per_s, g.gamma2_per_s, g.layer_theta_rad, r.v_dot_m_s2
+    smooth = g.switching != "sign"
+    rho = math.sqrt(x * x + y * y)
+    phi = dmath.atan2(y, x)
+    sin_alpha, cos_alpha = dmath.sincos(phi - theta)
+    rho_floor = g.rho_floor_m
+    if not rho_floor > rho:
+        rho_floor = rho
+    rho_e = rho - r.rho_m
+    phi_e = dmath.wrap_pi(phi - r.phi_rad)
+    theta_e = dmath.wrap_pi(theta - r.posture.theta_rad)
+    # rates by equation (9)
+    rho_e_rate = v_m_s * cos_alpha - r.rho_rate_m_s
+    phi_e_rate = -(v_m_s / rho_floor) * sin_alpha - r.phi_rate_rad_s
+    theta_e_rate = w_rad_s - r.w_rad_s
+    abs_phi_e_rate = sign(phi_e) * phi_e_rate  # d|phi_e|/dt, not |phi_e'|
+    side = _switch(theta_e, layer, smooth)
+    s1 = rho_e_rate + gamma1 * rho_e  # (13)
+    s2 = theta_e_rate + gamma2 * theta_e + side * abs(phi_e)  # (13)
+    braces = (
+        -g.q1_per_s * s1
+        - g.p1_m_s2 * _switch(s1, g.layer_s1_m_s, smooth)
+        - gamma1 * rho_e_rate
+        + r.rho_accel_m_s2  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
+        - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
+    )
+    u1 = _inverse(cos_alpha, g.cosine_guard) * braces - v_dot  # (16)
+    u2 = (  # (16)
+        -g.q2_per_s * s2
+        - g.p2_rad_s2 * _switch(s2, g.layer_s2_rad_s, smooth)
+        - gamma2 * theta_e_rate
+        - side * abs_phi_e_rate
+    )
+    if g.layer_derivative and abs(theta_e) < layer:
+        u2 -= theta_e_rate / layer * abs(phi_e)
+    return YangKimControl(rho_e, phi_e, theta_e, s1, s2, u1, u2)
+
+
+def _switch(x: float, width: float, smooth: bool) -> float:
+    return saturation(x, width) if smooth else sign(x)
+
+
+def _inverse(cos_alpha: float, d: float) -> float:
+    """The factor 1/cos(phi_c - theta_c) of equation (16), guarded by d."""
+    if d == 0.0:
+        if cos_alpha == 0.0:
+            raise ValueError("cos(phi_c - theta_c) = 0: assumption 3 (equation 12) is violated")
+        return 1.0 / cos_alpha
+    return cos_alpha * (1.0 + d * d) / (cos_alpha * cos_alpha + d * d)
