@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 DOWN = ">"
 UP = "<"
 DIRECTIONS = (DOWN, UP)
+_FOLLOWS_FROM = SPACING_TICKS - SPACING_TOLERANCE_TICKS
+_FOLLOWS_TO = SPACING_TICKS + SPACING_TOLERANCE_TICKS
 
 
 class Transmission(msgspec.Struct, frozen=True, gc=False):
@@ -64,7 +66,7 @@ def check_bad_stop(bad_stop: tuple[int, ...], count: int) -> None:
 
 def follows(last_tick: int, tick: int) -> bool:
     """Whether characters that begin at these ticks follow each other without a pause, as receivers judge it."""
-    return abs(tick - last_tick - SPACING_TICKS) <= SPACING_TOLERANCE_TICKS
+    return _FOLLOWS_FROM <= tick - last_tick <= _FOLLOWS_TO
 
 
 def of_symbols(symbols: Iterable[Symbol], direction: str, network: int = 0) -> list[Transmission]:
@@ -74,7 +76,7 @@ def of_symbols(symbols: Iterable[Symbol], direction: str, network: int = 0) -> l
     bad_stop: list[int] = []
     start_tick = last_tick = 0
     for byte, stop_good, tick in symbols:
-        if data and not follows(last_tick, tick):
+        if data and not _FOLLOWS_FROM <= tick - last_tick <= _FOLLOWS_TO:
             found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
             data, bad_stop = bytearray(), []
         if not data:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
+from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, guarded_inverse, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
@@ -130,7 +130,7 @@ def test_the_guarded_factor_keeps_the_sign_and_vanishes_at_the_singularity():
 
 def test_without_guard_the_singularity_is_named():
     with pytest.raises(ValueError, match="assumption 3"):
-        YangKim(SWITCHING)._inverse(0.0)
+        guarded_inverse(0.0, SWITCHING.cosine_guard)
 
 
 def test_sign_and_saturation_at_their_corners():

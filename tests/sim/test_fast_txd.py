@@ -11,6 +11,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
 from miro_robot.image import Image, Symbols
 from miro_sim.scenario import file as scenario_file
+from miro_sim.world.bodies import Bodies
 from miro_sim.world.network import Network
 from miro_sim.world.world import World
 from tests.robot.mcs51.asm import assemble
@@ -84,11 +85,13 @@ class Unheard(Network):
         return False
 
 
-def test_what_the_pc_hears_of_it_is_what_it_would_hear_of_one_endless_line(monkeypatch):
+def test_what_the_pc_hears_of_it_is_what_it_would_hear_of_one_endless_line():
     """With a line that takes a whole period there is nothing to hear early."""
-    piecewise = world(EVERY_CYCLE)
-    monkeypatch.setattr("miro_sim.world.world.Network", Unheard)
-    whole = world(EVERY_CYCLE)
+    piecewise, whole = world(EVERY_CYCLE), world(EVERY_CYCLE)
+    network = Unheard(whole.scenario.networks[0], whole.scenario, 0, whole.seed, whole.image, None)
+    whole.networks[:] = [network]
+    whole.bodies = Bodies(network.robots)
+    network.show(network.robots)
     for _ in range(2):
         assert piecewise.step() == whole.step()
 

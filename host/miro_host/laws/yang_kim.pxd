@@ -6,7 +6,7 @@ cpdef double sign(double x) noexcept
 cpdef double saturation(double x, double width) except? -7.5
 cpdef double curvature_term(double v, double w, double rho, double sin_alpha) except? -7.5
 cdef double _switch(double x, double width, bint smooth) except? -7.5
-cdef double _inverse(double cos_alpha, double d) except? -7.5
+cpdef double guarded_inverse(double cos_alpha, double d) except? -7.5
 @cython.locals(
     x=double, y=double, theta=double, rho=double, phi=double, sin_alpha=double, cos_alpha=double, rho_floor=double,
     rho_e=double, phi_e=double, theta_e=double, rho_e_rate=double, phi_e_rate=double, theta_e_rate=double,

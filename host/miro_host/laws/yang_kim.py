@@ -175,7 +175,7 @@ def _control(g: Gains, r: Reference, measured: Posture, v_m_s: float, w_rad_s: f
         + r.rho_accel_m_s2  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
         - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
     )
-    u1 = _inverse(cos_alpha, g.cosine_guard) * braces - v_dot  # (16)
+    u1 = guarded_inverse(cos_alpha, g.cosine_guard) * braces - v_dot  # (16)
     u2 = (  # (16)
         -g.q2_per_s * s2
         - g.p2_rad_s2 * _switch(s2, g.layer_s2_rad_s, smooth)
@@ -191,7 +191,7 @@ def _switch(x: float, width: float, smooth: bool) -> float:
     return saturation(x, width) if smooth else sign(x)
 
 
-def _inverse(cos_alpha: float, d: float) -> float:
+def guarded_inverse(cos_alpha: float, d: float) -> float:
     """The factor 1/cos(phi_c - theta_c) of equation (16), guarded by d."""
     if d == 0.0:
         if cos_alpha == 0.0:

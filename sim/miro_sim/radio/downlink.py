@@ -107,7 +107,11 @@ class Downlink:
             )
         lead = 0 if self.sender.always_on else self.sender.keyup
         key_tick = max(start_tick - lead, 0) + self.sender.latency
-        for link in (self, *(link for link, _ in self.audience)):
+        links, senders = [self], [self.sender]
+        for listening, sender in self.audience:
+            links.append(listening)
+            senders.append(sender)
+        for link in links:
             if key_tick < link.settled_tick:
                 raise TransmissionError(
                     f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
@@ -117,15 +121,16 @@ class Downlink:
         stops = bytearray(len(data) if bad_stop else 0)
         for place in bad_stop:
             stops[place] = 1
+        on_air = bytes(data), bytes(stops)
         late = self.jitter.u32(start_tick // HOST_BIT_TICKS) * (self.jitter_ticks + 1) >> 32
         arrival = max(start_tick + self.sender.latency + late, self.busy_tick)
-        for sender in (self.sender, *(sender for _, sender in self.audience)):
-            sender.transmissions.append((arrival, bytes(data), bytes(stops)))
+        for sender in senders:
+            sender.transmissions.append((arrival, *on_air))
         air_ticks = len(data) * HOST_CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
         self.busy_tick = max(arrival + air_ticks, self.sender.end(len(self.sender.transmissions) - 1))
         if self.lost.below(start_tick // HOST_BIT_TICKS, self.lost_threshold):
-            for sender in (self.sender, *(sender for _, sender in self.audience)):
+            for sender in senders:
                 sender.transmissions.pop()
         return self.free_tick
 

@@ -25,7 +25,7 @@ from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
-from miro_sim.periods import Period
+from miro_sim.periods import Period, RobotPeriod
 from miro_sim.radio.link_state import LINK_STATES, LinkState
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.actions import SETTLE_TICKS
@@ -160,11 +160,13 @@ class World:
 
         Raises ValueError for what is no whole number.
         """
-        tick = _whole(tick)
+        self._run_to(max(0, min(_whole(tick), NEVER_TICK)))
+
+    def _run_to(self, tick: int) -> None:
         while self.tick < tick and not self.stopped:
             self.begin_period()
             self.run_piece(self.rendezvous(tick))
-            if self.tick == self.period_end or self.stopped:
+            if self.stopped or self.tick == (self.index + 1) * CONTROL_PERIOD_TICKS:
                 self.end_period()
 
     def run_for(self, ticks: int) -> None:
@@ -285,15 +287,17 @@ class World:
 
     def rendezvous(self, tick: int) -> int:
         """Where everything meets next, going to `tick`."""
-        action_tick = NEVER_TICK
+        next_tick = min(tick, (self.index + 1) * CONTROL_PERIOD_TICKS)
         for network in self.networks:
-            action_tick = min(action_tick, network.actions.next_after(self.tick))
-        return min(tick, self.period_end, action_tick)
+            action_tick = network.actions.next_after(self.tick)
+            next_tick = min(next_tick, action_tick)
+        return next_tick
 
     def run_piece(self, tick: int) -> None:
         """Everything on to `tick`, which is no later than the end of the period."""
         for network in self.networks:
-            network.do_due(self.tick)
+            if network.actions.waiting:
+                network.do_due(self.tick)
         for network in self.networks:
             network.send_due(tick)
         for network in self.networks:
@@ -304,21 +308,26 @@ class World:
             self.stopped = network.run(tick) or self.stopped
         for network in self.networks:
             network.hear(tick)
-        for touch_tick, one, other in self.bodies.look():
-            self.networks[one.network].note_touch(touch_tick, one, other)
+        if self.bodies.pairs:
+            for touch_tick, one, other in self.bodies.look():
+                self.networks[one.network].note_touch(touch_tick, one, other)
 
     def end_period(self) -> None:
         """The records of the period that is over, and its link in the digest chain."""
-        wire = tuple(run for network in self.networks for run in network.end_period())
-        robots = tuple(record for network in self.networks for record in network.seen)
-        index, begun = self.index, self.index * CONTROL_PERIOD_TICKS
+        wire: list[Transmission] = []
+        robots: list[RobotPeriod] = []
+        for network in self.networks:
+            wire += network.end_period()
+            robots += network.seen
+        index = self.index
         self.in_period = False
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
-        actions = tuple(action for network in self.networks for action in network.actions.take())
-        self.last = Period(
-            index=index, tick=begun, robots=robots, wire=wire, digest=self.digest, actions=actions
-        )
+        actions: list[Action] = []
+        for network in self.networks:
+            actions += network.actions.take()
+        begun = index * CONTROL_PERIOD_TICKS
+        self.last = Period(index, begun, tuple(robots), tuple(wire), self.chain.hex(), tuple(actions))
         for observer in self.observers:
             observer(self.last)
 

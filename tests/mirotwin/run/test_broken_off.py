@@ -14,7 +14,7 @@ import pytest
 from miro_exact.domain import DomainError
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
-from mirotwin.run import run_files
+from mirotwin.run import run_command, run_files
 from mirotwin.shell.outputs import OutputFolder
 from tests import children
 
@@ -32,14 +32,14 @@ def _default_interrupt():
 
 def at_period(monkeypatch, index, act):
     """Has `act` called when the world is about to compute control period `index`."""
-    step = World.step
 
-    def stepped(world):
-        if world.index == index:
-            act()
-        return step(world)
+    class Interrupted(World):
+        def step(self):
+            if self.index == index:
+                act()
+            return super().step()
 
-    monkeypatch.setattr(World, "step", stepped)
+    monkeypatch.setattr(run_command, "World", Interrupted)
 
 
 def raising(error):
