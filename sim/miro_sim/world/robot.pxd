@@ -5,7 +5,7 @@ from miro_robot.board cimport Board
 from miro_robot.lm629.chip cimport Lm629
 from miro_sim.plant.drive cimport DifferentialDrive
 
-cdef long long CYCLE_TICKS
+cdef long long CYCLE_TICKS, GRID_TICKS
 
 
 cdef class Robot:
@@ -15,9 +15,13 @@ cdef class Robot:
     cdef readonly DifferentialDrive drive
     cdef readonly list counter_addresses
     cdef public tuple marks
-    cdef public list asked
+    cdef public list asked, noted
+    cdef public long long grid_tick
 
+    cpdef note_from(self, long long tick)
+    @cython.locals(stopped=int)
     cpdef int run(self, long long tick) except -1
+    cdef int _run(self, long long tick) except -1
     cpdef steer(self, measured, telemetry, long long tick)
     cpdef counter(self, int index)
     cpdef record(self, long long tick, measured, command)
