@@ -21,7 +21,7 @@ MIROTWIN = Path(sys.executable).with_name("mirotwin")
 SHORTENED = {
     name: (EXAMPLE / f"{name}.toml")
     .read_text(encoding="utf-8")
-    .replace("duration_s = 6.0", "duration_s = 0.5")
+    .replace("duration_s = 6.0", "duration_s = 0.25")
     for name in ("samson", "pursuit")
 }
 SHORT = SHORTENED["samson"]

@@ -145,11 +145,14 @@ def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path)
     assert str(tmp_path) not in save
 
 
-def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(short, tmp_path):
+def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(mirotwin, short, tmp_path):
     def written(name, *options):
         out = tmp_path / f"{name}.vcd"
-        command = [MIROTWIN, "fw", "vcd", short, "--slot", "0", "--out", out, *options]
-        children.run(command, check=True, capture_output=True)
+        command = ["fw", "vcd", short, "--slot", "0", "--out", out, *options]
+        if "--engine" in options:
+            children.run([MIROTWIN, *command], check=True, capture_output=True)
+        else:
+            assert mirotwin(*command)[0] == 0
         return out.read_bytes()
 
     window = ("--from", "150ms", "--to", "156ms")

@@ -2,9 +2,6 @@
 
 import pytest
 
-from tests.mirotwin.conftest import finished as finished
-from tests.mirotwin.conftest import mirotwin as mirotwin
-from tests.mirotwin.conftest import short as short
 from tests.mirotwin.fuzz.random_engine import RandomEngine
 
 

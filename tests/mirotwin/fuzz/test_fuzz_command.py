@@ -36,7 +36,7 @@ def started(tmp_path, *arguments):
 @needs_sdcc
 def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, built, tmp_path):
     image = built(MISTAKE)
-    code, out, err = mirotwin("fuzz", image, "--time", "3s", "--minimise", "1s", "--out", tmp_path / "out")
+    code, out, err = mirotwin("fuzz", image, "--time", "3s", "--minimise", "0.3s", "--out", tmp_path / "out")
     assert code == 1
     assert engines[0].stopped
     assert "mirotwin: found: " in err
@@ -55,7 +55,7 @@ def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin
 
 @pytest.mark.parametrize("kind", ["frames", "session"])
 def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_path, kind):
-    code, out, err = mirotwin("fuzz", "--time", "1s", "--input", kind, "--out", tmp_path / "out")
+    code, out, err = mirotwin("fuzz", "--time", "0.3s", "--input", kind, "--out", tmp_path / "out")
     assert (code, err) == (0, "")
     assert out.startswith("miro.ihx: ")
     assert "never reached: " in out
@@ -63,22 +63,22 @@ def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_pat
 
 
 def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines, tmp_path):
-    code, out, _ = mirotwin("fuzz", "--time", "30s", "--covering", "motion_off", "--out", tmp_path / "out")
+    code, out, _ = mirotwin("fuzz", "--time", "1s", "--covering", "motion_stop", "--out", tmp_path / "out")
     assert code == 0
-    path = tmp_path / "out" / "covering" / "motion_off.stream"
-    assert f"--covering motion_off: reached by {path}" in out
+    path = tmp_path / "out" / "covering" / "motion_stop.stream"
+    assert f"--covering motion_stop: reached by {path}" in out
     assert mirotwin("replay", path, "-q")[0] == 0
 
 
 def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
-    code, _, err = mirotwin("fuzz", "--time", "1s", "--covering", "give_up", "--out", tmp_path / "out")
+    code, _, err = mirotwin("fuzz", "--time", "0.3s", "--covering", "give_up", "--out", tmp_path / "out")
     assert code == 1
     assert "--covering give_up: not reached by " in err
 
 
 def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
-    arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "1s")
-    code, out, _ = mirotwin("fuzz", "--time", "1s", *arguments, "--out", tmp_path / "out")
+    arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "0.3s")
+    code, out, _ = mirotwin("fuzz", "--time", "0.3s", *arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "wheels_within_m_s: judged " in out
     assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
@@ -104,7 +104,7 @@ def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, 
     source = BROKEN.replace('RuntimeError("oh")', error)
     install(tmp_path / "dist", "broken", "1.0", parts, "checks", **{f"broken_check_{len(error)}": source})
     monkeypatch.syspath_prepend(str(tmp_path / "dist"))
-    code, _, err = mirotwin("fuzz", "--time", "20s", "--expect", "broken", "--out", tmp_path / "out")
+    code, _, err = mirotwin("fuzz", "--time", "1s", "--expect", "broken", "--out", tmp_path / "out")
     assert code == 2
     assert "--expect: " in err
     assert f"check 'broken' cannot judge: {error.partition('(')[0]}: " in err
@@ -197,7 +197,9 @@ def test_a_corpus_inside_the_folder_that_is_replaced_is_refused(mirotwin, engine
 
 @needs_sdcc
 def test_firmware_that_fails_before_it_hears_anything_is_refused(mirotwin, engines, built, tmp_path):
-    code, _, err = mirotwin("fuzz", built("stays in an interrupt"), "--time", "1s", "--out", tmp_path / "out")
+    code, _, err = mirotwin(
+        "fuzz", built("stays in an interrupt"), "--time", "0.3s", "--out", tmp_path / "out"
+    )
     assert code in (1, 2)
     if code == 2:
         assert "mend" in err
@@ -208,7 +210,7 @@ def test_firmware_that_never_sleeps_is_fuzzed_with_a_word_about_it(mirotwin, eng
     source = source_files()["main.c"]
     assert source.count("        sleep = IDL;\n") == 1
     built = build({"main.c": source.replace("        sleep = IDL;\n", "        sleep = 0;\n")})
-    code, _, err = mirotwin("fuzz", built.image, "--time", "1s", "--out", tmp_path / "out")
+    code, _, err = mirotwin("fuzz", built.image, "--time", "0.3s", "--out", tmp_path / "out")
     assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms after its last character" in err
     assert code in (0, 1)
 
@@ -224,7 +226,7 @@ def test_a_symbol_needs_symbols(mirotwin, engines, tmp_path):
 def test_an_image_without_symbols_can_be_fuzzed(mirotwin, engines, tmp_path):
     bare = tmp_path / "bare.ihx"
     bare.write_bytes(own_image().path.read_bytes())
-    code, out, _ = mirotwin("fuzz", bare, "--time", "1s", "--out", tmp_path / "out")
+    code, out, _ = mirotwin("fuzz", bare, "--time", "0.3s", "--out", tmp_path / "out")
     assert code == 0
     assert (tmp_path / "out" / "coverage.info.lst").exists()
     assert out.startswith("bare.ihx: ")

@@ -2,10 +2,7 @@
 
 import pytest
 
-from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.ports.ports import Rig
-
-__all__ = ["mirotwin", "rig"]
 
 
 @pytest.fixture

@@ -7,11 +7,9 @@ import pytest
 
 from miro_robot.firmware import image_path
 from mirotwin.testing import starter
-from tests.mirotwin.conftest import mirotwin
 from tests.mutants import build
 from tests.mutants.planted import PLANTED
 
-__all__ = ["mirotwin"]
 LATE = PLANTED["stops 15 ms late"]
 
 

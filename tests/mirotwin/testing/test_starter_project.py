@@ -11,9 +11,6 @@ import pytest
 from miro_robot.firmware import image_path
 from mirotwin.testing import starter
 from tests import children
-from tests.mirotwin.conftest import mirotwin
-
-__all__ = ["mirotwin"]
 
 
 def tree(folder):

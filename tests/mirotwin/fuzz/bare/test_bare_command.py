@@ -5,8 +5,6 @@ import shlex
 import pytest
 from intelhex import IntelHex
 
-from tests.mirotwin.conftest import mirotwin as mirotwin
-from tests.mirotwin.fuzz.conftest import engines as engines
 from tests.mirotwin.verify.bare.firmwares import FAULTY, POLLS, SLEEPS, image
 
 CHECK = """

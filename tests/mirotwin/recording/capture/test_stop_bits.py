@@ -18,10 +18,8 @@ from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.rerun import runner
-from tests.mirotwin.conftest import mirotwin
 from tests.sim.world.rig import image
 
-__all__ = ["mirotwin"]
 PERIODS = 150
 
 

@@ -2,10 +2,7 @@
 
 import pytest
 
-from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.report.foxglove import rig
-
-__all__ = ["mirotwin"]
 
 
 @pytest.fixture(scope="session")

@@ -15,11 +15,8 @@ from miro_sim.world.waits import WaitExpired
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text, tables_of, write_case
 from mirotwin.verify.checks.happens import expect_of
 from tests import children
-from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.verify.checks.rig import MS, needs_sdcc, own_image, planted, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
-
-__all__ = ["mirotwin"]
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig9", "waypoints", "sine"])

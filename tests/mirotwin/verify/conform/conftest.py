@@ -1,3 +1,0 @@
-"""The command, called in this process."""
-
-from tests.mirotwin.conftest import mirotwin as mirotwin
