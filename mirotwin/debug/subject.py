@@ -124,14 +124,14 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | N
     if is_bare_case(path):
         return _bare_case(options)
     choose_engine(options.engine)
-    job, image = load_job(path, options.firmware, options.engine, options.settings)
+    job = load_job(path, options.firmware, options.engine, options.settings)
     if not job.case.verdict:
         return None, None
-    run = RobotRun(job.world(image), options.network or 0)
+    run = RobotRun(job.world_of(), options.network or 0)
     if options.slot is not None:
         slots = [robot.slot for robot in run.world.networks[run.network].robots]
         run = RobotRun(run.world, run.network, slots.index(options.slot))
-    return run, partial(_judge, job, options.subject)
+    return run, partial(_judge, job)
 
 
 def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
@@ -148,10 +148,10 @@ def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
     return CaseRun(playback), lambda timeline: _verdict(header.verdict or "", failures)
 
 
-def _judge(job: Job, path: str, timeline: Timeline) -> tuple[str, Failure | None]:
+def _judge(job: Job, timeline: Timeline) -> tuple[str, Failure | None]:
     assert isinstance(timeline.run, RobotRun)
     world = timeline.run.world
-    checks = Checks(world, expectations_of(job.scenario, path))
+    checks = Checks(world, expectations_of(job.scenario, job.file))
     timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
     checks.finish()
     return _verdict(job.case.verdict, checks.failures)

@@ -163,10 +163,10 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
             world = World(text.scenario, options.seed or 0, image)
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
-        job, image = load_job(subject, options.firmware, options.engine, options.settings)
+        job = load_job(subject, options.firmware, options.engine, options.settings)
         periods = job.recorded[-1].index + 1 if job.recorded else None
         with plain_parameters(subject):
-            world = job.world(image)
+            world = job.world_of()
     network, index = _which_robot(world, options)
     return RobotRun(world, network, index, periods)
 

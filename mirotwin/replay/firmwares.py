@@ -178,12 +178,8 @@ def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) 
 
 
 def firmwares_apart(
-    file: str, job: Job, annotated: tuple[AnnotatedImage, AnnotatedImage], found: Sequence[Difference]
+    job: Job, annotated: tuple[AnnotatedImage, AnnotatedImage], found: Sequence[Difference]
 ) -> FirmwareDifference | None:
     """Where the recorded image and the one that ran go apart, up to the first difference."""
-
-    def make(which: Image) -> World:
-        return job.world(which)
-
-    with plain_parameters(file, "replayed"):
-        return first_instruction(make, *annotated, found[0].tick + LOOK_TICKS)
+    with plain_parameters(job.file, "replayed"):
+        return first_instruction(job.world_of, *annotated, found[0].tick + LOOK_TICKS)

@@ -11,7 +11,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_robot.image import SPACE_BYTES, Image
+from miro_robot.image import SPACE_BYTES
 from miro_sim.periods import Period
 from mirotwin.desk.guard import HEADING, DeskOptions
 from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
@@ -61,22 +61,22 @@ from mirotwin.verify.checks.expect import expectations_of, says_anything
 from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
 
 
-def replay_case(job: Job, image: Image, file: str, quiet: bool) -> int:
+def replay_case(job: Job, quiet: bool) -> int:
     """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
     name = job.case.verdict.partition(":")[0]
-    expected = expectations_of(job.scenario, file)
+    expected = expectations_of(job.scenario, job.file)
     if not any(check.name == name for checks in expected.values() for check in checks):
         what = f"the verdict is of the check {name!r}, which nothing expects"
-        raise BadInput(file, "header", what, "put it into [expect], or take the verdict away")
+        raise BadInput(job.file, "header", what, "put it into [expect], or take the verdict away")
     end_tick = job.case.end_tick or None
     periods = None if end_tick is None else -(-end_tick // CONTROL_PERIOD_TICKS)
     with ProgressBar("replaying", periods, quiet) as bar:
-        again = rerun_job(job, image, file, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
+        again = rerun_job(job, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
     judged = all(one.name != name or one.verdict != "not judged" for one in again.checks.verdicts())
     verdict = verdict_of(job.case.verdict, again.failures, job.case.changed, judged)
     _say(verdict)
     if again.failures and not quiet:
-        show(debug_line(file, foreign_path(image)))
+        show(debug_line(job.file, foreign_path(job.runs_on)))
     return verdict.code
 
 
@@ -165,7 +165,7 @@ def replay(options: ReplayOptions) -> int:
     settings = (*options.settings, *as_settings(options.expected))
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job, image = load_job(file, options.firmware, options.engine, settings, options.seed, options.stack_from)
+    job = load_job(file, options.firmware, options.engine, settings, options.seed, options.stack_from)
     if not job.recorded and not options.desk.port:
         _refuse(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
@@ -178,29 +178,29 @@ def replay(options: ReplayOptions) -> int:
     if desk.port:
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
-        file = str(record_at_port(job, image, file, desk, options.out, options.force, options.quiet))
-        job, image = load_job(file, None, options.engine)
+        file = str(record_at_port(job, desk, options.out, options.force, options.quiet))
+        job = load_job(file, None, options.engine)
     if job.origin:
         from mirotwin.replay.replay_port import compare_with_twin
 
         rule = compare.of_answers(file)
-        return compare_with_twin(job, image, file, rule, options.everything, options.quiet, compare.as_json)
+        return compare_with_twin(job, rule, options.everything, options.quiet, compare.as_json)
     if compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
     if job.case.verdict:
         _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
-        return replay_case(job, image, file, options.quiet)
+        return replay_case(job, options.quiet)
     judged = says_anything(job.scenario)
-    periods = _periods(file, job, compare.rule)
-    again = _rerun(file, job, image, periods, options.quiet or compare.as_json)
+    periods = _periods(job, compare.rule)
+    again = _rerun(job, periods, options.quiet or compare.as_json)
     world, checks, replayed = again.world, again.checks, again.periods
     rule = msgspec.structs.replace(compare.rule, digests=job.state == world.state.tables())
     found = differences(job.recorded, replayed, rule)
     apart = None
-    if found and job.image is not None and job.image.code != image.code:
-        annotated = annotated_of(job.image, images, ()), annotated_of(image, (), options.sources)
-        apart = firmwares_apart(file, job, annotated, found)
+    if found and job.image is not None and job.image.code != job.runs_on.code:
+        annotated = annotated_of(job.image, images, ()), annotated_of(job.runs_on, (), options.sources)
+        apart = firmwares_apart(job, annotated, found)
 
     if not options.quiet and not compare.as_json:
         print_frames(job, replayed, options.everything)
@@ -221,7 +221,7 @@ def replay(options: ReplayOptions) -> int:
             "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
             **compare.rule_as_json(),
         }
-        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": image.sha256}
+        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256}
         instruction = None if apart is None else apart.as_json()
         document = {"file": file, "seed": job.seed, "firmware": firmwares, **compared}
         result = {
@@ -239,7 +239,7 @@ def _refuse(file: str, what: str, given: Sequence[str]) -> None:
         raise BadInput(file, given[0], what, "leave it out")
 
 
-def _periods(file: str, job: Job, rule: CompareRule) -> int | None:
+def _periods(job: Job, rule: CompareRule) -> int | None:
     """How many control periods are replayed; None: to the end of the scenario."""
     if not job.recorded:
         ends = [tick for tick in (rule.to_tick, job.case.end_tick) if tick]
@@ -248,21 +248,19 @@ def _periods(file: str, job: Job, rule: CompareRule) -> int | None:
     there = first + len(job.recorded)
     if rule.from_tick >= there * CONTROL_PERIOD_TICKS:
         what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
-        raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
+        raise BadInput(job.file, f"--from {rule.from_tick}t", what, "look earlier")
     if rule.to_tick is None:
         return there - first
     return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
 
 
-def _rerun(file: str, job: Job, image: Image, periods: int | None, quiet: bool) -> Rerun:
+def _rerun(job: Job, periods: int | None, quiet: bool) -> Rerun:
     """The first `periods` of it, as far as the scenario goes."""
     first = job.recorded[0].index if job.recorded else 0
     last = job.periods if periods is None else min(first + periods, job.periods)
     with ProgressBar("replaying", last - first, quiet) as bar:
         until_tick = last * CONTROL_PERIOD_TICKS
-        return rerun_job(
-            job, image, file, until_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS - first)
-        )
+        return rerun_job(job, until_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS - first))
 
 
 def _verdict(

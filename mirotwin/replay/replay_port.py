@@ -46,13 +46,13 @@ _TWIN = (
 """Settings of the twin: an ideal radio, and a camera that nobody steers by."""
 
 
-def record_at_port(
-    job: Job, image: Image, file: str, desk: DeskOptions, out: Path | None, force: bool, quiet: bool
-) -> Path:
+def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, quiet: bool) -> Path:
     """Sends all that the job's hosts send to the robots at the port; the recording of it. Raises BadInput."""
-    sent = _sendable(job, file, desk)
-    folder = OutputFolder(out or _default(file), force, (RECORDING,), ours=out is None)
-    source = twin_source(job.scenario, job.seed, image, job.firmware if image is job.image else b"")
+    sent = _sendable(job, desk)
+    folder = OutputFolder(out or _default(job.file), force, (RECORDING,), ours=out is None)
+    source = twin_source(
+        job.scenario, job.seed, job.runs_on, job.firmware if job.runs_on is job.image else b""
+    )
     robots = job.scenario.networks[0].robots
     decoder = Decoder(robots)
     numbers = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
@@ -62,7 +62,7 @@ def record_at_port(
         stream = _WrittenApart(files.enter_context(folder.part(RECORDING).open("wb")))
         files.callback(stream.close)
         recorder = files.enter_context(Recorder(stream, source))
-        with RobotPort(desk, job.scenario, file, recorder) as port:
+        with RobotPort(desk, job.scenario, job.file, recorder) as port:
             port.greet(next_seq=next(numbers, 0))
             shortest, longest = (ticks / TICKS_PER_MS for ticks in port.delay_ticks)
             slots = f"{', '.join(map(str, port.slots))} of {robots}"
@@ -116,8 +116,9 @@ class _WrittenApart:
             one.result()
 
 
-def _sendable(job: Job, file: str, desk: DeskOptions) -> list[Transmission]:
+def _sendable(job: Job, desk: DeskOptions) -> list[Transmission]:
     """What is to be sent. Raises BadInput for what no port can send, or the guard does not allow."""
+    file = job.file
     sent, guard = sent_in(job.script), Guard(desk, file)
     if not sent:
         raise BadInput(file, "", "no line from host to robot", "nothing can be sent")
@@ -154,15 +155,13 @@ def twin_source(scenario: Scenario, seed: int, image: Image, firmware: bytes = b
     )
 
 
-def compare_with_twin(
-    job: Job, image: Image, file: str, rule: CompareRule, everything: bool, quiet: bool, as_json: bool
-) -> int:
+def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool, as_json: bool) -> int:
     """Runs the twin with what was sent at the port, and compares its answers; the exit code."""
-    comparison = compared(job, image, file, rule, quiet or as_json)
+    comparison = compared(job, rule, quiet or as_json)
     found = comparison.differences
     code = DIVERGENCE if found else DONE
     if as_json:
-        head = {"file": file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
+        head = {"file": job.file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
         head["not_judged"] = comparison.not_judged
         print_json(head | differences_as_json(found, everything, WORDS) | {"exit_code": code})
     elif found and not quiet:
@@ -181,9 +180,9 @@ def compare_with_twin(
     return code
 
 
-def compared(job: Job, image: Image, file: str, rule: CompareRule, quiet: bool) -> PortComparison:
+def compared(job: Job, rule: CompareRule, quiet: bool) -> PortComparison:
     """The recorded answers beside those of the twin."""
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     with ProgressBar("running the twin", end_tick, quiet) as bar:
-        again = rerun_job(job, image, file, end_tick, bar.to)
+        again = rerun_job(job, end_tick, bar.to)
     return compare(job.recorded, again.periods, job.scenario.networks[0].robots, rule)

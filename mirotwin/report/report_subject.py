@@ -69,10 +69,8 @@ def material_of(wanted: PageSubject) -> Material:
     if is_bare_case(file):
         what = "is a case of a bare processor, which has no robot to show"
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
-    job, image = load_job(file, wanted.firmware, wanted.engine)
-    if job.recorded:
-        return _of_recording(wanted, file, job, image)
-    return _of_case(wanted, file, job, image)
+    job = load_job(file, wanted.firmware, wanted.engine)
+    return _of_recording(wanted, job) if job.recorded else _of_case(wanted, job)
 
 
 def page_of_port(wanted: PageSubject) -> bytes | None:
@@ -80,8 +78,8 @@ def page_of_port(wanted: PageSubject) -> bytes | None:
     file = _file_of(wanted.subject)
     if is_bare_case(file):
         return None
-    job, image = load_job(file, wanted.firmware, wanted.engine)
-    return port_page(job, image, file, wanted.quiet) if job.origin else None
+    job = load_job(file, wanted.firmware, wanted.engine)
+    return port_page(job, wanted.quiet) if job.origin else None
 
 
 def page_of_failure(folder: str) -> bytes:
@@ -100,24 +98,23 @@ def _file_of(subject: str) -> str:
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 
 
-def _reproduced(
-    wanted: PageSubject, file: str, job: Job, image: Image, until_tick: int | None
-) -> Reproduction:
-    with plain_parameters(file, "replayed"):
-        world = job.world(image)
+def _reproduced(wanted: PageSubject, job: Job, until_tick: int | None) -> Reproduction:
+    with plain_parameters(job.file, "replayed"):
+        world = job.world_of()
     total = until_tick or job.periods * CONTROL_PERIOD_TICKS
-    with ProgressBar("running it again", total, wanted.quiet) as bar, replaying(file, world):
-        return reproduce(world, until_tick, expectations_of(job.scenario, file), bar.to)
+    with ProgressBar("running it again", total, wanted.quiet) as bar, replaying(job.file, world):
+        return reproduce(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
 
 
-def _of_recording(wanted: PageSubject, file: str, job: Job, image: Image) -> Material:
+def _of_recording(wanted: PageSubject, job: Job) -> Material:
+    file, image = job.file, job.runs_on
     recorded = [period for period in job.recorded if period.index in wanted.shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
         place = f"--from {wanted.from_tick}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-    again = _reproduced(wanted, file, job, image, end_tick)
+    again = _reproduced(wanted, job, end_tick)
     other = job.image is None or job.image.code != image.code
     extras = extras_of(file, recorded[0].tick, end_tick, wanted.frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
@@ -134,7 +131,7 @@ def _of_recording(wanted: PageSubject, file: str, job: Job, image: Image) -> Mat
     # the state of a controller is not computed again, so that digests of states say nothing here
     found = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
     return Material(
-        about=_about("run", file, job, image, notes, _command(wanted, file)),
+        about=_about("run", wanted, job, notes),
         scenario=job.scenario,
         scenario_text=tomli_w.dumps(tables_of(job.scenario)),
         periods=recorded,
@@ -147,13 +144,14 @@ def _of_recording(wanted: PageSubject, file: str, job: Job, image: Image) -> Mat
     )
 
 
-def _of_case(wanted: PageSubject, file: str, job: Job, image: Image) -> Material:
+def _of_case(wanted: PageSubject, job: Job) -> Material:
+    file, image = job.file, job.runs_on
     ends = [tick for tick in (job.case.end_tick, wanted.to_tick) if tick]
-    again = _reproduced(wanted, file, job, image, min(ends, default=None))
+    again = _reproduced(wanted, job, min(ends, default=None))
     report = Path(file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
-    about = _about("failed test" if text else "case", file, job, image, notes, _command(wanted, file))
+    about = _about("failed test" if text else "case", wanted, job, notes)
     return Material(
         about=msgspec.structs.replace(
             about,
@@ -188,20 +186,17 @@ def _said(job: Job, again: Reproduction) -> list[str]:
     return [f"What was recorded{now}. Recorded: {verdict}"]
 
 
-def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], again: str) -> PageHeader:
+def _about(kind: str, wanted: PageSubject, job: Job, notes: Sequence[str]) -> PageHeader:
+    name = Path(job.file).name
     return PageHeader(
         kind=kind,
-        file=Path(file).name,
+        file=name,
         seed=job.seed,
-        firmware=image.path.name,
-        firmware_sha256=image.sha256 or "",
+        firmware=job.runs_on.path.name,
+        firmware_sha256=job.runs_on.sha256 or "",
         notes=notes,
-        again=(again,),
+        again=(replay_line(name, Path(wanted.firmware).name if wanted.firmware else None),),
     )
-
-
-def _command(wanted: PageSubject, file: str) -> str:
-    return replay_line(Path(file).name, Path(wanted.firmware).name if wanted.firmware else None)
 
 
 def _summary(recording: Path, digest: str) -> Summary | None:

@@ -60,15 +60,18 @@ class Case(msgspec.Struct, frozen=True):
 class Job(msgspec.Struct, frozen=True):
     """What is to be replayed: a recording, or a text stream (then `recorded` is empty and `image` None).
 
-    `image`: the one that was recorded, None where it is none. `state`: the form of the states whose digests were
-    recorded, if a replay computes the same states, else empty: a controller's states are not computed again.
-    `origin`: "port" where the answers that were recorded are those of real robots. `firmware`: the recorded file.
+    `file` holds it; `runs_on`: the image to play it to. `image`: the one that was recorded, None where it is none.
+    `state`: the form of the states whose digests were recorded, if a replay computes the same states, else empty: a
+    controller's states are not computed again. `origin`: "port" where the answers that were recorded are those of real
+    robots. `firmware`: the recorded file.
     """
 
     scenario: Scenario
     seed: int
     script: list[ScriptItem]
     recorded: Sequence[Period]
+    file: str
+    runs_on: Image
     image: Image | None = None
     state: str = ""
     case: Case = Case()
@@ -81,12 +84,11 @@ class Job(msgspec.Struct, frozen=True):
         """Control periods of its scenario."""
         return max(1, -(-ticks(self.scenario.duration_s) // CONTROL_PERIOD_TICKS))
 
-    def world(self, image: Image | None = None) -> World:
-        """A world that is to do it again, with `image`; a run that was resumed begins where that one did."""
+    def world_of(self, image: Image | None = None) -> World:
+        """A world that is to do it again, on `image` if one is given; a resumed run begins where that one did."""
         from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
-        run = image or self.image
-        assert run is not None
+        run = image or self.runs_on
         if not self.resumed:
             return World(self.scenario, self.seed, run, script=self.script)
         world = World(self.scenario, self.seed, run, script=())
@@ -110,7 +112,7 @@ def load_job(
     settings: Sequence[str] = (),
     seed: int | None = None,
     stack_from: int | None = None,
-) -> tuple[Job, Image]:
+) -> Job:
     """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
 
     `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
@@ -126,10 +128,10 @@ def load_job(
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
         image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
-        job = _job_of_recording(recording, file, settings, image, seed)
-        return job, image if firmware is None and image is not None else load_firmware(
-            firmware, stack_from=stack_from
-        )
+        named = firmware is not None or image is None
+        runs_on = load_firmware(firmware, stack_from=stack_from) if named else image
+        assert runs_on is not None
+        return _job_of_recording(recording, file, settings, image, runs_on, seed)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     header = given.header
@@ -138,32 +140,28 @@ def load_job(
     reseeded = seed not in (None, header.seed or 0)
     other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded
     case = Case(header.verdict or "", header.end_tick or 0, other)
-    return msgspec.structs.replace(_job_of_stream(given, file, settings, seed), case=case), image
+    return _job_of_stream(given, file, settings, image, seed, case)
 
 
-def load_stream(file: str, engine: str | None) -> Job:
-    """The job of a stream file, whatever firmware it is for: that is the caller's to choose."""
+def load_stream(file: str, engine: str | None, firmware: str | None) -> Job:
+    """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
     data = read_input(file)
     choose_engine(engine)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     case = Case(given.header.verdict or "", given.header.end_tick or 0)
-    return msgspec.structs.replace(_job_of_stream(given, file, (), None), case=case)
+    return _job_of_stream(given, file, (), load_firmware(firmware), None, case)
 
 
 def rerun_job(
-    job: Job,
-    image: Image,
-    file: str,
-    until_tick: int | None = None,
-    progress: Callable[[int], object] = lambda tick: None,
+    job: Job, until_tick: int | None = None, progress: Callable[[int], object] = lambda tick: None
 ) -> Rerun:
-    """Sends it again on `image`, under what its scenario expects; None: to the end of that. Raises BadInput."""
-    with plain_parameters(file, "replayed"):
-        world = job.world(image)
-    with replaying(file, world):
-        return rerun(world, until_tick, expectations_of(job.scenario, file), progress)
+    """Sends it again, under what its scenario expects; None: to the end of that. Raises BadInput."""
+    with plain_parameters(job.file, "replayed"):
+        world = job.world_of()
+    with replaying(job.file, world):
+        return rerun(world, until_tick, expectations_of(job.scenario, job.file), progress)
 
 
 @contextmanager
@@ -195,7 +193,12 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
 
 
 def _job_of_recording(
-    recording: Recording, path: str, settings: Sequence[str], image: Image | None, seed: int | None
+    recording: Recording,
+    path: str,
+    settings: Sequence[str],
+    image: Image | None,
+    runs_on: Image,
+    seed: int | None,
 ) -> Job:
     source = recording.source
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
@@ -206,11 +209,24 @@ def _job_of_recording(
     silent = all(network.host == "silent" for network in scenario.networks)
     state = source.state if as_it_was and silent else ""
     own = source.seed if seed is None else seed
-    job = Job(scenario, own, script, recording.periods, image, state, resumed=source.resumed)
-    return msgspec.structs.replace(job, origin=source.origin, firmware=source.firmware)
+    return Job(
+        scenario,
+        own,
+        script,
+        recording.periods,
+        path,
+        runs_on,
+        image,
+        state,
+        resumed=source.resumed,
+        origin=source.origin,
+        firmware=source.firmware,
+    )
 
 
-def _job_of_stream(given: stream.StreamFile, path: str, settings: Sequence[str], seed: int | None) -> Job:
+def _job_of_stream(
+    given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None, case: Case
+) -> Job:
     sent = given.script()
     header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(
@@ -218,7 +234,8 @@ def _job_of_stream(given: stream.StreamFile, path: str, settings: Sequence[str],
     )
     check_actions(sent, path, scenario)
     own = given.header.seed or 0
-    return Job(scenario, own if seed is None else seed, script_of_stream(sent), ())
+    script = script_of_stream(sent)
+    return Job(scenario, own if seed is None else seed, script, (), path, image, case=case)
 
 
 def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:

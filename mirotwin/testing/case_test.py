@@ -44,8 +44,8 @@ class CaseTests:
         return next((text for text in self.checks if text.rpartition(":")[2] == name), None)
 
     def _run(self, path: str) -> Outcome:
-        job, image = load_stream(path, self.engine), load_firmware(self.firmware)
-        again = rerun_job(job, image, path, job.case.end_tick or None)
+        job = load_stream(path, self.engine, self.firmware)
+        again = rerun_job(job, job.case.end_tick or None)
         failure = again.failure
         lines: tuple[str, ...] = () if failure is None else (f"expectation failed: {failure}",)
         for one in again.checks.verdicts():
@@ -58,7 +58,7 @@ class CaseTests:
             tick=again.tick,
             seed=job.seed,
             digest=again.world.digest,
-            firmware_sha256=image.sha256 or "",
+            firmware_sha256=job.runs_on.sha256 or "",
         )
 
     def _run_bare(self, path: str) -> Outcome:

@@ -11,7 +11,6 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_protocol.table import TICKS_PER_MS
-from miro_robot.image import Image
 from mirotwin.desk.compare import FIELDS, RobotBesideTwin, TimedAnswer, compare
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.document import render
@@ -24,11 +23,11 @@ SHOWN = {"left moved": "counts", "right moved": "counts", "flags": "", "accepted
 """Channels that are drawn, and their units: flags as they are, others from the first answer on."""
 
 
-def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
+def port_page(job: Job, quiet: bool) -> bytes:
     """The page of a recording made at a port. Raises BadInput where Bokeh is not installed."""
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     with ProgressBar("running the twin", end_tick, quiet) as bar:
-        again = rerun_job(job, image, file, end_tick, bar.to)
+        again = rerun_job(job, end_tick, bar.to)
     found = compare(job.recorded, again.periods, job.scenario.networks[0].robots)
     figures = {
         f"plot-{robot.slot}-{channel.replace(' ', '-')}": _figure(
@@ -38,8 +37,8 @@ def port_page(job: Job, image: Image, file: str, quiet: bool) -> bytes:
         for channel in SHOWN
     }
     values = {
-        "file": Path(file).name,
-        "firmware": image.sha256 or "",
+        "file": Path(job.file).name,
+        "firmware": job.runs_on.sha256 or "",
         "scenario": job.scenario.name,
         "duration_s": seconds(end_tick),
         "found": found,

@@ -95,14 +95,14 @@ def _case():
         said = io.StringIO()
         with contextlib.redirect_stderr(said):
             try:
-                job, image = load_job(str(path), None, None)
+                job = load_job(str(path), None, None)
             except BadInput as error:
                 return refused(error)
             assert all(line.isprintable() for line in said.getvalue().splitlines())
             if sum(len(network.robot) for network in job.scenario.networks) > 10:
                 return "too many robots for here"
             try:
-                job.world(image)
+                job.world_of()
             except (BadInput, DomainError) as error:
                 return refused(error)
         return f"taken, {min(len(job.script), 3)} in the script, case {bool(job.case.verdict)}"
