@@ -18,7 +18,7 @@ from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
-from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run
+from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run, which_robot
 from mirotwin.replay.firmwares import LinesFrom, debugged_image, load_images
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
@@ -97,6 +97,8 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
     session = Session(Debugger(timeline, symbols, everyone), [], "begin")
     if not image.symbols.names:
         session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
+    elif not symbols.has_sources():
+        session.said.append("no C files: --sources names their folder")
     if judge is not None:
         session.why = "case"
         verdict, failure = judge(timeline)
@@ -104,8 +106,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
         if failure is not None:
             _stand_at(timeline, failure, options.slot)
     if options.at is not None:
-        session.why = "goto"
-        timeline.go_to(options.at.ticks(run.tick_hz))
+        session.why = session.debugger.go_to(options.at.ticks(run.tick_hz))
     return session
 
 
@@ -127,11 +128,8 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | N
     job = load_job(path, options.firmware, options.engine, options.settings)
     if not job.case.verdict:
         return None, None
-    run = RobotRun(job.world_of(), options.network or 0)
-    if options.slot is not None:
-        slots = [robot.slot for robot in run.world.networks[run.network].robots]
-        run = RobotRun(run.world, run.network, slots.index(options.slot))
-    return run, partial(_judge, job)
+    world = job.world_of()
+    return RobotRun(world, *which_robot(world, options)), partial(_judge, job)
 
 
 def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:

@@ -83,9 +83,9 @@ class Symbols:
         own = [(place, address) for address, place in self.debug.lines if _name(place.file) == _name(file)]
         what = f"{_name(file)}:{line}"
         if not own:
-            files = sorted({_name(place.file) for place in self.line_begins.values()})
-            known = ", ".join(files) or "none: the image has no debug files, give an address"
-            raise BadInput("", what, "no code is of this file", f"the files are {known}")
+            files = ", ".join(sorted({_name(place.file) for place in self.line_begins.values()}))
+            remedy = f"the files are {files}" if files else "give an address: the image has no debug files"
+            raise BadInput("", what, "no code is of this file", remedy)
         place = min((place for place, _ in own if place.line >= line), default=None, key=lambda one: one.line)
         if place is None:
             last = max(place.line for place, _ in own)
@@ -100,6 +100,11 @@ class Symbols:
             return self.at_line(file, int(line))
         address = address_of(text, self.image, str(self.image.path), "")
         return [address], self.line(address)
+
+    def has_sources(self) -> bool:
+        """Whether the C files of its lines, if there are any, are there."""
+        files = {line.file for line in self.line_begins.values()}
+        return not files or any(self.sources.path(file) for file in files)
 
     # Names
 

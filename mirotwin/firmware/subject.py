@@ -167,12 +167,12 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         periods = job.recorded[-1].index + 1 if job.recorded else None
         with plain_parameters(subject):
             world = job.world_of()
-    network, index = _which_robot(world, options)
+    network, index = which_robot(world, options)
     return RobotRun(world, network, index, periods)
 
 
-def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
-    """(network, place among its robots) of the robot that was asked for."""
+def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
+    """(network, place among its robots) of the robot that was asked for. Raises BadInput."""
     network = options.network or 0
     if network >= len(world.networks):
         raise BadInput(
