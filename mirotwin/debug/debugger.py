@@ -10,6 +10,8 @@ import bisect
 from collections.abc import Callable, Collection
 from typing import Literal, NamedTuple
 
+import msgspec
+
 from miro_exact.bad_input import BadInput
 from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.frames import StackFrame
@@ -32,21 +34,22 @@ _COUNTS: dict[str, Callable[[int, int], bool]] = {
 }  # fmt: skip
 
 
-class Breakpoint:
+class Breakpoint(msgspec.Struct, eq=False):
     """Stops, or with `log` tells something, before an instruction at one of `addresses`: where `condition` is true,
     `written` is written, and `count` fits how often that was so since the run began.
+
+    `hits`: (cycle, processor) of those that are counted, up to `counted_to`.
     """
 
-    def __init__(self, number: int, text: str, addresses: Collection[int]) -> None:
-        self.number = number
-        self.text = text
-        self.addresses = frozenset(addresses)
-        self.condition: Term | None = None
-        self.written: Bytes | None = None
-        self.count: Callable[[int], bool] | None = None
-        self.log: Callable[[Moment], str] | None = None
-        self.hits: list[tuple[int, int]] = []  # (cycle, processor), up to `counted_to`
-        self.counted_to = 0
+    number: int
+    text: str
+    addresses: Collection[int]
+    condition: Term | None = None
+    count: Callable[[int], bool] | None = None
+    written: Bytes | None = None
+    log: Callable[[Moment], str] | None = None
+    hits: list[tuple[int, int]] = []
+    counted_to: int = 0
 
 
 class Said(NamedTuple):
@@ -98,9 +101,10 @@ class Debugger:
     def add(self, text: str, addresses: Collection[int], condition: str = "", count: str = "") -> Breakpoint:
         """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is not one."""
         self._numbers += 1
-        found = Breakpoint(self._numbers, text, addresses)
-        found.condition = expression(condition) if condition else None
-        found.count = _counting(count) if count else None
+        term = expression(condition) if condition else None
+        found = Breakpoint(
+            self._numbers, text, frozenset(addresses), term, _counting(count) if count else None
+        )
         self.breakpoints.append(found)
         return found
 

@@ -123,7 +123,7 @@ def _element(value: Value, index: int) -> Value:
     return msgspec.structs.replace(value, kind=kind.element, address=address, number=part)
 
 
-def _pointed(value: Value, scope: Scope, index: int = 0) -> Value:
+def _pointed(value: Value, scope: Scope, index: int) -> Value:
     """What a pointer points to, or so many elements after it; of an array its element."""
     kind = value.kind
     if kind is None or kind.kind != "pointer":
@@ -199,15 +199,6 @@ def _address(value: Value) -> Value:
     return Value(number=value.address, note=f"in {value.space}")
 
 
-def _member_or_bit(value: Value, name: str, scope: Scope) -> Value:
-    if not name.isdecimal():
-        return _member(value, name)
-    bits = number(value, scope)
-    if not isinstance(bits, int) or int(name) > 31:
-        raise NoValue(f"has no bit {name}")
-    return Value(number=bits >> int(name) & 1)
-
-
 class _Reader:
     """Reads one expression, token by token."""
 
@@ -252,7 +243,7 @@ class _Reader:
         self.take()
         term = self.unary()
         if sign == "*":
-            return lambda scope: _pointed(term(scope), scope)
+            return _indexed(term, lambda scope: Value(number=0))
         if sign == "&":
             return lambda scope: _address(term(scope))
         return _applied(_SIGNS[sign], sign, term)
@@ -264,7 +255,8 @@ class _Reader:
                 term = _indexed(term, self.binary(0))
                 self.expect("]")
             else:
-                term = _member_of(term, self.take(), how == "->")
+                target = _indexed(term, lambda scope: Value(number=0)) if how == "->" else term
+                term = _member_of(target, self.take())
         return term
 
     def primary(self) -> Term:
@@ -273,32 +265,32 @@ class _Reader:
             term = self.binary(0)
             self.expect(")")
             return term
-        with suppress(ValueError):
-            return _constant(int(token, 16 if token[:2].lower() == "0x" else 10))
-        if len(token) > 2 and token[0] == "'":
-            return _constant(_ESCAPES.get(token[2], ord(token[2])) if token[1] == "\\" else ord(token[1]))
         module, _, name = token.rpartition(":")
-        if not name.isidentifier():
+        if name.isidentifier():
+            return lambda scope: scope.find(name, module)
+        constant = Value(number=_constant(token))
+        if constant.number is None:
             raise self.refused(f"lacks a name or a number{f' before {token}' if token else ''}")
-        return lambda scope: scope.find(name, module)
+        return lambda scope: constant
 
 
-def _constant(found: int) -> Term:
-    return lambda scope: Value(number=found)
+def _constant(token: str) -> int | None:
+    """Of digits or a character."""
+    if len(token) > 2 and token[0] == "'":
+        return _ESCAPES.get(token[2], ord(token[2])) if token[1] == "\\" else ord(token[1])
+    with suppress(ValueError):
+        return int(token, 16 if token[:2].lower() == "0x" else 10)
+    return None
 
 
 def _indexed(term: Term, index: Term) -> Term:
     return lambda scope: _pointed(term(scope), scope, number(index(scope), scope))
 
 
-def _member_of(term: Term, name: str, through: bool) -> Term:
-    def found(scope: Scope) -> Value:
-        value = term(scope)
-        return _member_or_bit(_pointed(value, scope) if through else value, name, scope)
-
-    return found
-
-
-def memory(space: str, size: int) -> Value:
-    """A whole memory, as an array of bytes."""
-    return Value(CType("array", size, element=CType("int", 1), count=size), space)
+def _member_of(term: Term, name: str) -> Term:
+    """A member, or by a number a bit."""
+    if not name.isdecimal():
+        return lambda scope: _member(term(scope), name)
+    if int(name) > 31:
+        raise NoValue(f"has no bit {name}")
+    return _applied(lambda bits: bits >> int(name) & 1, f".{name}", term)

@@ -22,7 +22,7 @@ from miro_robot.inspect.values import bytes_at
 from miro_robot.inspect.writes import instructions_of
 from miro_robot.lm629.chip import Lm629
 from miro_robot.mcs51.names import BITS, SFRS
-from mirotwin.debug.expression import NoValue, Value, memory
+from mirotwin.debug.expression import NoValue, Value
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
@@ -219,7 +219,7 @@ class Moment:
         if name in BITS:
             return Value(_BIT, "bit", BITS[name])
         if name in SIZES and (name != "xram" or board is None):
-            return memory(name, SIZES[name])
+            return Value(CType("array", SIZES[name], element=_BYTE, count=SIZES[name]), name)
         if name == "pins":
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
         if name == "lm629" and board is not None:
