@@ -47,16 +47,9 @@ def python(example):
     names = example.namespace
     if TEST.search(source):
         Path("test_block.py").write_text(names["__given__"] + source, "utf-8")
-        command = [
-            *names["__shell__"].python,
-            "-m",
-            "pytest",
-            "-q",
-            "-p",
-            "no:cacheprovider",
-            "test_block.py",
-        ]
-        done = children.run(command, capture_output=True, text=True)
+        shell = names["__shell__"]
+        command = [*shell.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_block.py"]
+        done = children.run(command, env=shell.environment, capture_output=True, text=True)
         return done.stdout + done.stderr if done.returncode else None
     exec(compile("\n" * example.parsed.line + source, example.path, "exec"), names)
     return None
