@@ -410,18 +410,25 @@ class PortWaits:
 
 def _opened(url: str) -> Any:
     more: dict[str, Any] = {"write_timeout": BLOCKED_S}
+    address = url
     if "://" not in url:
         more["exclusive"] = True
     elif url.lower().startswith("rfc2217:"):
         more["write_timeout"] = None  # the only one that pyserial has there
+        address += (
+            f"{'&' if '?' in url else '?'}ign_set_control"  # ser2net says nothing of a DTR that is not there
+        )
+    realtime_priority()  # of the thread, too, that reads for `rfc2217://`
     try:
-        return serial.serial_for_url(url, BAUD, timeout=0, **more)
+        return serial.serial_for_url(address, BAUD, timeout=0, **more)
     except (serial.SerialException, OSError, ValueError) as error:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":
             number = errno.EBUSY
         what, remedy = _REMEDIES.get(number or 0, (f"cannot be opened: {error}", ""))
         raise PortError(url, "", what, remedy) from None
+    finally:
+        realtime_priority(False)
 
 
 def realtime_priority(wanted: bool = True) -> bool:

@@ -81,10 +81,10 @@ def socat(session, folder):
 
 
 @contextmanager
-def ser2net(session, folder):
+def ser2net(session, folder, accepter="tcp", scheme="socket"):
     number = free_port()
     (folder / "ser2net.yaml").write_text(
-        f"connection: &robot\n  accepter: tcp,127.0.0.1,{number}\n"
+        f"connection: &robot\n  accepter: {accepter},127.0.0.1,{number}\n"
         f"  connector: serialdev,{session.ports['pty'][0]},9600n81,local\n"
     )
     command = (shutil.which("ser2net", path="/usr/sbin:/usr/bin"), "-n", "-c", str(folder / "ser2net.yaml"))
@@ -97,7 +97,16 @@ def ser2net(session, folder):
 
         waited(listens)
         time.sleep(0.5)  # until the look above has let go of the port
-        yield f"socket://127.0.0.1:{number}"
+        yield f"{scheme}://127.0.0.1:{number}"
+
+
+def ser2net_by_rfc2217(session, folder):
+    return ser2net(session, folder, "telnet(rfc2217),tcp", "rfc2217")
+
+
+needs_ser2net = pytest.mark.skipif(
+    not shutil.which("ser2net", path="/usr/sbin:/usr/bin"), reason="needs ser2net"
+)
 
 
 @contextmanager
@@ -142,12 +151,8 @@ def carry(listening, number, keeps_s):
     [
         directly,
         pytest.param(socat, marks=pytest.mark.skipif(not shutil.which("socat"), reason="needs socat")),
-        pytest.param(
-            ser2net,
-            marks=pytest.mark.skipif(
-                not shutil.which("ser2net", path="/usr/sbin:/usr/bin"), reason="needs ser2net"
-            ),
-        ),
+        pytest.param(ser2net, marks=needs_ser2net),
+        pytest.param(ser2net_by_rfc2217, marks=needs_ser2net),
         rfc2217_server,
         *(pytest.param(adapter(ms / 1000), id=f"{ms} ms") for ms in (1, 4, 16)),
     ],
