@@ -350,7 +350,8 @@ class RobotPort:
             seconds = self._now / TICKS_PER_SECOND
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
-            raise PortError(self.url, f"{seconds:.3f} s", f"the port is lost: {error}") from None
+            what, remedy = f"the port is lost: {error}", "robots that hear nothing stop after 110 ms"
+            raise PortError(self.url, f"{seconds:.3f} s", what, remedy) from None
 
     # ---- a recording like any other ----------------------------------------------------------------------
 
@@ -425,7 +426,9 @@ def _opened(url: str) -> Any:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":
             number = errno.EBUSY
-        what, remedy = _REMEDIES.get(number or 0, (f"cannot be opened: {error}", ""))
+        why = f"{error}".rpartition(f"{address}: ")[2]
+        unknown = f"cannot be opened: {why}", "is its address right, and does anybody serve it?"
+        what, remedy = _REMEDIES.get(number or 0, unknown)
         raise PortError(url, "", what, remedy) from None
     finally:
         realtime_priority(False)

@@ -20,14 +20,14 @@ from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
 from miro_sim.scenario.keys import Scenario
-from mirotwin.desk.compare import PortComparison, compare
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort, realtime_priority
 from mirotwin.ports.serve_command import live_settings
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json
-from mirotwin.rerun.job import Job, rerun_job
+from mirotwin.report.page.port_page import beside_twin
+from mirotwin.rerun.job import Job
 from mirotwin.rerun.script import sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.outputs import RECORDING, OutputFolder
@@ -58,12 +58,12 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     numbers = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
     with ExitStack() as files:
         files.enter_context(folder)
-        folder.keep = (RECORDING,)
         stream = _WrittenApart(files.enter_context(folder.part(RECORDING).open("wb")))
         files.callback(stream.close)
         recorder = files.enter_context(Recorder(stream, source))
         with RobotPort(desk, job.scenario, job.file, recorder) as port:
             port.greet(next_seq=next(numbers, 0))
+            folder.keep = (RECORDING,)  # of a talk that was broken off
             shortest, longest = (ticks / TICKS_PER_MS for ticks in port.delay_ticks)
             slots = f"{', '.join(map(str, port.slots))} of {robots}"
             complain(
@@ -157,7 +157,7 @@ def twin_source(scenario: Scenario, seed: int, image: Image, firmware: bytes = b
 
 def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool, as_json: bool) -> int:
     """Runs the twin with what was sent at the port, and compares its answers; the exit code."""
-    comparison = compared(job, rule, quiet or as_json)
+    comparison = beside_twin(job, quiet or as_json, rule)
     found = comparison.differences
     code = DIVERGENCE if found else DONE
     if as_json:
@@ -178,11 +178,3 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
         unsure_ms = max((one.unsure_ticks for one in comparison.robots), default=0) / TICKS_PER_MS
         show(f"the robot answers as its twin does, {count} times; times are known to {unsure_ms:.1f} ms")
     return code
-
-
-def compared(job: Job, rule: CompareRule, quiet: bool) -> PortComparison:
-    """The recorded answers beside those of the twin."""
-    end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
-    with ProgressBar("running the twin", end_tick, quiet) as bar:
-        again = rerun_job(job, end_tick, bar.to)
-    return compare(job.recorded, again.periods, job.scenario.networks[0].robots, rule)

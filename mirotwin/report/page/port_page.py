@@ -11,7 +11,8 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_protocol.table import TICKS_PER_MS
-from mirotwin.desk.compare import FIELDS, RobotBesideTwin, TimedAnswer, compare
+from mirotwin.desk.compare import ANSWERS, FIELDS, PortComparison, RobotBesideTwin, TimedAnswer, compare
+from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.document import render
 from mirotwin.rerun.job import Job, rerun_job
@@ -23,15 +24,21 @@ SHOWN = {"left moved": "counts", "right moved": "counts", "flags": "", "accepted
 """Channels that are drawn, and their units: flags as they are, others from the first answer on."""
 
 
-def port_page(job: Job, quiet: bool) -> bytes:
-    """The page of a recording made at a port. Raises BadInput where Bokeh is not installed."""
+def beside_twin(job: Job, quiet: bool, rule: CompareRule = ANSWERS) -> PortComparison:
+    """Runs the twin with what was sent at the port; the recorded answers beside its own."""
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     with ProgressBar("running the twin", end_tick, quiet) as bar:
         again = rerun_job(job, end_tick, bar.to)
-    found = compare(job.recorded, again.periods, job.scenario.networks[0].robots)
+    return compare(job.recorded, again.periods, job.scenario.networks[0].robots, rule)
+
+
+def port_page(job: Job, quiet: bool) -> bytes:
+    """The page of a recording made at a port. Raises BadInput where Bokeh is not installed."""
+    end_s = seconds(len(job.recorded) * CONTROL_PERIOD_TICKS)
+    found = beside_twin(job, quiet)
     figures = {
         f"plot-{robot.slot}-{channel.replace(' ', '-')}": _figure(
-            robot, channel, seconds(end_tick), _marks(found.differences, robot.slot, channel)
+            robot, channel, end_s, _marks(found.differences, robot.slot, channel)
         )
         for robot in found.robots
         for channel in SHOWN
@@ -40,7 +47,7 @@ def port_page(job: Job, quiet: bool) -> bytes:
         "file": Path(job.file).name,
         "firmware": job.runs_on.sha256 or "",
         "scenario": job.scenario.name,
-        "duration_s": seconds(end_tick),
+        "duration_s": end_s,
         "found": found,
         "shown": SHOWN,
         "unsure_ms": max((robot.unsure_ticks for robot in found.robots), default=0) / TICKS_PER_MS,
