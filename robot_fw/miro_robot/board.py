@@ -212,8 +212,10 @@ class Board(Bus):
                 return stopped
 
     def _next_interrupt(self, chip: Lm629) -> int:
-        """The next tick at which the chip may raise HI by itself: a sample, or the end of its reset."""
-        return chip.next_tick if chip.sample_tick == _NEVER else chip.sample_tick
+        """The next tick at which the chip may raise HI by itself: an unmasked sample, or the end of reset."""
+        if chip.sample_tick == _NEVER:
+            return chip.next_tick
+        return chip.sample_tick if chip.signals.mask else _NEVER
 
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
@@ -438,8 +440,6 @@ class Board(Bus):
             self.left.set_reset(tick, left >> 4)
         if right >> 4 != self.right.reset_level:
             self.right.set_reset(tick, right >> 4)
-        if self._next_interrupt(self.left) < self.horizon or self._next_interrupt(self.right) < self.horizon:
-            self.cpu.replan()  # a reset has begun to end
         if at_left or self.left.next_tick <= tick:
             self.left.set_bus(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
         else:
@@ -448,6 +448,8 @@ class Board(Bus):
             self.right.set_bus(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
         else:
             self.right.port.ps, self.right.port.data = right >> 3 & 1, data
+        if self._next_interrupt(self.left) < self.horizon or self._next_interrupt(self.right) < self.horizon:
+            self.cpu.replan()  # a reset has begun to end, or a mask has gone
         levels = self.left.port.drive if self.left.port.reading else 0xFF
         if self.right.port.reading:
             levels &= self.right.port.drive

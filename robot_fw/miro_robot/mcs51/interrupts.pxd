@@ -9,17 +9,19 @@ cdef class Interrupts:
     cdef public int in_service
     cdef long long since[6]
     cdef long long until[6]
+    cdef int asked
 
     @cython.locals(source=int)
     cpdef void clear(self) noexcept
     cpdef void ask(self, int source, long long cycle) noexcept
     cpdef void withdraw(self, int source, long long cycle) noexcept
-    @cython.locals(source=int, chosen=int, latched='long long')
+    @cython.locals(enabled=int, source=int, chosen=int, latched='long long')
     cpdef int choose(self, long long boundary) noexcept
-    @cython.locals(source=int, earliest='long long', boundary='long long')
+    @cython.locals(enabled=int, source=int, earliest='long long', boundary='long long')
     cpdef long long next_boundary(self, long long now) noexcept
     cpdef void enter(self, int source) noexcept
     cpdef void leave(self) noexcept
+    cpdef int after_load(self) except -1
 
 @cython.final
 cdef class ExternalInterrupts:

@@ -34,6 +34,7 @@ class Interrupts:
         "since": ("6q", -2, NEVER_TICK),  # a flag of timer 2 is seen a cycle early
         "until": ("6q", -2, NEVER_TICK),
     }
+    NOT_STATE = ("asked",)
 
     def __init__(self) -> None:
         self.ie = 0
@@ -41,6 +42,7 @@ class Interrupts:
         self.in_service = 0  # bit 0 a low-priority, bit 1 a high-priority routine
         self.since = [0] * 6
         self.until = [0] * 6
+        self.asked = 0  # bit per source: its window has not passed yet, or is not known to have
 
     def clear(self) -> None:
         """As after reset."""
@@ -56,6 +58,7 @@ class Interrupts:
         if self.until[source] != _NEVER:
             self.since[source] = cycle
             self.until[source] = _NEVER
+            self.asked |= 1 << source
 
     def withdraw(self, source: int, cycle: int) -> None:
         """The source's flag is no longer seen at S5P2 of `cycle`."""
@@ -64,12 +67,13 @@ class Interrupts:
 
     def choose(self, boundary: int) -> int:
         """The source whose LCALL begins in cycle `boundary`, or -1."""
-        if not self.ie & 0x80 or self.in_service & 2:
+        enabled = self.ie & self.asked
+        if not enabled or not self.ie & 0x80 or self.in_service & 2:
             return -1
         latched = boundary - 2
         chosen = -1
         for source in range(6):
-            if (self.ie >> source) & 1 and self.since[source] <= latched < self.until[source]:
+            if (enabled >> source) & 1 and self.since[source] <= latched < self.until[source]:
                 if (self.ip >> source) & 1:
                     return source  # the first of the high level wins over every low one
                 if chosen < 0 and not self.in_service:
@@ -78,11 +82,16 @@ class Interrupts:
 
     def next_boundary(self, now: int) -> int:
         """The first cycle >= `now` in which `choose` may find something among the flags known, or NEVER_TICK."""
-        if not self.ie & 0x80 or self.in_service & 2:
+        enabled = self.ie & self.asked
+        if not enabled or not self.ie & 0x80 or self.in_service & 2:
             return _NEVER
         earliest = _NEVER
         for source in range(6):
-            if (self.ie >> source) & 1 and (not self.in_service or (self.ip >> source) & 1):
+            if not (enabled >> source) & 1:
+                continue
+            if self.until[source] <= now - 2:
+                self.asked &= ~(1 << source)
+            elif not self.in_service or (self.ip >> source) & 1:
                 boundary = max(self.since[source] + 2, now)
                 if boundary - 2 < self.until[source] and boundary < earliest:
                     earliest = boundary
@@ -91,6 +100,9 @@ class Interrupts:
     def enter(self, source: int) -> None:
         """Its routine is called."""
         self.in_service |= 1 + ((self.ip >> source) & 1)
+
+    def after_load(self) -> None:
+        self.asked = 0x3F
 
     def leave(self) -> None:
         """RETI: the highest routine in service is over."""

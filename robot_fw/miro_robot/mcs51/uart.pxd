@@ -63,7 +63,7 @@ cdef class Uart:
     cdef void _receive(self, long long tick) noexcept
     @cython.locals(now='long long', enabled=int, level=int, change='long long')
     cdef void _search(self, long long tick) noexcept
-    @cython.locals(state=int, idle='long long', now='long long')
+    @cython.locals(period='long long', level=int, edge='long long', state=int, idle='long long', now='long long')
     cdef void _bit(self, long long tick) noexcept
     @cython.locals(number=int, bit=int)
     cdef void _act(self, long long now) noexcept

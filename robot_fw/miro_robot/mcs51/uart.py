@@ -269,33 +269,35 @@ class Uart:
 
     def _bit(self, tick: int) -> None:
         """16x ticks of one bit below `tick`: only counter states 7 to 10 do anything."""
+        period = self.rx_period
+        level = 0
+        edge = 0  # the level holds until then
         while self.rx_next < tick and self.rx_count:
             state = self.rx_count & _COUNTER_BITS
-            idle = (_VOTE_FIRST - state) & _COUNTER_BITS if state < _VOTE_FIRST or state > _ACTION else 0
-            if idle:
-                if self.rx_next + (idle - 1) * self.rx_period >= tick:
-                    idle = (tick - 1 - self.rx_next) // self.rx_period + 1
-                self.rx_count += idle
-                self.rx_next += idle * self.rx_period
-                if self.rx_next >= tick:  # else what comes next looks again
-                    self.rx_last = self.level(self.rx_next - self.rx_period)
-                continue
             now = self.rx_next
-            self.rx_next = now + self.rx_period
-            self.rx_last = self.level(now)
-            if (  # no edge within the three votes: all at once
-                state == _VOTE_FIRST
-                and now + 3 * self.rx_period < tick
-                and (not self.latch & 1 or self.rxd.next_edge(now) > now + 3 * self.rx_period)
-            ):
-                self.rx_votes += 3 * self.rx_last
-                self.rx_count += 4
-                self.rx_next = now + 4 * self.rx_period
-                self._act(now + 3 * self.rx_period)
+            if state < _VOTE_FIRST or state > _ACTION:
+                idle = (_VOTE_FIRST - state) & _COUNTER_BITS
+                if now + (idle - 1) * period >= tick:
+                    idle = (tick - 1 - now) // period + 1
+                self.rx_count += idle
+                self.rx_next = now + idle * period
+                if self.rx_next >= tick:  # else what comes next looks again
+                    self.rx_last = self.level(self.rx_next - period)
                 continue
+            if now >= edge:
+                level = self.level(now)
+                edge = self.rxd.next_edge(now) if self.latch & 1 else _NEVER
+            self.rx_last = level
+            if state == _VOTE_FIRST and now + 3 * period < tick and edge > now + 3 * period:
+                self.rx_votes += 3 * level  # no edge within the three votes: all at once
+                self.rx_count += 4
+                self.rx_next = now + 4 * period
+                self._act(now + 3 * period)
+                continue
+            self.rx_next = now + period
             self.rx_count += 1
             if state < _ACTION:
-                self.rx_votes += self.rx_last
+                self.rx_votes += level
             else:
                 self._act(now)
 

@@ -12,9 +12,10 @@ from miro_robot.probe import Probe
 from miro_robot.wiring import load_wiring
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Bridge, Chassis, DriveParams, OpticalEncoder
-from tests.robot.board.rig import board_with
+from tests.robot.board.rig import RESET, START, board_with
 from tests.robot.firmware.rig import IMAGE, MS, Rig
 
+MSKI, RSTI, LTRJ, STT = 0x1C, 0x1D, 0x1F, 0x01
 DRIVES = st.builds(
     lambda on_us, off_us, index, stiction: DriveParams(
         bridge=Bridge(on_delay_s=on_us * 1e-6, off_delay_s=off_us * 1e-6),
@@ -92,4 +93,26 @@ def test_a_run_that_is_cut_from_power_up_on_ends_as_in_one_piece(cuts):
     for cut in sorted(cuts):
         pieces.run(cut)
     whole.run(max(cuts))
+    assert snapshot(pieces) == snapshot(whole)
+
+
+def tell_left(opcode, *words):
+    """Lines that write a command and its data words to the left LM629, each byte after its busy time."""
+    data = [byte for word in words for byte in word.to_bytes(2, "big")]
+    lines = []
+    for ps, byte in [(0, opcode), *((1, byte) for byte in data)]:
+        moves = [f"MOV P0,#{byte}", *(f"MOV P2,#{levels | ps}" for levels in (0x36, 0x32, 0x36))]
+        lines += [*moves, "MOV R7,#60", "DJNZ R7,$"]
+    return lines
+
+
+def test_hi_that_is_unmasked_in_a_run_comes_at_its_sample():
+    masked = [*tell_left(MSKI, 0), *tell_left(RSTI, 0), "MOV R6,#10", "pause:", "DJNZ R7,$", "DJNZ R6,pause"]
+    motor_off = [*tell_left(MSKI, 0x04), *tell_left(LTRJ, 0x0100), *tell_left(STT)]
+    hear = ["hear:", "INC R3", "JB P3.2,hear", "SJMP $"]
+    whole, pieces = (board_with("\n".join([START + RESET, *masked, *motor_off, *hear])) for _ in range(2))
+    whole.run(10 * MS)
+    for tick in range(0, 10 * MS + 1, 100):
+        pieces.run(tick)
+    assert whole.left.hi == 1
     assert snapshot(pieces) == snapshot(whole)
