@@ -1,4 +1,5 @@
 cimport cython
+from libc cimport math
 from miro_exact cimport dmath
 
 cdef int _STEPS
@@ -10,7 +11,7 @@ cdef class Lens:
     cdef readonly double x_m, y_m, height_m, focal_u, focal_v, centre_u, centre_v, k1
     cdef readonly double xa, xb, xc, ya, yb, yc, za, zb, zc, out_x, out_y
 
-    @cython.locals(right=double, up=double, drawn=double, radius=double, square=double, growth=double, fall=double)
+    @cython.locals(right=double, up=double, drawn=double, radius=double, nearer=double, square=double, growth=double, fall=double)
     cpdef slopes(self, double u, double v)
     @cython.locals(fall_m=double)
     cpdef (double, double) ground(self, double u, double v, double z_m)

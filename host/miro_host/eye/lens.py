@@ -63,7 +63,10 @@ class Lens:
                 growth = 1.0 + 3.0 * square
                 if growth < 0.1:
                     raise ValueError(f"pixel ({u:.1f}, {v:.1f}) lies beyond what the lens draws")
-                radius -= (radius * (1.0 + square) - drawn) / growth
+                nearer = radius - (radius * (1.0 + square) - drawn) / growth
+                if nearer == radius:
+                    break  # and so would all steps that are left
+                radius = nearer
             right *= radius / drawn
             up *= radius / drawn
         fall = self.zc - self.za * right - self.zb * up
