@@ -25,7 +25,7 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
 from miro_sim.pitch.paints import NUMBERS
 from miro_sim.pitch.picture_settings import PictureSettings
-from miro_sim.pitch.rays import Rays, rays_of
+from miro_sim.pitch.rays import Rays, between, rays_of
 from miro_sim.pitch.scene import Scene, scene_of
 from miro_sim.pitch.sensor import Sensor
 
@@ -42,13 +42,9 @@ _MOST_MARGIN_UM = 12_500
 _OUT = -1
 _UNSURE = -2
 _MIXED = 255
-_UNKNOWN = 254
 _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321
-_MIDDLE_X_UM = 550_000
-_MIDDLE_Y_UM = 350_000
-_FAR_SQUARE = 625e9  # of the corner of the pitch from its middle, in um^2
 
 
 class Camera:
@@ -59,44 +55,11 @@ class Camera:
     """
 
     NOT_STATE = (
-        *(
-            "parameters",
-            "settings",
-            "pattern",
-            "rays",
-            "scene",
-            "sensor",
-            "width",
-            "height",
-            "falloff",
-            "sets",
-            "field_sets",
-        ),
-        *(
-            "side",
-            "black",
-            "team_u",
-            "team_v",
-            "identity_u",
-            "identity_v",
-            "patch_um",
-            "robots",
-            "team_paint",
-        ),
-        *("identity_paint", "x", "y", "cos", "sin", "near", "near_count", "code", "seen", "height_um"),
-        *(
-            "least_x",
-            "most_x",
-            "least_y",
-            "most_y",
-            "margin_um",
-            "count",
-            "corner_u",
-            "corner_v",
-            "fall_u",
-            "fall_v",
-            "seer",
-        ),
+        *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
+        *("field_sets", "side", "black", "team_u", "team_v", "identity_u", "identity_v", "patch_um"),
+        *("robots", "team_paint", "identity_paint", "x", "y", "cos", "sin", "near", "near_count"),
+        *("moving", "code", "seen", "height_um", "least_x", "most_x", "least_y", "most_y", "margin_um"),
+        *("still", "count", "corner_u", "corner_v", "top_x", "top_y", "cornered", "fall_u", "fall_v", "seer"),
     )
 
     def __init__(
@@ -108,9 +71,8 @@ class Camera:
         self.width = WIDTH
         self.height = HEIGHT
         self.rays: Rays = rays_of(parameters)
-        self.scene: Scene = scene_of(parameters, settings.black_floor, None)
+        self.scene: Scene = scene_of(parameters, settings, None)
         self.sensor = Sensor(settings, stream)
-        self.falloff = math.floor(settings.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
         self.field_sets = settings.sub_exposures
         self.sets = settings.sub_exposures * settings.fields
         self.side = NUMBERS["side"]
@@ -133,10 +95,15 @@ class Camera:
         self.least_y = [0] * 10
         self.most_y = [0] * 10
         self.margin_um = [0] * 10
+        self.still = [0] * 10
+        self.moving = False
         self.seen = [0] * 16
         self.height_um = [0] * 16
         self.corner_u = [0] * 40
         self.corner_v = [0] * 40
+        self.top_x = [0] * 4
+        self.top_y = [0] * 4
+        self.cornered = -1
         self.fall_u = [0] * 10
         self.fall_v = [0] * 10
         self.seer = [0] * 10
@@ -148,7 +115,7 @@ class Camera:
     def clear(self) -> None:
         """Takes all robots and the ball off the pitch."""
         self.clear_robots()
-        self.scene = scene_of(self.parameters, self.settings.black_floor, None)
+        self.scene = scene_of(self.parameters, self.settings, None)
 
     def clear_robots(self) -> None:
         """Takes all robots off the pitch; the ball stays."""
@@ -156,7 +123,7 @@ class Camera:
 
     def ball(self, x_m: float, y_m: float) -> None:
         """Puts the ball on the floor, its centre above this place."""
-        self.scene = scene_of(self.parameters, self.settings.black_floor, (_um(x_m), _um(y_m)))
+        self.scene = scene_of(self.parameters, self.settings, (_um(x_m), _um(y_m)))
 
     def robot(
         self,
@@ -195,27 +162,25 @@ class Camera:
         self.robots = body + 1
 
     def _bound(self, body: int) -> None:
-        """The least and the largest place of a robot over all instants, and what margin does for all of them.
+        """Between which places a pixel's middle may see a robot at any instant, and what margin does for all of them.
 
         A place within the square lies elsewhere in it at another instant, but by no more than the robot's way, plus
         its turn times the distance from the middle, plus 4 um for what is rounded. No margin (0) if that is too much.
         """
         first = body * _SETS
-        self.least_x[body] = self.most_x[body] = self.x[first]
-        self.least_y[body] = self.most_y[body] = self.y[first]
-        for place in range(first + 1, first + self.sets):
-            self.least_x[body] = min(self.least_x[body], self.x[place])
-            self.most_x[body] = max(self.most_x[body], self.x[place])
-            self.least_y[body] = min(self.least_y[body], self.y[place])
-            self.most_y[body] = max(self.most_y[body], self.y[place])
         middle = first + self.sets // 2
-        drift = 0
+        drift = way_x = way_y = 0
         for place in range(first, first + self.sets):
-            way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
+            x, y = abs(self.x[place] - self.x[middle]), abs(self.y[place] - self.y[middle])
             turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
-            drift = max(drift, way + (_NEAR_UM * turn >> 15))
+            drift = max(drift, x + y + (_NEAR_UM * turn >> 15))
+            way_x, way_y = max(way_x, x), max(way_y, y)
+        far = _CORNER_UM + self.rays.spread_um
+        self.least_x[body], self.most_x[body] = self.x[middle] - way_x - far, self.x[middle] + way_x + far
+        self.least_y[body], self.most_y[body] = self.y[middle] - way_y - far, self.y[middle] + way_y + far
         margin = self.rays.spread_um + drift + 4
         self.margin_um[body] = margin if margin <= _MOST_MARGIN_UM else 0
+        self.still[body] = drift == 0
 
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
@@ -236,54 +201,64 @@ class Camera:
         end = min(_WIDTH, left + width + self.sensor.side)
         self._gather(first, top, end - first, height)
         for row in range(top, top + height):
-            for column in range(first, end):
-                pixel = row * _WIDTH + column
-                self.sensor.put(column, self._total(pixel), self._light(pixel))
+            self.scene.show(self.sensor, row, first, end, self.field_sets)
+            if self.near_count:
+                self._draw_robots(row, first, end)
             self.sensor.write(row, left, width, out, 3 * width * (row - top))
-
-    def _light(self, pixel: int) -> int:
-        """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
-        x = self.rays.middle_x[pixel] - _MIDDLE_X_UM
-        y = self.rays.middle_y[pixel] - _MIDDLE_Y_UM
-        lost = (x * x + y * y >> 20) * self.falloff >> 32
-        return 4096 - lost if lost < 4096 else 0
 
     def _gather(self, left: int, top: int, width: int, height: int) -> None:
         """Which bodies may be seen in the window: neighbouring pixels are no further apart than two spreads."""
         pixel = (top + height // 2) * _WIDTH + left + width // 2
         reach = (width // 2 + height // 2 + 3) * 2 * self.rays.spread_um + self.rays.longest_fall_um
         self.near_count = 0
+        self.moving = False
         x = self.rays.middle_x[pixel]
         y = self.rays.middle_y[pixel]
-        far = reach + _CORNER_UM
         for body in range(self.robots):
-            if self.least_x[body] - far <= x <= self.most_x[body] + far:
-                if self.least_y[body] - far <= y <= self.most_y[body] + far:
+            if self.least_x[body] - reach <= x <= self.most_x[body] + reach:
+                if self.least_y[body] - reach <= y <= self.most_y[body] + reach:
                     self.near[self.near_count] = body
                     self.near_count += 1
+                    self.moving = self.moving or not self.still[body]
 
-    def _total(self, pixel: int) -> int:
-        """The paints of all samples of a pixel, added."""
-        scene = self.scene
-        if scene.paint[pixel] == _UNKNOWN:
-            scene.look(pixel)
+    def _draw_robots(self, row: int, first: int, end: int) -> None:
+        """Those pixels of a line in which a robot is seen."""
+        middle_x, middle_y = self.rays.middle_x, self.rays.middle_y
+        fall_x, fall_y = self.rays.fall_x, self.rays.fall_y
+        for column in range(first, end):
+            pixel = row * _WIDTH + column
+            x, y = middle_x[pixel], middle_y[pixel]
+            end_x, end_y = x + fall_x[pixel], y + fall_y[pixel]
+            for index in range(self.near_count):
+                if self._passes(self.near[index], x, y, end_x, end_y):
+                    total = self._total(pixel, x, y, end_x, end_y)
+                    if total >= 0:
+                        self.sensor.put(column, total, self.scene.light(pixel))
+                    break
+
+    def _total(self, pixel: int, x: int, y: int, end_x: int, end_y: int) -> int:
+        """The paints of all samples of a pixel, added; -1 if none is a robot's."""
         seen = False
         for index in range(self.near_count):
             body = self.near[index]
             common = _OUT
-            if self._passes(pixel, body):
+            if self._passes(body, x, y, end_x, end_y):
                 margin = self.margin_um[body]
                 common = self._code(body, self.sets // 2, pixel, margin) if margin else _UNSURE
             for at in range(self.sets):
-                code = common if common != _UNSURE else self._code(body, at, pixel, self.rays.spread_um)
+                code = common
+                if common == _UNSURE and not self.still[body]:
+                    code = self._code(body, at, pixel, self.rays.spread_um)
                 self.code[index * _SETS + at] = code
                 if code != _OUT:
                     seen = True
         if not seen:
-            return scene.total[pixel] * self.field_sets
-        total = 0
+            return -1
+        total = part = 0
         for at in range(self.sets):
-            total += self._instant(pixel, at)
+            if self.moving or at % self.field_sets == 0:
+                part = self._instant(pixel, at)
+            total += part
         return total
 
     def _instant(self, pixel: int, at: int) -> int:
@@ -302,16 +277,13 @@ class Camera:
             return self.scene.total[pixel]
         return self._samples(pixel, at)
 
-    def _passes(self, pixel: int, body: int) -> bool:
-        """Whether lines through the pixel may meet a robot at any instant, looked at along each axis alone."""
-        far = _CORNER_UM + self.rays.spread_um
-        top = self.rays.middle_x[pixel]
-        end = top + self.rays.fall_x[pixel]
-        if max(top, end) < self.least_x[body] - far or min(top, end) > self.most_x[body] + far:
+    def _passes(self, body: int, x: int, y: int, end_x: int, end_y: int) -> bool:
+        """Whether lines from (x, y) to the end may meet a robot at any instant, looked at along each axis alone."""
+        least, most = self.least_x[body], self.most_x[body]
+        if (x < least and end_x < least) or (x > most and end_x > most):
             return False
-        top = self.rays.middle_y[pixel]
-        end = top + self.rays.fall_y[pixel]
-        return max(top, end) >= self.least_y[body] - far and min(top, end) <= self.most_y[body] + far
+        least, most = self.least_y[body], self.most_y[body]
+        return not ((y < least and end_y < least) or (y > most and end_y > most))
 
     def _code(self, body: int, at: int, pixel: int, spread: int) -> int:
         """The one paint of a robot seen from a pixel's middle and `spread` around it, or _OUT, or _UNSURE."""
@@ -360,6 +332,8 @@ class Camera:
         scene = self.scene
         behind = scene.paint[pixel]
         ball_seen = scene.shows_ball(pixel)
+        if self.cornered != pixel:
+            self._find_corners(pixel)
         self.count = 0
         for index in range(self.near_count):
             if self.code[index * _SETS + at] != _OUT:
@@ -384,23 +358,29 @@ class Camera:
 
     def _turn(self, body: int, at: int, pixel: int) -> None:
         """The pixel's corners and its fall in the axes of one more robot; corners in rows: a b above, c d below."""
-        rays = self.rays
         place = body * _SETS + at
         cosine, sine = self.cos[place], self.sin[place]
-        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
         slot = self.count
         for corner in range(4):
-            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
-            x = rays.top_x[ray] - self.x[place]
-            y = rays.top_y[ray] - self.y[place]
+            x = self.top_x[corner] - self.x[place]
+            y = self.top_y[corner] - self.y[place]
             self.corner_u[4 * slot + corner] = (x * cosine + y * sine) >> 15
             self.corner_v[4 * slot + corner] = (y * cosine - x * sine) >> 15
-        x = rays.fall_x[pixel]
-        y = rays.fall_y[pixel]
+        x = self.rays.fall_x[pixel]
+        y = self.rays.fall_y[pixel]
         self.fall_u[slot] = (x * cosine + y * sine) >> 15
         self.fall_v[slot] = (y * cosine - x * sine) >> 15
         self.seer[slot] = body
         self.count = slot + 1
+
+    def _find_corners(self, pixel: int) -> None:
+        """Where the pixel's corners are at the height of the tops."""
+        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        for corner in range(4):
+            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
+            self.top_x[corner] = self.rays.top_x(ray)
+            self.top_y[corner] = self.rays.top_y(ray)
+        self.cornered = pixel
 
     def _alone(self, behind: int, first: int, end: int) -> int:
         """The samples where only one robot may be seen, before one paint: as `_see`, but nothing is compared."""
@@ -451,8 +431,13 @@ class Camera:
         for sample in range(first, end):
             if self.height_um[sample] == _TOP_UM:
                 continue
-            u = _between(self.corner_u, 4 * slot, sample)
-            v = _between(self.corner_v, 4 * slot, sample)
+            a = 4 * slot
+            u = between(
+                self.corner_u[a], self.corner_u[a + 1], self.corner_u[a + 2], self.corner_u[a + 3], sample
+            )
+            v = between(
+                self.corner_v[a], self.corner_v[a + 1], self.corner_v[a + 2], self.corner_v[a + 3], sample
+            )
             if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
                 self.seen[sample] = self._top(body, u, v)
                 self.height_um[sample] = _TOP_UM
@@ -461,15 +446,6 @@ class Camera:
                 if height > self.height_um[sample]:
                     self.seen[sample] = self.side
                     self.height_um[sample] = height
-
-
-def _between(corners: list[int], first: int, sample: int) -> int:
-    """A sample between four corners, which are at `first` in two rows."""
-    p = 2 * (sample & 3) + 1
-    q = 2 * (sample >> 2) + 1
-    left = corners[first] * (8 - q) + corners[first + 2] * q
-    right = corners[first + 1] * (8 - q) + corners[first + 3] * q
-    return (left * (8 - p) + right * p) >> 6
 
 
 def _um(metres: float) -> int:

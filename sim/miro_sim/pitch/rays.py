@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from functools import lru_cache
 
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
@@ -33,7 +34,7 @@ class Rays:
     """
 
     NOT_STATE = (
-        *("slope_x", "slope_y", "top_x", "top_y", "middle_x", "middle_y", "fall_x", "fall_y"),
+        *("slope_x", "slope_y", "middle_x", "middle_y", "fall_x", "fall_y"),
         *("x_um", "y_um", "height_um", "spread_um", "longest_fall_um"),
     )
 
@@ -43,14 +44,12 @@ class Rays:
         self.x_um = _um(parameters.x_m)
         self.y_um = _um(parameters.y_m)
         self.height_um = _um(parameters.height_m)
-        self.slope_x = [0] * 77361
-        self.slope_y = [0] * 77361
-        self.top_x = [0] * 77361
-        self.top_y = [0] * 77361
-        self.middle_x = [0] * 76800
-        self.middle_y = [0] * 76800
-        self.fall_x = [0] * 76800
-        self.fall_y = [0] * 76800
+        self.slope_x = array("i", bytes(4 * 77361))
+        self.slope_y = array("i", bytes(4 * 77361))
+        self.middle_x = array("i", bytes(4 * 76800))
+        self.middle_y = array("i", bytes(4 * 76800))
+        self.fall_x = array("i", bytes(4 * 76800))
+        self.fall_y = array("i", bytes(4 * 76800))
         self._cast(lens)
         self._gather()
         self.spread_um = self._spread()
@@ -60,7 +59,6 @@ class Rays:
         return f"Rays(({self.x_um}, {self.y_um}, {self.height_um}) um, spread {self.spread_um} um)"
 
     def _cast(self, lens: Lens) -> None:
-        drop = self.height_um - _TOP_UM
         for j in range(_HEIGHT + 1):
             for i in range(_WIDTH + 1):
                 lens.slopes(float(i), float(j))
@@ -77,8 +75,14 @@ class Rays:
                 corner = j * _CORNERS + i
                 self.slope_x[corner] = x
                 self.slope_y[corner] = y
-                self.top_x[corner] = self.x_um + (drop * x >> 22)
-                self.top_y[corner] = self.y_um + (drop * y >> 22)
+
+    def top_x(self, corner: int) -> int:
+        """Where a corner's ray passes the height of the tops."""
+        return self.x_um + ((self.height_um - _TOP_UM) * self.slope_x[corner] >> 22)
+
+    def top_y(self, corner: int) -> int:
+        """The same along y."""
+        return self.y_um + ((self.height_um - _TOP_UM) * self.slope_y[corner] >> 22)
 
     def _gather(self) -> None:
         """The means of each pixel's corners."""
@@ -91,8 +95,8 @@ class Rays:
                 y = self.slope_y[a] + self.slope_y[a + 1] + self.slope_y[c] + self.slope_y[c + 1]
                 self.fall_x[pixel] = _TOP_UM * x >> 24
                 self.fall_y[pixel] = _TOP_UM * y >> 24
-                x = self.top_x[a] + self.top_x[a + 1] + self.top_x[c] + self.top_x[c + 1]
-                y = self.top_y[a] + self.top_y[a + 1] + self.top_y[c] + self.top_y[c + 1]
+                x = self.top_x(a) + self.top_x(a + 1) + self.top_x(c) + self.top_x(c + 1)
+                y = self.top_y(a) + self.top_y(a + 1) + self.top_y(c) + self.top_y(c + 1)
                 self.middle_x[pixel] = (x + 2) >> 2
                 self.middle_y[pixel] = (y + 2) >> 2
 
@@ -104,8 +108,8 @@ class Rays:
                 pixel = j * _WIDTH + i
                 for corner in range(4):
                     at = (j + (corner >> 1)) * _CORNERS + i + (corner & 1)
-                    x = self.top_x[at] + (_TOP_UM * self.slope_x[at] >> 22)
-                    y = self.top_y[at] + (_TOP_UM * self.slope_y[at] >> 22)
+                    x = self.top_x(at) + (_TOP_UM * self.slope_x[at] >> 22)
+                    y = self.top_y(at) + (_TOP_UM * self.slope_y[at] >> 22)
                     x -= self.middle_x[pixel] + self.fall_x[pixel]
                     y -= self.middle_y[pixel] + self.fall_y[pixel]
                     if x * x + y * y > widest:
@@ -117,6 +121,13 @@ class Rays:
         for pixel in range(_WIDTH * _HEIGHT):
             longest = max(longest, abs(self.fall_x[pixel]), abs(self.fall_y[pixel]))
         return longest
+
+
+def between(a: int, b: int, c: int, d: int, sample: int) -> int:
+    """Sample 0 to 15, row by row, between the corners of a pixel: a b above, c d below."""
+    p = 2 * (sample & 3) + 1
+    q = 2 * (sample >> 2) + 1
+    return ((a * (8 - q) + c * q) * (8 - p) + (b * (8 - q) + d * q) * p) >> 6
 
 
 def _um(metres: float) -> int:

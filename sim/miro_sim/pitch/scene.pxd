@@ -1,5 +1,6 @@
 cimport cython
-from miro_sim.pitch cimport rays
+from miro_sim.pitch cimport rays, sensor
+from miro_sim.pitch.rays cimport between
 
 cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH
 cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
@@ -10,9 +11,11 @@ cdef long long _CIRCLE_UM, _AREA_HALF_UM, _AREA_DEPTH_UM, _BALL_UM
 cdef class Scene:
     cdef readonly rays.Rays rays
     cdef long long packed[32]
-    cdef unsigned char paint[76800]
-    cdef long long total[76800]
-    cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y
+    cdef unsigned char[::1] paint
+    cdef long long[::1] total
+    cdef int[::1] lit
+    cdef short[::1] y, cb, cr
+    cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y, falloff
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
     cdef readonly bint has_ball
 
@@ -20,19 +23,27 @@ cdef class Scene:
     cdef bint _near_ball(self, int pixel) noexcept
     @cython.locals(paint=int)
     cdef bint shows_ball(self, int pixel) noexcept
+    @cython.locals(x='long long', y='long long', lost='long long')
+    cdef long long light(self, int pixel) noexcept
+    @cython.locals(column=int, pixel=int)
+    cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
     cdef void look(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', ring=int)
     cdef int sample(self, int pixel, int sample) noexcept
     @cython.locals(ring=int)
     cdef int ball_above(self, int pixel, int sample, long long height) noexcept
-    @cython.locals(p=int, q=int, a=int, c=int, left='long long', right='long long')
-    cdef long long _slope(self, int* slopes, int pixel, int sample) noexcept
+    @cython.locals(slopes='int[::1]', a=int, c=int)
+    cdef long long _slope_x(self, int pixel, int sample) noexcept
+    @cython.locals(slopes='int[::1]', a=int, c=int)
+    cdef long long _slope_y(self, int pixel, int sample) noexcept
     @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', along='long long',
                    stretch='long long', distance='long long', rim='long long')
     cdef int _ring(self, long long slope_x, long long slope_y, long long above) noexcept
     @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', on_wall=bint)
     cdef int paint_of(self, long long slope_x, long long slope_y) noexcept
-    cdef bint _inside(self, long long x, long long y) noexcept
-    @cython.locals(square='long long', inner='long long', outer='long long', depth='long long')
-    cdef bint _on_line(self, long long x, long long y) noexcept
+    @cython.locals(rays=rays.Rays, spread='long long', x='long long', y='long long', far='long long')
+    cdef int _sure(self, int pixel) noexcept
+    cdef bint _inside(self, long long x, long long y, long long more) noexcept
+    @cython.locals(half='long long', square='long long', inner='long long', outer='long long', depth='long long')
+    cdef bint _on_line(self, long long x, long long y, long long more) noexcept

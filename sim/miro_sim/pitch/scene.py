@@ -14,20 +14,23 @@ are not drawn.
 
 The ball lies on the floor. It is drawn as four rings, brighter towards its middle.
 
-A pixel's 16 samples are evaluated when it is first looked at, and kept.
+A pixel is sampled when it is first looked at, unless all its samples are sure to see the floor, or what is outside.
+What the sensor makes of it is kept too, for the light of one moment.
 """
 
 from __future__ import annotations
 
+import math
+from array import array
 from functools import lru_cache
 
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_sim.pitch.ground import INSET_M, LENGTH_M, WIDTH_M
 from miro_sim.pitch.paints import NUMBERS, packed
-from miro_sim.pitch.rays import Rays, rays_of
+from miro_sim.pitch.picture_settings import PictureSettings
+from miro_sim.pitch.rays import Rays, between, rays_of
+from miro_sim.pitch.sensor import Sensor
 
-MIXED = 255
-UNKNOWN = 254
 _MIXED = 255
 _UNKNOWN = 254
 _CORNERS = 321
@@ -42,28 +45,34 @@ _BALL_UM = 21_350  # radius of a golf ball of 42.7 mm
 _CIRCLE_UM = 250_000
 _AREA_HALF_UM = 250_000
 _AREA_DEPTH_UM = 150_000
+_FAR_SQUARE = 625e9  # of the corner of the pitch from its middle, in um^2
 
 
 class Scene:
     """The scene without robots; `ball`: above which place (um) its centre is, if there is one.
 
-    `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added.
+    `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added. `y`, `cb`, `cr`: what the sensor makes of it
+    when its light has the scale `lit`.
     """
 
     NOT_STATE = (
         *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
         *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
+        *("falloff", "lit", "y", "cb", "cr"),
     )
 
-    def __init__(self, rays: Rays, packed: list[int], ball: tuple[int, int] | None) -> None:
+    def __init__(self, rays: Rays, picture: PictureSettings, ball: tuple[int, int] | None) -> None:
         self.rays = rays
         self.packed = [0] * 32
-        for number, paint in enumerate(packed):
+        for number, paint in enumerate(packed(picture.black_floor)):
             self.packed[number] = paint
-        self.paint = [0] * 76800
-        self.total = [0] * 76800
-        for pixel in range(76800):
-            self.paint[pixel] = _UNKNOWN
+        self.falloff = math.floor(picture.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
+        self.paint = bytearray([_UNKNOWN]) * 76800
+        self.total = array("q", bytes(8 * 76800))
+        self.lit = array("i", b"\xff" * (4 * 76800))  # -1
+        self.y = array("h", bytes(2 * 76800))
+        self.cb = array("h", bytes(2 * 76800))
+        self.cr = array("h", bytes(2 * 76800))
         self.half_x = round(LENGTH_M * 500_000.0)
         self.half_y = round(WIDTH_M * 500_000.0)
         self.middle_x = self.half_x - round(INSET_M * 1e6)
@@ -97,8 +106,37 @@ class Scene:
         end = top + rays.fall_y[pixel]
         return not ((top > far and end > far) or (top < 0 - far and end < 0 - far))
 
+    def light(self, pixel: int) -> int:
+        """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
+        x = self.rays.middle_x[pixel] - self.middle_x
+        y = self.rays.middle_y[pixel] - self.middle_y
+        lost = (x * x + y * y >> 20) * self.falloff >> 32
+        return 4096 - lost if lost < 4096 else 0
+
+    def show(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
+        """Puts the pixels of a line into the sensor's; `instants`: how many times their samples are added."""
+        for column in range(first, end):
+            pixel = row * _WIDTH + column
+            if self.lit[pixel] != sensor.scale:
+                if self.paint[pixel] == _UNKNOWN:
+                    self.look(pixel)
+                sensor.put(column, self.total[pixel] * instants, self.light(pixel))
+                self.lit[pixel] = sensor.scale
+                self.y[pixel] = sensor.y[column]
+                self.cb[pixel] = sensor.cb[column]
+                self.cr[pixel] = sensor.cr[column]
+            else:
+                sensor.y[column] = self.y[pixel]
+                sensor.cb[column] = self.cb[pixel]
+                sensor.cr[column] = self.cr[pixel]
+
     def look(self, pixel: int) -> None:
         """Fills `paint` and `total` of a pixel."""
+        paint = self._sure(pixel)
+        if paint >= 0:
+            self.paint[pixel] = paint
+            self.total[pixel] = 16 * self.packed[paint]
+            return
         first = -1
         total = 0
         plain = True
@@ -114,8 +152,8 @@ class Scene:
 
     def sample(self, pixel: int, sample: int) -> int:
         """The paint that sample 0 to 15 of a pixel hits, row by row."""
-        x = self._slope(self.rays.slope_x, pixel, sample)
-        y = self._slope(self.rays.slope_y, pixel, sample)
+        x = self._slope_x(pixel, sample)
+        y = self._slope_y(pixel, sample)
         if self.has_ball:
             ring = self._ring(x, y, 0)
             if ring >= 0:
@@ -124,22 +162,21 @@ class Scene:
 
     def ball_above(self, pixel: int, sample: int, height: int) -> int:
         """The paint of the ball if that sample sees it at this height or above, or -1."""
-        ring = self._ring(
-            self._slope(self.rays.slope_x, pixel, sample),
-            self._slope(self.rays.slope_y, pixel, sample),
-            height,
-        )
+        ring = self._ring(self._slope_x(pixel, sample), self._slope_y(pixel, sample), height)
         return self.ball_rim + ring if ring >= 0 else -1
 
-    def _slope(self, slopes: list[int], pixel: int, sample: int) -> int:
+    def _slope_x(self, pixel: int, sample: int) -> int:
         """Between the corners of a pixel, at a sample."""
-        p = 2 * (sample & 3) + 1
-        q = 2 * (sample >> 2) + 1
+        slopes = self.rays.slope_x
         a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
         c = a + _CORNERS
-        left = slopes[a] * (8 - q) + slopes[c] * q
-        right = slopes[a + 1] * (8 - q) + slopes[c + 1] * q
-        return (left * (8 - p) + right * p) >> 6
+        return between(slopes[a], slopes[a + 1], slopes[c], slopes[c + 1], sample)
+
+    def _slope_y(self, pixel: int, sample: int) -> int:
+        slopes = self.rays.slope_y
+        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        c = a + _CORNERS
+        return between(slopes[a], slopes[a + 1], slopes[c], slopes[c + 1], sample)
 
     def _ring(self, slope_x: int, slope_y: int, above: int) -> int:
         """The ring of the ball, 0 to 3 from the rim, that a ray sees; -1 if it misses it or passes it below `above`.
@@ -163,13 +200,28 @@ class Scene:
             return -1
         return 3 - 4 * (distance - 1) // rim if distance > 0 else 3
 
+    def _sure(self, pixel: int) -> int:
+        """The floor or the outside if all of a pixel is sure to see it, else -1."""
+        rays = self.rays
+        spread = rays.spread_um + 2  # for what is rounded here
+        x = abs(rays.middle_x[pixel] + rays.fall_x[pixel] // 3 - self.middle_x)  # at the height of the walls
+        y = abs(rays.middle_y[pixel] + rays.fall_y[pixel] // 3 - self.middle_y)
+        if self.has_ball and self._near_ball(pixel):
+            return -1
+        if not self._inside(x, y, 0 - spread):
+            far = self.half_x + _GOAL_DEPTH_UM + _WALL_UM + spread
+            return self.outside if x > far or y > self.half_y + _WALL_UM + spread else -1
+        x = abs(rays.middle_x[pixel] + rays.fall_x[pixel] - self.middle_x)
+        y = abs(rays.middle_y[pixel] + rays.fall_y[pixel] - self.middle_y)
+        return self.floor if self._inside(x, y, 0 - spread) and not self._on_line(x, y, spread) else -1
+
     def paint_of(self, slope_x: int, slope_y: int) -> int:
         """The paint that the ray of these slopes hits."""
         rays = self.rays
         drop = rays.height_um - _WALL_HEIGHT_UM
         x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
         y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)
-        if not self._inside(x, y):
+        if not self._inside(x, y, 0):
             on_wall = (x <= self.half_x + _WALL_UM and y <= self.half_y + _WALL_UM) or (
                 x <= self.half_x + _GOAL_DEPTH_UM + _WALL_UM and y <= _GOAL_HALF_UM + _WALL_UM
             )
@@ -177,36 +229,37 @@ class Scene:
         drop = rays.height_um
         x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
         y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)
-        if not self._inside(x, y):
+        if not self._inside(x, y, 0):
             return self.wall_face
-        return self.line if self._on_line(x, y) else self.floor
+        return self.line if self._on_line(x, y, 0) else self.floor
 
-    def _inside(self, x: int, y: int) -> bool:
-        """Whether a place (distances from the middle) is between the walls or in a goal."""
-        if y <= _GOAL_HALF_UM and x <= self.half_x + _GOAL_DEPTH_UM:
+    def _inside(self, x: int, y: int, more: int) -> bool:
+        """Whether a place (distances from the middle) is between the walls or in a goal, both `more` wide each way."""
+        if y <= _GOAL_HALF_UM + more and x <= self.half_x + _GOAL_DEPTH_UM + more:
             return True
-        if x > self.half_x or y > self.half_y:
+        if x > self.half_x + more or y > self.half_y + more:
             return False
-        return x + y <= self.half_x + self.half_y - _CORNER_UM
+        return x + y <= self.half_x + self.half_y - _CORNER_UM + 2 * more
 
-    def _on_line(self, x: int, y: int) -> bool:
-        """Middle line, circle, goal areas and goal lines."""
-        if x <= _LINE_HALF_UM:
+    def _on_line(self, x: int, y: int, more: int) -> bool:
+        """Middle line, circle, goal areas and goal lines, `more` wider each way."""
+        half = _LINE_HALF_UM + more
+        if x <= half:
             return True
         square = x * x + y * y
-        inner = _CIRCLE_UM - _LINE_HALF_UM
-        outer = _CIRCLE_UM + _LINE_HALF_UM
+        inner = _CIRCLE_UM - half
+        outer = _CIRCLE_UM + half
         if inner * inner <= square <= outer * outer:
             return True
         depth = self.half_x - x
-        if y <= _GOAL_HALF_UM and abs(depth) <= _LINE_HALF_UM:
+        if y <= _GOAL_HALF_UM + more and abs(depth) <= half:
             return True
-        if abs(depth - _AREA_DEPTH_UM) <= _LINE_HALF_UM and y <= _AREA_HALF_UM + _LINE_HALF_UM:
+        if abs(depth - _AREA_DEPTH_UM) <= half and y <= _AREA_HALF_UM + half:
             return True
-        return abs(y - _AREA_HALF_UM) <= _LINE_HALF_UM and 0 <= depth <= _AREA_DEPTH_UM
+        return abs(y - _AREA_HALF_UM) <= half and 0 - more <= depth <= _AREA_DEPTH_UM + more
 
 
-@lru_cache(maxsize=8)
-def scene_of(lens: CameraParameters, black_floor: bool, ball: tuple[int, int] | None) -> Scene:
+@lru_cache(maxsize=3)
+def scene_of(lens: CameraParameters, picture: PictureSettings, ball: tuple[int, int] | None) -> Scene:
     """The scene as a camera sees it; worlds with the same one share what was looked at."""
-    return Scene(rays_of(lens), packed(black_floor), ball)
+    return Scene(rays_of(lens), picture, ball)

@@ -9,7 +9,8 @@ cdef int _BITS, _WIDTH, _GREY
 cdef class Sensor:
     cdef readonly object settings
     cdef readonly rng.Stream stream
-    cdef long long frame, scale, offset, jitter
+    cdef long long frame, offset, jitter
+    cdef int scale
     cdef readonly int reach, side
     cdef int shift, half
     cdef int taps[9]
