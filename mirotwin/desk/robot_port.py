@@ -139,7 +139,7 @@ class RobotPort:
                 self._descriptor = self._serial.fileno()
 
     def __enter__(self) -> RobotPort:
-        self.prompt = realtime_priority()
+        self.prompt = not self._virtual and realtime_priority()
         return self
 
     def __exit__(
@@ -419,7 +419,8 @@ def _opened(url: str) -> Any:
         address += (
             f"{'&' if '?' in url else '?'}ign_set_control"  # ser2net says nothing of a DTR that is not there
         )
-    realtime_priority()  # of the thread, too, that reads for `rfc2217://`
+    if url.lower().startswith("rfc2217:"):
+        realtime_priority()  # of the thread, too, that reads there
     try:
         return serial.serial_for_url(address, BAUD, timeout=0, **more)
     except (serial.SerialException, OSError, ValueError) as error:

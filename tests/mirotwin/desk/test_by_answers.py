@@ -94,6 +94,13 @@ def test_a_mistake_that_answers_show_is_found(mirotwin, name):
 
 
 @pytest.mark.skipif(not compiler(), reason="needs SDCC")
+def test_a_rule_that_presupposes_a_failed_one_is_not_judged(mirotwin):
+    found = verdicts(mirotwin, robot_with("takes frames with a bad CRC"), ["P08", "P07"])
+    assert found["P07"]["verdict"] == "failed"
+    assert (found["P08"]["verdict"], found["P08"]["cause"]) == ("not judged", "P07")
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
 @pytest.mark.parametrize("name", UNSEEN)
 def test_a_mistake_that_answers_do_not_show_passes_nothing_that_it_breaks(mirotwin, name):
     rules = {"stops by opening the loops": "P31", "takes bad stop bits": "P09"}

@@ -24,6 +24,14 @@ def test_nothing_is_sent_that_moves_unless_it_is_allowed(mirotwin, drive):
     assert not (drive.parent / "runs").exists()
 
 
+@pytest.mark.parametrize("port", ["/dev/nothing", "socket://127.0.0.1:1"])
+def test_a_port_that_cannot_be_opened_leaves_nothing_in_the_way_of_the_next_try(mirotwin, drive, port):
+    for _ in range(2):
+        code, _, err = mirotwin("replay", drive, "--port", port, "--allow-motion")
+        assert (code, err.count("\n")) == (2, 1)
+        assert "there is no such port" in err or "does anybody serve it?" in err
+
+
 def test_too_fast_a_wheel_is_refused_before_anything_is_sent(mirotwin, drive):
     code, _, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "--max-speed", "0.15")
     assert code == 2

@@ -21,7 +21,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.verify.rig_options import silent_scenario
 from tests import children
-from tests.mirotwin.desk.rig import stream_text
+from tests.mirotwin.desk.rig import ROBOT, stream_text
 from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
 
 MS = 24_000
@@ -102,6 +102,16 @@ def test_what_is_not_allowed_is_not_sent(pty):
     sent = pty.read()
     assert stops(sent)
     assert DRIVE not in sent
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="needs Linux")
+def test_only_a_port_of_the_wall_clock_asks_for_priority_and_gives_it_back(pty):
+    before = os.sched_getscheduler(0)
+    with robots_at(pty.path) as port:
+        assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == port.prompt
+    assert os.sched_getscheduler(0) == before
+    with robots_at(ROBOT):
+        assert os.sched_getscheduler(0) == before
 
 
 def test_characters_come_with_the_time_at_which_they_were_there(pty):
