@@ -187,7 +187,8 @@ def _body(message: Message, n: int, form: Format) -> bytes:
         kind, payload = FrameType.TELEMETRY, _telemetry_payload(message, n)
     else:
         raise _no_message(message)
-    header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
+    seq = message.seq
+    header = kind * SEQ_MODULUS + (seq if type(seq) is int and 0 <= seq < SEQ_MODULUS else checked(SEQ, seq))
     return bytes([header]) + payload.ljust(form.payload_size, b"\0")
 
 
@@ -276,18 +277,13 @@ def _team_payload(message: TeamFrame, n: int) -> bytes:
     pairs = _items("velocities", message.velocities, n, "pairs of (left, right), one a robot")
     numbers: list[int] = []
     for slot, pair in enumerate(pairs):
-        numbers += pair if _is_plain(pair) else _pair(slot, pair)
+        if type(pair) is tuple and len(pair) == 2:  # what a station sends, judged without a call
+            left, right = pair
+            if type(left) is type(right) is int and _LOW <= left <= _HIGH and _LOW <= right <= _HIGH:
+                numbers += pair
+                continue
+        numbers += _pair(slot, pair)
     return _VELOCITIES[n].pack(*numbers)
-
-
-def _is_plain(pair: Any) -> bool:
-    """Whether `pair` is what a station sends: a tuple of two ints within the limits."""
-    if type(pair) is not tuple or len(pair) != 2:
-        return False
-    left, right = pair
-    if type(left) is not int or type(right) is not int:
-        return False
-    return _LOW <= left <= _HIGH and _LOW <= right <= _HIGH
 
 
 def _pair(slot: int, pair: Any) -> tuple[int, int]:

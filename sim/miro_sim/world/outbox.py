@@ -80,7 +80,8 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        if sent.tick < free_tick or any(_overlap(one.sent, sent) for one in self.waiting):
+        waiting = self.waiting
+        if sent.tick < free_tick or (waiting and any(_overlap(one.sent, sent) for one in waiting)):
             self.dropped += 1
             return False
         self._add(Waiting(sent, STATION))

@@ -136,31 +136,31 @@ class SeeingSight:
         robots = len(self.bodies)
         first = self.frame * (robots + 2)
         self.frame += 1
-        camera = self.camera
-        if self.chances.uniform(first) < camera.dropped_frames:
+        camera, chance = self.camera, self.chances.uniform
+        if camera.dropped_frames > 0.0 and chance(first) < camera.dropped_frames:
             self.dropped += 1
             return self.grabber.take((None,) * robots)
-        if self.chances.uniform(first + 1) < camera.repeated_frames:
+        if camera.repeated_frames > 0.0 and chance(first + 1) < camera.repeated_frames:
             self.repeated += 1
             return self.grabber.take(None)
-        seen = look()
-        kept = tuple(
-            None if self.chances.uniform(first + 2 + index) < camera.lost_robots else sighting
-            for index, sighting in enumerate(seen)
-        )
+        kept = look()
+        if camera.lost_robots > 0.0:
+            lost = [chance(first + 2 + index) < camera.lost_robots for index in range(robots)]
+            kept = tuple(None if gone else seen for gone, seen in zip(lost, kept, strict=True))
         self._count(tick, kept)
         return self.grabber.take(kept)
 
     def _count(self, tick: int, seen: Sightings) -> None:
         """Compares with the truth, which nobody on the PC can."""
-        for index, sighting in enumerate(seen):
+        for sighting, own in zip(seen, self.bodies, strict=True):
             if sighting is None:
                 self.lost += 1
                 continue
-            ways = [_distance_m(body.drive, tick, sighting) for body in self.bodies]
-            if ways[index] > WRONG * self.worst_m:
+            way = _distance_m(own.drive, tick, sighting)
+            if way > WRONG * self.worst_m:
                 self.wrong += 1
-            if min(ways) < ways[index]:
+            others = [body for body in self.bodies if body is not own]
+            if any(_distance_m(body.drive, tick, sighting) < way for body in others):
                 self.swapped += 1
 
 
