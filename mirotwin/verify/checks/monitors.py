@@ -59,6 +59,7 @@ def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
 T = TypeVar("T")
 Expected = Mapping[RobotId, Sequence[Check]]
 _FROM_RECEIVED = ("frame", "damaged")
+_CHARACTERS = ("received", "transmitted", *_FROM_RECEIVED)
 _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
@@ -164,6 +165,7 @@ class _RobotMonitors:
         self.hears_board = any(what not in _FROM_PC for what in self.of_events)
         self.hears_pc = bool(self.of_events)
         self.hears_characters = "heard" in self.of_events
+        self.reads_characters = any(what in self.of_events for what in _CHARACTERS)
         self.of_board, self.of_pc = Cursor(robot.log), Cursor(network.log)
         self.faults = len(robot.board.faults)
         self.waiting: list[Event] = []
@@ -197,7 +199,7 @@ class _RobotMonitors:
             self.waiting += [event for _, event in new if self._concerns(event)]
         if self.hears_board:
             self.lost += self.of_board.lost
-            self.waiting += [event for _, event in self.of_board.read()]
+            self.waiting += [event for _, event in self.of_board.read(self.reads_characters)]
 
     def _concerns(self, event: Event) -> bool:
         if event.what in _RESTARTS:

@@ -136,6 +136,9 @@ def of_action(action: Action) -> Event:
     return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)
 
 
+_CHARACTERS = (event_log.RECEIVED, event_log.SENT)
+
+
 class RobotLog:
     """The events of a robot's board, read as those of a PC are."""
 
@@ -155,9 +158,11 @@ class RobotLog:
         return self.log.end
 
     def since(self, serial: int, heard: bool = True) -> Iterator[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept."""
+        """(serial number, event) of those from `serial` on that are kept; `heard`: with the characters."""
         for number in range(max(serial, self.log.first), self.log.end):
-            yield number, _event(*self.log.event(number), self.network, self.slot)
+            found = self.log.event(number)
+            if heard or found[1] not in _CHARACTERS:
+                yield number, _event(*found, self.network, self.slot)
 
 
 class Cursor:
@@ -175,7 +180,7 @@ class Cursor:
         return max(0, self.log.first - self.next)
 
     def read(self, heard: bool = True) -> list[tuple[int, Event]]:
-        """(serial number, event) of what is new; `heard`: with the characters that a PC received."""
+        """(serial number, event) of what is new; `heard`: with the characters, which are most of it."""
         found = list(self.log.since(self.next, heard))
         self.next = self.log.end
         return found
