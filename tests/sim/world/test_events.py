@@ -3,7 +3,7 @@
 from miro_robot.event_log import EventLog
 from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
 
-SENT = 1  # of a board's log, which keeps 2048 events
+RECEIVED, SENT, REACHED = 0, 1, 4  # of a board's log, which keeps 2048 events
 CAPACITY = 2048
 
 
@@ -34,6 +34,15 @@ def test_a_cursor_on_a_pc_may_leave_out_characters():
         (1, "answer", 11),
     ]
     assert [event.what for _, event in without.read(heard=False)] == ["answer"]
+
+
+def test_a_cursor_on_a_robot_may_leave_out_characters():
+    log = robot_log()
+    cursor = Cursor(log)
+    for kind in (RECEIVED, SENT, REACHED):
+        log.log.note(kind, 5, 1, 0x41)
+    assert [(serial, event.what) for serial, event in cursor.read(heard=False)] == [(2, "reached")]
+    assert cursor.read() == []
 
 
 def test_a_cursor_counts_what_was_dropped_before_it_was_read():
