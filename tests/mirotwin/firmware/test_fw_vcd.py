@@ -145,6 +145,7 @@ def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path)
     assert str(tmp_path) not in save
 
 
+@pytest.mark.slow
 def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(mirotwin, short, tmp_path):
     def written(name, *options):
         out = tmp_path / f"{name}.vcd"

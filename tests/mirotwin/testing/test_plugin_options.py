@@ -25,6 +25,7 @@ def test_once():
 """
 
 
+@pytest.mark.slow
 def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path):
     options = ["-v", "-rA", "--mirotwin-repeat=4", "--mirotwin-seed=10", "--mirotwin-artifacts=left"]
     alone = session(tmp_path, *options, tests=MANY)

@@ -59,6 +59,7 @@ def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin, here):
         assert "c.parquet: holds the results of another campaign" in err
 
 
+@pytest.mark.slow
 def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here):
     code, out, _ = mirotwin(
         *("fuzz", "--time", "1s", "--jobs", 1, "--minimise", "0.2s", "--out", "out"),

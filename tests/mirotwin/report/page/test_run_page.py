@@ -117,6 +117,7 @@ def test_a_page_names_no_folder_of_the_machine(fig6_page, fig6):
     assert str(document.ASSETS) not in text
 
 
+@pytest.mark.slow
 def test_two_processes_make_the_same_bytes_and_a_second_page_of_one_process_too(fig6, fig6_page, tmp_path):
     code = (
         "import os, sys; from click.testing import CliRunner; from mirotwin.commands import main\n"
@@ -273,6 +274,7 @@ def test_a_page_says_what_is_missing_without_javascript(fig6_page):
     assert "<noscript>" in fig6_page.read_text()
 
 
+@pytest.mark.slow
 def test_a_page_that_is_too_large_is_refused_and_the_remedy_works(two, tmp_path, mirotwin, monkeypatch):
     page = tmp_path / "large.html"
     assert mirotwin("report", two, "-o", page, "--no-frames", "-q") == (0, "")
