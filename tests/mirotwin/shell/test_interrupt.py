@@ -80,7 +80,7 @@ mirotwin.entry.main()
 
 
 def test_ctrl_c_in_a_callback_of_the_interpreter_ends_the_program_after_it():
-    found = subprocess.run(
+    found = children.run(
         [sys.executable, "-c", IN_A_CALLBACK],
         capture_output=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
