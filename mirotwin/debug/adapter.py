@@ -55,9 +55,7 @@ class Adapter:
         self.its: Debugger
         self.console: Console | None = None
         self.lines: list[str] = []
-        self.kinds: dict[
-            str, list[int]
-        ] = {}  # numbers of breakpoints, by a kind, of those of lines by a file
+        self.kinds: dict[str, list[int]] = {}  # numbers of breakpoints; those of lines by file
         self.children: list[list[tuple[str, Shown]]] = []
         self.paused = self.changed = self.ended = False
         self.run_after: Callable[[], object] | None = None
@@ -73,9 +71,9 @@ class Adapter:
 
     def answer(self, request: Message) -> None:
         command = request["command"]
-        handler = getattr(self, f"on_{command}", None) or (
-            partial(self._move, command) if command in _MOVES else None
-        )
+        handler = getattr(self, f"on_{command}", None)
+        if command in _MOVES:
+            handler = partial(self._move, command)
         try:
             if handler is None:
                 raise BadInput("", command, "is not answered by this debugger")
@@ -152,12 +150,10 @@ class Adapter:
         return self._set(f"breakpoint in {path}", given.get("breakpoints", ()), make)
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
-        symbols = self.its.symbols
-        return self._set(
-            "function breakpoint",
-            given["breakpoints"],
-            lambda one: (self._add(one, symbols.at(one["name"])[0]), {}),
-        )
+        def make(one: Message) -> Made:
+            return self._add(one, self.its.symbols.at(one["name"])[0]), {}
+
+        return self._set("function breakpoint", given["breakpoints"], make)
 
     def on_setInstructionBreakpoints(self, given: Message) -> Message:
         def make(one: Message) -> Made:
@@ -438,11 +434,7 @@ def _inner(value: Value) -> list[tuple[str, Shown]]:
     if value.space == "sfr" and value.kind is not None and value.kind.size == 1:
         bits = [(name, bit) for name, bit in BITS.items() if bit & 0xF8 == value.address]
         return [(name, partial(Value, CType("bit", 1), "bit", bit)) for name, bit in bits]
-    return [(name, partial(_same, child)) for name, child in children(value)]
-
-
-def _same(value: Value) -> Value:
-    return value
+    return children(value)
 
 
 def _placed(moment: Moment, scope: str) -> list[tuple[str, Shown]]:

@@ -242,8 +242,8 @@ def _lines_of(name: str, value: Value, moment: Moment) -> Iterator[str]:
         note = f"   ({value.note})" if value.note else ""
         yield f"{name} = {shown_value(content(value, moment))}{note}"
     else:
-        for part, child in children(value):
-            yield from _lines_of(f"{name}.{part}", child, moment)
+        for part, get in children(value):
+            yield from _lines_of(f"{name}.{part}", get(), moment)
 
 
 def shown_value(found: Any) -> str:

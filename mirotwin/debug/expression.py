@@ -12,12 +12,13 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Any, Protocol
 
 import msgspec
 
 from miro_exact.bad_input import BadInput, shortened
-from miro_robot.image.c_types import CType, Fields, value_of
+from miro_robot.image.c_types import CType, Fields, Member, value_of
 
 _TOKEN = re.compile(r"(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
 _MOST_TOKENS, _MOST_SHIFT = 128, 64
@@ -91,24 +92,26 @@ def number(value: Value, scope: Scope) -> Any:
     return found
 
 
-def children(value: Value) -> list[tuple[str, Value]]:
+def children(value: Value) -> list[tuple[str, Callable[[], Value]]]:
     """Members and elements by name, empty for a single number."""
     if value.members is not None:
-        return [(name, get()) for name, get in value.members.items()]
+        return list(value.members.items())
     if value.kind is not None and value.kind.kind == "array":
-        return [(f"[{at}]", _element(value, at)) for at in range(value.kind.count)]
-    fields = value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
-    return [(field.name, _member(value, field.name)) for field in fields]
+        return [(f"[{at}]", partial(_element, value, at)) for at in range(value.kind.count)]
+    return [(field.name, partial(_member, value, field.name)) for field in _fields(value)]
+
+
+def _fields(value: Value) -> tuple[Member, ...]:
+    return value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
 
 
 def _member(value: Value, name: str) -> Value:
     if value.members is not None and name in value.members:
         return value.members[name]()
-    fields = value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
-    for field in fields:
+    for field in _fields(value):
         if field.name == name:
             return msgspec.structs.replace(value, kind=field.type, address=value.address + field.offset)
-    there = [*(value.members or ()), *(field.name for field in fields)]
+    there = [*(value.members or ()), *(field.name for field in _fields(value))]
     raise NoValue(f"has no member {name}", f"it has {', '.join(there)}" if there else "")
 
 

@@ -31,7 +31,7 @@ SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
 SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle")
 _CHIP = {
     "": "desired_position desired_velocity real_position real_velocity status pwm_magnitude sign hi"
-    " index_position breakpoint mode writes_while_busy",
+    " index_position breakpoint mode writes_while_busy pid trajectory",
     "pid": "kp ki kd il ds error_sum",
     "trajectory": "target max_velocity acceleration",
 }
@@ -224,7 +224,7 @@ class Moment:
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
         if name == "lm629" and board is not None:
             board.sync(cpu.cycles * CYCLE_TICKS)
-            return Value(members={"left": lambda: _chip(board.left), "right": lambda: _chip(board.right)})
+            return Value(members={"left": partial(_chip, board.left), "right": partial(_chip, board.right)})
         numbers = {"PC": cpu.pc, "DPTR": cpu.dptr, "cycle": cpu.cycles, "tick": cpu.cycles * CYCLE_TICKS}
         return Value(number=numbers[name]) if name in numbers else None
 
@@ -246,19 +246,12 @@ class Moment:
         return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
 
 
-def _chip(chip: Lm629) -> Value:
-    def group(part: str) -> Value:
-        names = _CHIP[part].split()
-        paths = [f"{part}.{name}".lstrip(".") for name in names]
-        members = {name: partial(_of, chip, path) for name, path in zip(names, paths, strict=True)}
-        inner = {} if part else {name: partial(group, name) for name in _CHIP if name}
-        return Value(members={**members, **inner})
-
-    return group("")
-
-
-def _of(chip: Lm629, path: str) -> Value:
-    return Value(number=int(attrgetter(path)(chip)))
+def _chip(chip: Lm629, path: str = "") -> Value:
+    """What one looks at in a chip, or in a part of it."""
+    if path not in _CHIP:
+        return Value(number=int(attrgetter(path)(chip)))
+    paths = {name: f"{path}.{name}".lstrip(".") for name in _CHIP[path].split()}
+    return Value(members={name: partial(_chip, chip, inner) for name, inner in paths.items()})
 
 
 def _name(path: str) -> str:

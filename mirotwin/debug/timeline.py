@@ -13,6 +13,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
@@ -30,6 +31,7 @@ from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 BUDGET_BYTES = 16 << 20
 CLOSE_TICKS = 48_000  # 2 ms
 _PAGE = 4096
+_TICK, _ORDER = attrgetter("tick"), itemgetter(0, 1)  # of a checkpoint, of a hit
 _LONGEST_CYCLES = 4  # of an instruction
 _WAKES = frozenset((0, *range(0x03, 0x34, 8)))  # where a processor that slept goes on
 
@@ -127,7 +129,7 @@ class Timeline:
     def _save(self) -> None:
         """Keeps the state of now, unless it is kept."""
         tick = self._now
-        at = bisect.bisect_left(self._kept, tick, key=_tick)
+        at = bisect.bisect_left(self._kept, tick, key=_TICK)
         if at < len(self._kept) and self._kept[at].tick == tick:
             return
         state = self.state()
@@ -155,7 +157,7 @@ class Timeline:
 
     def _before(self, tick: int) -> int:
         """The last checkpoint before `tick`, or the first one."""
-        return max(0, bisect.bisect_left(self._kept, tick, key=_tick) - 1)
+        return max(0, bisect.bisect_left(self._kept, tick, key=_TICK) - 1)
 
     def _look_closely(self, end_tick: int) -> None:
         """Sees to it that a checkpoint is at most 2 ms before `end_tick`, each one half as far from it as the last."""
@@ -258,7 +260,7 @@ class Timeline:
         if not found:
             self._settle()
             return None
-        hit = min(found, key=_order)
+        hit = min(found, key=_ORDER)
         self.land(hit)
         return hit
 
@@ -278,7 +280,7 @@ class Timeline:
             found: list[Hit] = []
             with self._asking(traps, lambda hit, found=found: bool(found.append(hit))):  # type: ignore[misc]
                 self._run_to(end_tick)
-            found.sort(key=_order, reverse=True)
+            found.sort(key=_ORDER, reverse=True)
             yield from (hit for hit in found if hit[:2] < here)
             end_tick, first = begin_tick, first or self.interrupted()
         self.go_to(begin_tick)
@@ -328,11 +330,3 @@ class Timeline:
         finally:
             for one in asking:
                 one.detach()
-
-
-def _tick(one: _Checkpoint) -> int:
-    return one.tick
-
-
-def _order(hit: Hit) -> tuple[int, int]:
-    return hit[:2]
