@@ -39,7 +39,8 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def network(self) -> int:
-        return 0
+        """Whose step it is: that of the key, or of the condition it waits for."""
+        return getattr(self, "network_", None) or 0
 
     def problem(self, network: ScenarioNetwork) -> str:
         """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
@@ -60,7 +61,8 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def said(self) -> str:
         """What it is, in a few words."""
-        return self.VERB
+        value = getattr(self, self.VERB, "")
+        return f"{self.VERB} {value}" if isinstance(value, str | int) else self.VERB
 
     def __str__(self) -> str:
         note = f" ({self.note})" if self.note else ""
@@ -110,15 +112,8 @@ class StreamStep(Step, frozen=True, kw_only=True):
     ask: bool = True
 
     @property
-    def network(self) -> int:
-        return self.network_
-
-    @property
     def every_ticks(self) -> int:
         return CONTROL_PERIOD_TICKS if self.every_ms is None else ms_ticks(self.every_ms)
-
-    def said(self) -> str:
-        return f"stream {self.stream}"
 
     def problem(self, network: ScenarioNetwork) -> str:
         if self.stream == "off":
@@ -138,20 +133,29 @@ class StreamStep(Step, frozen=True, kw_only=True):
             host.begin(self.every_ticks, self.frames, self.ask)
 
 
-class WaitStep(Step, frozen=True, kw_only=True):
+class ConditionStep(Step, frozen=True, kw_only=True):
+    """Base of those that look for events."""
+
+    condition: Condition
+
+    @property
+    def network(self) -> int:
+        return self.condition.network
+
+    def problem(self, network: ScenarioNetwork) -> str:
+        slot = getattr(self.condition, "slot", None)
+        return "" if slot is None else absent(slot, network)
+
+
+class WaitStep(ConditionStep, frozen=True, kw_only=True):
     """`wait_for`: goes on to the first event that fits. `expect`: the next event of the kind has to fit.
 
     What happened since the last wait counts, unless `from_now`. `within_ms`, from now on: left out, to the run's end.
     """
 
     verb: Verb
-    condition: Condition
     within_ms: WithinMs | None = None
     from_now: bool = False
-
-    @property
-    def network(self) -> int:
-        return self.condition.network
 
     def needs_ticks(self) -> int:
         return 0 if self.within_ms is None else ms_ticks(self.within_ms)
@@ -159,25 +163,17 @@ class WaitStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"{self.verb} {self.condition.what}"
 
-    def problem(self, network: ScenarioNetwork) -> str:
-        return problem_of_condition(self.condition, network)
-
     def do(self, player: Player) -> None:
         kind = self.condition.any_of_its_kind() if self.verb == "expect" else self.condition
         player.wait_for(self.condition, kind, self.within_ms, self.from_now)
 
 
-class NeverStep(Step, frozen=True, kw_only=True):
+class NeverStep(ConditionStep, frozen=True, kw_only=True):
     """`never`: no event that fits, for so long from now on. `silence_for_ms` is this for a character at the PC."""
 
     VERB = "never"
 
-    condition: Condition
     for_ms: PauseMs
-
-    @property
-    def network(self) -> int:
-        return self.condition.network
 
     def lasts_ticks(self) -> int:
         return ms_ticks(self.for_ms)
@@ -185,14 +181,11 @@ class NeverStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"never {self.condition.what}"
 
-    def problem(self, network: ScenarioNetwork) -> str:
-        return problem_of_condition(self.condition, network)
-
     def do(self, player: Player) -> None:
         player.never(self.condition, self.for_ms)
 
 
-class HoldStep(Step, frozen=True, kw_only=True):
+class HoldStep(ConditionStep, frozen=True, kw_only=True):
     """`hold = "wheels"`: they turn as fast as this, for so long from now on."""
 
     VERB = "hold"
@@ -200,18 +193,11 @@ class HoldStep(Step, frozen=True, kw_only=True):
     condition: WheelSpeeds
     for_ms: PauseMs
 
-    @property
-    def network(self) -> int:
-        return self.condition.network
-
     def lasts_ticks(self) -> int:
         return ms_ticks(self.for_ms)
 
     def said(self) -> str:
         return "hold wheels"
-
-    def problem(self, network: ScenarioNetwork) -> str:
-        return problem_of_condition(self.condition, network)
 
     def do(self, player: Player) -> None:
         player.hold(self.condition, self.for_ms)
@@ -241,10 +227,6 @@ class CheckStep(Step, frozen=True, kw_only=True):
     slot: Slot | None = None
     checks: tuple[Check, ...] = ()
 
-    @property
-    def network(self) -> int:
-        return self.network_ or 0
-
     def said(self) -> str:
         return f"check {', '.join(self.check)}"
 
@@ -265,13 +247,6 @@ class RadioStep(Step, frozen=True, kw_only=True):
     radio: Literal["up", "down", "noise"]
     network_: Network = msgspec.field(default=0, name="network")
 
-    @property
-    def network(self) -> int:
-        return self.network_
-
-    def said(self) -> str:
-        return f"radio {self.radio}"
-
     def do(self, player: Player) -> None:
         player.world.set_radio(self.radio, self.network)
 
@@ -284,13 +259,6 @@ class ResetStep(Step, frozen=True, kw_only=True):
     reset: Literal[0, 1]
     network_: Network = msgspec.field(default=0, name="network")
     slot: Slot | None = None
-
-    @property
-    def network(self) -> int:
-        return self.network_
-
-    def said(self) -> str:
-        return f"reset {self.reset}"
 
     def do(self, player: Player) -> None:
         player.world.set_reset(self.reset, self.network, player.slot(self.slot, self.network))
@@ -305,13 +273,6 @@ class PowerStep(Step, frozen=True, kw_only=True):
     network_: Network = msgspec.field(default=0, name="network")
     slot: Slot | None = None
 
-    @property
-    def network(self) -> int:
-        return self.network_
-
-    def said(self) -> str:
-        return f"power {self.power}"
-
     def do(self, player: Player) -> None:
         level = int(self.power == "on")
         player.world.set_power(level, self.network, player.slot(self.slot, self.network))
@@ -323,9 +284,6 @@ class SaveStep(Step, frozen=True, kw_only=True):
     VERB = "save"
 
     save: str
-
-    def said(self) -> str:
-        return f"save {self.save}"
 
     def problem(self, network: ScenarioNetwork) -> str:
         if FILE.fullmatch(self.save):
@@ -344,12 +302,6 @@ PLAIN: dict[str, type[Step]] = {
 }
 """Those whose table is read as it stands."""
 VERBS = ("send", "wait_for", "expect", "never", "silence_for_ms", "hold", *PLAIN)
-
-
-def problem_of_condition(condition: Condition, network: ScenarioNetwork) -> str:
-    """Whether its robot is there."""
-    slot = getattr(condition, "slot", None)
-    return "" if slot is None else absent(slot, network)
 
 
 def absent(slot: int, network: ScenarioNetwork) -> str:
