@@ -1,4 +1,4 @@
-"""Ranges of the random part of a campaign, as its file writes them.
+"""Ranges as people write them: seeds (0-49), and those of the random part of a campaign's file.
 
 { from = 0.001, to = 0.02 }            all values in between are equally likely
 { from = 1e-6, to = 1e-3, scale = "log" }      equal ratios are

@@ -1,4 +1,4 @@
-"""`mirotwin fw profile`: where the processor spends its time."""
+"""`mirotwin fw profile` and `fw coverage`: where the processor spends its time, and which lines ran."""
 
 from __future__ import annotations
 

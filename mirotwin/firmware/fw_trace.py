@@ -1,4 +1,4 @@
-"""`mirotwin fw trace`: every step of the processor as a line."""
+"""`mirotwin fw trace` and `fw vcd`: every step of the processor as a line, and every wire for GTKWave and sigrok."""
 
 from __future__ import annotations
 

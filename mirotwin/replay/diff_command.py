@@ -26,7 +26,7 @@ from mirotwin.replay.exact_difference import (
     source_differences,
 )
 from mirotwin.replay.firmwares import LinesFrom, annotated_of, load_images
-from mirotwin.rerun.recorded import image_if_any
+from mirotwin.rerun.job import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import ALL, NAME, QUIET, Engine, choose_engine

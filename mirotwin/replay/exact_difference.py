@@ -19,7 +19,7 @@ from mirotwin.recording.recorder import RunSource
 from mirotwin.replay.annotated_image import AnnotatedImage
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
-from mirotwin.rerun.recorded import repeating, world_of
+from mirotwin.rerun.job import repeating, world_of
 from mirotwin.shell.options import plain_parameters
 
 

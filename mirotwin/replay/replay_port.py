@@ -27,8 +27,7 @@ from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json
 from mirotwin.report.page.port_page import beside_twin
-from mirotwin.rerun.job import Job
-from mirotwin.rerun.script import sent_in
+from mirotwin.rerun.job import Job, sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.outputs import RECORDING, OutputFolder
 from mirotwin.shell.program import DIVERGENCE, DONE, complain

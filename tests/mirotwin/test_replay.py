@@ -14,7 +14,7 @@ from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.frame_list import frame_lines
 from mirotwin.recording.compare import differences
-from mirotwin.rerun.script import robots_of_stream, scenario_of_stream, script_of, script_of_stream
+from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
 *BEFORE, PERIOD = periods(4, [(0, 0), (1, 2)])

@@ -17,7 +17,7 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.recording import reader
-from mirotwin.rerun.script import script_of
+from mirotwin.rerun.job import script_of
 from tests import children
 
 ROOT = Path(__file__).parents[3]

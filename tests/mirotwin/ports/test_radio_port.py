@@ -11,7 +11,7 @@ from miro_sim.scenario.file import source_text
 from miro_sim.world.world import World
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.serve_command import live_scenario
-from mirotwin.rerun.script import script_of
+from mirotwin.rerun.job import script_of
 from tests.mirotwin.ports.rig import own_image, question
 
 

@@ -9,7 +9,7 @@ from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.serve_command import live_scenario
 from mirotwin.ports.session import Session
 from mirotwin.rerun import runner
-from mirotwin.rerun.script import script_of
+from mirotwin.rerun.job import script_of
 from tests.mirotwin.ports.rig import NO_SELECTOR, fake_pace, own_image, question
 
 
