@@ -20,7 +20,7 @@ from pathlib import Path
 
 from miro_protocol.transmission import Transmission
 from mirotwin.recording import reader
-from mirotwin.rerun.script import script_of
+from mirotwin.rerun.job import script_of
 from tests import children
 from tests.mirotwin.desk.rig import as_hardware, stream_text
 from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
