@@ -31,6 +31,7 @@ cdef class Camera:
     cdef int y[60]
     cdef int cos[60]
     cdef int sin[60]
+    cdef int spread_um[60]
     cdef int least_x[10]
     cdef int most_x[10]
     cdef int least_y[10]
@@ -48,7 +49,8 @@ cdef class Camera:
     cdef int seer[10]
     cdef int count
 
-    @cython.locals(body=int, at=int, place=int, share=double, after_s=double, way_m=double, sine=double, cosine=double)
+    @cython.locals(body=int, at=int, place=int, share=double, aside='long long', after_s=double, way_m=double, sine=double,
+                   cosine=double)
     cpdef robot(self, int team, int identity, double x_m, double y_m, double theta_rad, double v_m_s=*, double w_rad_s=*)
     @cython.locals(first=int, end=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, unsigned char[::1] out)

@@ -11,8 +11,9 @@ Of several sides the highest is seen; where robots stand in
 each other, the first one is. All in um and integers. `fall` is taken at the middle of the pixel.
 
 A pixel whose samples are sure to see one paint is not sampled: if its middle sees that paint, and would still do so if
-all edges were nearer by `Rays.spread_um`. So any pixel gives the same bits in any window. One test does for all
-instants of the exposure if its edges are nearer by as much more as the robot moves between them (`margin_um`).
+all edges were nearer by what a pixel is wide along the robot's axes (`spread_um`). So any pixel gives the same bits in
+any window. One test does for all instants of the exposure if its edges are nearer by as much more as the robot moves
+between them (`margin_um`).
 """
 
 from __future__ import annotations
@@ -57,7 +58,18 @@ class Camera:
     NOT_STATE = (
         *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
         *("field_sets", "side", "black", "team_u", "team_v", "identity_u", "identity_v", "patch_um"),
-        *("robots", "team_paint", "identity_paint", "x", "y", "cos", "sin", "near", "near_count"),
+        *(
+            "robots",
+            "team_paint",
+            "identity_paint",
+            "x",
+            "y",
+            "cos",
+            "sin",
+            "spread_um",
+            "near",
+            "near_count",
+        ),
         *("moving", "code", "seen", "height_um", "least_x", "most_x", "least_y", "most_y", "margin_um"),
         *("still", "count", "corner_u", "corner_v", "top_x", "top_y", "cornered", "fall_u", "fall_v", "seer"),
     )
@@ -87,6 +99,7 @@ class Camera:
         self.y = [0] * 60
         self.cos = [0] * 60
         self.sin = [0] * 60
+        self.spread_um = [0] * 60
         self.near = [0] * 10
         self.near_count = 0
         self.code = [0] * 60
@@ -158,6 +171,8 @@ class Camera:
             sine, cosine = sincos(theta_rad + w_rad_s * after_s)
             self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
             self.sin[place] = math.floor(sine * 32768.0 + 0.5)
+            aside = self.rays.aside_um * (abs(self.cos[place]) + abs(self.sin[place])) >> 15
+            self.spread_um[place] = min(self.rays.spread_um, aside + 2)  # of a pixel along the robot's axes
         self._bound(body)
         self.robots = body + 1
 
@@ -178,7 +193,7 @@ class Camera:
         far = _CORNER_UM + self.rays.spread_um
         self.least_x[body], self.most_x[body] = self.x[middle] - way_x - far, self.x[middle] + way_x + far
         self.least_y[body], self.most_y[body] = self.y[middle] - way_y - far, self.y[middle] + way_y + far
-        margin = self.rays.spread_um + drift + 4
+        margin = self.spread_um[middle] + drift + 4
         self.margin_um[body] = margin if margin <= _MOST_MARGIN_UM else 0
         self.still[body] = drift == 0
 
@@ -248,7 +263,7 @@ class Camera:
             for at in range(self.sets):
                 code = common
                 if common == _UNSURE and not self.still[body]:
-                    code = self._code(body, at, pixel, self.rays.spread_um)
+                    code = self._code(body, at, pixel, self.spread_um[body * _SETS + at])
                 self.code[index * _SETS + at] = code
                 if code != _OUT:
                     seen = True

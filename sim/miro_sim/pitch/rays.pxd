@@ -12,7 +12,7 @@ cpdef long long between(long long a, long long b, long long c, long long d, int 
 @cython.final
 cdef class Rays:
     cdef int[::1] slope_x, slope_y, middle_x, middle_y, fall_x, fall_y
-    cdef readonly long long x_um, y_um, height_um, spread_um, longest_fall_um
+    cdef readonly long long x_um, y_um, height_um, spread_um, aside_um, longest_fall_um
 
     @cython.locals(x='long long', y='long long', exact_x=double, exact_y=double, i=int, j=int,
                    corner=int)

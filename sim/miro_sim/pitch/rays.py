@@ -30,12 +30,12 @@ class Rays:
     """The rays of one camera. Constant. All lengths in um, in the paper's axes.
 
     `spread_um`: no sample of a pixel is further than this from the mean of its corners, on the floor and at the top,
-    rounding included. `longest_fall_um`: of all rays, from the top to the floor.
+    rounding included; along x and along y than `aside_um`. `longest_fall_um`: of all rays, from the top to the floor.
     """
 
     NOT_STATE = (
         *("slope_x", "slope_y", "middle_x", "middle_y", "fall_x", "fall_y"),
-        *("x_um", "y_um", "height_um", "spread_um", "longest_fall_um"),
+        *("x_um", "y_um", "height_um", "spread_um", "aside_um", "longest_fall_um"),
     )
 
     def __init__(self, parameters: CameraParameters) -> None:
@@ -52,6 +52,7 @@ class Rays:
         self.fall_y = array("i", bytes(4 * 76800))
         self._cast(lens)
         self._gather()
+        self.aside_um = 0
         self.spread_um = self._spread()
         self.longest_fall_um = self._longest_fall()
 
@@ -101,7 +102,7 @@ class Rays:
                 self.middle_y[pixel] = (y + 2) >> 2
 
     def _spread(self) -> int:
-        """The longest way from a pixel's middle to one of its corners, both on the floor."""
+        """The longest way from a pixel's middle to one of its corners, both on the floor; `aside_um` along an axis."""
         widest = 0
         for j in range(_HEIGHT):
             for i in range(_WIDTH):
@@ -112,8 +113,9 @@ class Rays:
                     y = self.top_y(at) + (_TOP_UM * self.slope_y[at] >> 22)
                     x -= self.middle_x[pixel] + self.fall_x[pixel]
                     y -= self.middle_y[pixel] + self.fall_y[pixel]
-                    if x * x + y * y > widest:
-                        widest = x * x + y * y
+                    self.aside_um = max(self.aside_um, abs(x), abs(y))
+                    widest = max(widest, x * x + y * y)
+        self.aside_um += 1 + _MARGIN_SPARE_UM
         return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
 
     def _longest_fall(self) -> int:
