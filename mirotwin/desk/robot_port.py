@@ -414,13 +414,10 @@ def _opened(url: str) -> Any:
     address = url
     if "://" not in url:
         more["exclusive"] = True
-    elif url.lower().startswith("rfc2217:"):
+    elif url.lower().startswith("rfc2217:"):  # ser2net says nothing of a DTR that is not there
         more["write_timeout"] = None  # the only one that pyserial has there
-        address += (
-            f"{'&' if '?' in url else '?'}ign_set_control"  # ser2net says nothing of a DTR that is not there
-        )
-    if url.lower().startswith("rfc2217:"):
-        realtime_priority()  # of the thread, too, that reads there
+        address += "&ign_set_control" if "?" in url else "?ign_set_control"
+        realtime_priority()  # of the thread that reads there, too
     try:
         return serial.serial_for_url(address, BAUD, timeout=0, **more)
     except (serial.SerialException, OSError, ValueError) as error:
