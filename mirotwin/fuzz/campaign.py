@@ -3,7 +3,7 @@
 This is one of the few places that know the wall clock.
 
     engine ──crashes──► triage: minimised, told apart, confirmed
-       └────queue────► coverage, checks in Python (a share of the time, the rest waits)
+       └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
 
 The engine works in processes of its own, so it goes on while one of its inputs is looked at.
 """
@@ -34,6 +34,13 @@ AFTER_S = 20.0
 """How long inputs are still looked at once the time is over."""
 
 
+class Covering(msgspec.Struct, frozen=True):
+    """A function that is to be reached, and where it begins."""
+
+    name: str
+    address: int
+
+
 class Status(msgspec.Struct, frozen=True):
     """How a campaign stands. Rates over wall time; `waiting`: inputs that were not looked at yet."""
 
@@ -49,7 +56,7 @@ class Status(msgspec.Struct, frozen=True):
 class Campaign:
     """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
-    `judged`: inputs that those have looked at.
+    `judged`: inputs that those have looked at; `reached_by`: the stream that reached what was to be reached.
     """
 
     def __init__(
@@ -58,6 +65,7 @@ class Campaign:
         triage: Triage,
         folder: CampaignFolder,
         expected: Mapping[str, Any],
+        covering: Covering | None = None,
         tell: Callable[[Crash], None] = lambda crash: None,
     ) -> None:
         self.engine = engine
@@ -65,9 +73,11 @@ class Campaign:
         self.triage = triage
         self.folder = folder
         self.expected = expected
+        self.covering = covering
         self.tell = tell
         self.judged = 0
         self.inputs = 0
+        self.reached_by: Path | None = None
         self._crashes: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._to_judge: deque[bytes] = deque()
@@ -84,17 +94,17 @@ class Campaign:
             for data in data_of:
                 self._seen.add(data)
                 inputs.append(data)
-        self._looked = LOOKED - len(self._queue)  # these are quick
+        self._looked = LOOKED - len(self._queue)  # these are quick, and --covering may need no more
 
     # ---- the loop ------------------------------------------------------------------------------------------
 
     def run(self, time_s: float | None, show: Callable[[Status], None]) -> None:
-        """Until the time is over (None: never). The engine is stopped however it ends."""
+        """Until the time is over (None: never), or what was to be reached is. The engine is stopped however it ends."""
         self._began_s = time.monotonic()
         self.triage.tell = lambda: self._show_sometimes(show)
         try:
             self.engine.start()
-            while time_s is None or self.run_s < time_s:
+            while self.reached_by is None and (time_s is None or self.run_s < time_s):
                 began_s = time.monotonic()
                 self._collect()
                 self._work(began_s + SLICE_S, time_s)
@@ -158,7 +168,7 @@ class Campaign:
 
     def _work(self, end_s: float, time_s: float | None, at_ease: bool = False) -> None:
         """Crashes, and coverage between two of them; then checks in Python, a third of the time."""
-        while True:
+        while self.reached_by is None or at_ease:
             if time.monotonic() >= end_s or (time_s is not None and self.run_s >= time_s):
                 return
             if self._crashes and (not self._queue or self._looked >= LOOKED):
@@ -184,9 +194,12 @@ class Campaign:
         """An input that found something new: what it executes."""
         self.inputs += 1
         self.folder.write("corpus", f"input-{self.inputs:05d}", data)
-        self.triage.reached.run(data)
+        counts = self.triage.reached.run(data)
         if self.expected:
             self._to_judge.append(data)
+        if self.covering is not None and self.reached_by is None and self.covering.address in counts:
+            stream = self.triage.oracle.judged(data, {}).stream()
+            self.reached_by = self.triage.leave("covering", self.covering.name, data, stream, counts)
 
     def _judge(self, data: bytes) -> None:
         """What the checks in Python say of it. Raises PluginError where one raises."""

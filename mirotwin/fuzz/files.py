@@ -6,6 +6,7 @@ OUT/
   crashes/NAME.txt         the same as readable lines
   crashes/NAME.info        what it executed, as an lcov tracefile
   unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
+  covering/SYMBOL.*        the input that reached a function (--covering)
   corpus/                  inputs that found something new
   seeds/, dictionary       what it began with
   engine/                  the engine's own
@@ -26,7 +27,7 @@ from miro_exact.bad_input import BadInput
 from miro_protocol import files
 from mirotwin.shell.outputs import OutputError, told_when_full
 
-FOLDERS = ("crashes", "unconfirmed", "corpus", "seeds", "engine")
+FOLDERS = ("crashes", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
 SCRATCH = ("corpus", "seeds", "engine")
 """Folders of these that are taken away where a campaign breaks off with an error."""

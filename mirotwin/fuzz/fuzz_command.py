@@ -9,14 +9,14 @@ from typing import Any, Literal, cast
 
 import click
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.coverage_files import sources_of
-from mirotwin.fuzz.campaign import AFTER_S, Campaign
+from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
@@ -54,7 +54,7 @@ def fuzz(options: FuzzOptions) -> int:
 
     Ctrl-C ends a campaign early, with all that was found.
 
-    Exit code 1: something was found and confirmed.
+    Exit code 1: something was found and confirmed, or --covering was not reached.
     """
     active = cast(Literal["compiled", "python"], choose_engine(options.engine))
     firmware = load_bare_firmware(options.image) if options.bare else load_firmware(options.image)
@@ -81,6 +81,7 @@ def _campaign(
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
     check_outside(folder.path, options.corpus)
+    covering = _covering(options.covering, image)
     target = spec.make()
     oracle = oracle_of(target, check)
     inputs = target.seeds()
@@ -91,11 +92,14 @@ def _campaign(
             complain(note)
     _check_at_rest(target, image)
     reached = InputCoverage(image, spec.make)
+    if covering is not None and covering.address in reached.total:
+        what = f"{covering.name} runs while the firmware starts, before any input"
+        raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
     triage = Triage(reached, oracle, folder, sources_of(image, options.sources), options.minimise_s)
     with folder.filled():
         sorted_inputs = _sorted_out(target, inputs)
-        campaign = _begun(spec, options, triage, folder, expected, sorted_inputs)
+        campaign = _begun(spec, options, triage, folder, expected, covering, sorted_inputs)
         time_s = options.time_s if sorted_inputs[1] else 0.0
         return _run(
             campaign,
@@ -113,6 +117,7 @@ def _begun(
     triage: Triage,
     folder: CampaignFolder,
     expected: dict[str, Any],
+    covering: Covering | None,
     inputs: tuple[list[bytes], list[bytes], list[bytes]],
 ) -> Campaign:
     """A campaign that has looked at the inputs that fail, pass and execute no branch."""
@@ -124,7 +129,7 @@ def _begun(
             complain(note)
     else:
         complain("every input fails or executes no branch: there is nothing to go on from")
-    campaign = Campaign(engine, triage, folder, expected, _teller(options.quiet))
+    campaign = Campaign(engine, triage, folder, expected, covering, _teller(options.quiet))
     campaign.begin_with(failing, (*passing, *silent))
     return campaign
 
@@ -175,7 +180,7 @@ def _run(
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
     ended = CampaignEnd(left=left, complete=stopped is None, check=check_in_file)
-    code = report(campaign, image, out, ended, options.quiet)
+    code = report(campaign, image, out, options.covering, ended, options.quiet)
     if stopped is not None:
         raise stopped
     return code
@@ -194,6 +199,21 @@ def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
     if not checks:
         return {}
     return dict(changed(silent_scenario(()), "fuzz", as_settings(checks), expectations_of).expect)
+
+
+def _covering(symbol: str | None, image: Image) -> Covering | None:
+    """Where the function begins. Raises BadInput for one that is not there."""
+    if symbol is None:
+        return None
+    found = image.symbols.find(symbol)
+    if found is None or found.space != "code":
+        if not image.symbols.names:
+            remedy = "put the .map or .cdb that the linker wrote beside the image"
+            raise BadInput(image.path, f"--covering {symbol}", "the image has no symbols", remedy)
+        functions = [name for name, one in image.symbols.names.items() if one.space == "code"]
+        remedy = did_you_mean(symbol, functions) or "`mirotwin fw disasm` lists the functions"
+        raise BadInput(image.path, f"--covering {symbol}", "there is no such function", remedy)
+    return Covering(symbol, found.address)
 
 
 def _check_at_rest(target: Target, image: Image) -> None:

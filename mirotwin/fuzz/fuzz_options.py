@@ -55,6 +55,10 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             apart="bare",
         ),
     ] = ()
+    covering: Annotated[
+        str | None,
+        Option(metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."),
+    ] = None
     robots: Annotated[str, ROBOTS.saying("Slots of the network.", apart="bare")] = "3"
     slot: Annotated[int, SLOT.saying("Slot of the robot.", apart="bare")] = 0
     seed: Annotated[int | None, SEED.saying("Seed of the engine. Default: from the system.")] = None

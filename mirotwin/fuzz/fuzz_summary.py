@@ -32,7 +32,9 @@ class CampaignEnd(msgspec.Struct, frozen=True):
     check: str | None = None
 
 
-def report(campaign: Campaign, image: Image, out: Path, ended: CampaignEnd, quiet: bool) -> int:
+def report(
+    campaign: Campaign, image: Image, out: Path, covering: str | None, ended: CampaignEnd, quiet: bool
+) -> int:
     """Writes the files of the campaign and shows the results; the exit code."""
     triage = campaign.triage
     tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
@@ -58,7 +60,8 @@ def report(campaign: Campaign, image: Image, out: Path, ended: CampaignEnd, quie
     _print_crashes(campaign, out, image, ended.check)
     if not quiet:
         show_line(f"written to {out}")
-    return EXPECTATION_FAILED if triage.confirmed else DONE
+    missed = covering is not None and _print_covering(campaign, covering, image)
+    return EXPECTATION_FAILED if triage.confirmed or missed else DONE
 
 
 def never_reached(tracefile: Tracefile) -> list[str]:
@@ -93,6 +96,17 @@ def _print_crash(crash: Crash, more: int, out: Path, image: Image, check: str | 
     show_line(f"    {debug_line(stream, foreign_path(image))}")
 
 
+def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:
+    """Says whether the function was reached; True if not."""
+    if campaign.reached_by is None:
+        inputs = counted(campaign.inputs, "input")
+        complain(f"--covering {symbol}: not reached by {inputs}; give it more --time, or a --corpus")
+        return True
+    show_line(f"--covering {symbol}: reached by {campaign.reached_by}")
+    show_line(f"    {replay_line(campaign.reached_by, foreign_path(image))}")
+    return False
+
+
 def _write_summary(
     campaign: Campaign, out: Path, tracefile: Tracefile, never: list[str], ended: CampaignEnd
 ) -> None:
@@ -111,6 +125,7 @@ def _write_summary(
         "lines": msgspec.to_builtins(lines),
         "branches": msgspec.to_builtins(branches),
         "functions_never_reached": never,
+        "reached_by": None if campaign.reached_by is None else str(campaign.reached_by),
         "crashes": [_as_json(crash, campaign) for crash in campaign.triage.found],
     }
     campaign.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")

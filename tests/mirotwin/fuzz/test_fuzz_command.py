@@ -62,6 +62,20 @@ def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_pat
     assert "no crashes" in out.splitlines()
 
 
+def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines, tmp_path):
+    code, out, _ = mirotwin("fuzz", "--time", "1s", "--covering", "motion_stop", "--out", tmp_path / "out")
+    assert code == 0
+    path = tmp_path / "out" / "covering" / "motion_stop.stream"
+    assert f"--covering motion_stop: reached by {path}" in out
+    assert mirotwin("replay", path, "-q")[0] == 0
+
+
+def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
+    code, _, err = mirotwin("fuzz", "--time", "0.3s", "--covering", "give_up", "--out", tmp_path / "out")
+    assert code == 1
+    assert "--covering give_up: not reached by " in err
+
+
 def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
     arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "0.3s")
     code, out, _ = mirotwin("fuzz", "--time", "0.3s", *arguments, "--out", tmp_path / "out")
@@ -135,11 +149,13 @@ def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
         (["--time", "0s"], "'0s' is no time at all; give more than zero"),
         (["--jobs", "0"], "--jobs"),
         (["--slot", "3"], "--slot 3 does not exist among 3 robots; give 0 to 2."),
+        (["--covering", "motion_of"], "there is no such function; did you mean "),
         (["--expect", "no_fualt"], "there is no such check; did you mean no_fault?"),
         (["--expect", "settles_within_s"], "within_s is missing"),
         (["--input", "words"], "--input"),
         (["nowhere.ihx"], "nowhere.ihx: there is no such file"),
         (["--corpus", "nowhere"], "nowhere: --corpus: there is no such folder"),
+        (["--covering", "main"], "main runs while the firmware starts, before any input"),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_line(mirotwin, engines, tmp_path, arguments, said):
@@ -197,6 +213,14 @@ def test_firmware_that_never_sleeps_is_fuzzed_with_a_word_about_it(mirotwin, eng
     code, _, err = mirotwin("fuzz", built.image, "--time", "0.3s", "--out", tmp_path / "out")
     assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms after its last character" in err
     assert code in (0, 1)
+
+
+def test_a_symbol_needs_symbols(mirotwin, engines, tmp_path):
+    bare = tmp_path / "bare.ihx"
+    bare.write_bytes(own_image().path.read_bytes())
+    code, _, err = mirotwin("fuzz", bare, "--covering", "main", "--out", tmp_path / "out")
+    assert code == 2
+    assert "the image has no symbols; put the .map or .cdb that the linker wrote beside the image" in err
 
 
 def test_an_image_without_symbols_can_be_fuzzed(mirotwin, engines, tmp_path):
