@@ -37,6 +37,7 @@ FIRMWARE = {
     "coverage": Lazy("mirotwin.firmware.fw_profile", "Shows which lines of the firmware ran."),
     "vcd": Lazy("mirotwin.firmware.fw_trace", "Writes the wires as a VCD file."),
     "header": Lazy("mirotwin.firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
+    "vectors": Lazy("mirotwin.firmware.fw_image", "Writes single-step test vectors of the processor."),
 }
 
 

@@ -12,6 +12,8 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("exact", "protocol", "robot_fw/miro_robot", "host", "sim")
 OBSERVERS = (
     "inspect",
+    "vectors.py",
+    "vector_draw.py",
     "image",
     "mirotwin",
     "engine.py",

@@ -1,19 +1,15 @@
-"""Random machine states for single-step vectors: `python -m tests.vectors.vector_draw --out DIR`, a file an opcode.
+"""Random machine states for single-step vectors.
 
-The same seed writes the same bytes; more vectors per opcode only add to them. The format and the execution are in
-`vectors.py`.
+The format and the execution are in `vectors.py`. The source of chance is a function given by the caller: `draw(n)`
+returns an integer from 0 to n - 1.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
-from itertools import count
-from pathlib import Path
 
-from miro_exact.rng import Stream
 from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE, disassemble
-from tests.vectors.vectors import REGISTERS, State, Vector, VectorRunner, encode, table_address
+from miro_robot.mcs51.vectors import REGISTERS, State, Vector, VectorRunner, table_address
 
 Draw = Callable[[int], int]
 
@@ -43,7 +39,7 @@ _SWITCHED_OFF = 0x03  # PCON: the core stands, and there is no end to compare
 class _Drawing:
     """One initial state in the making."""
 
-    def __init__(self, opcode, draw):
+    def __init__(self, opcode: int, draw: Draw) -> None:
         self.opcode = opcode
         self.row = ROW[opcode]
         self.operands = _OPERANDS[self.row]
@@ -53,7 +49,7 @@ class _Drawing:
         self.xram: dict[int, int] = {}
         self.pins: dict[int, int] = {}
 
-    def state(self):
+    def state(self) -> State:
         pc = self.draw(0x10000)
         self._core()
         for _ in range(_DECOYS):
@@ -72,7 +68,7 @@ class _Drawing:
         )
         return state if self.opcode not in _MOVC else self._with_table(state)
 
-    def _core(self):
+    def _core(self) -> None:
         for address in _ALWAYS:
             self.sfr[address] = self.draw(256) | _HIGH.get(address, 0)
         if self.opcode in _MOVX:
@@ -81,12 +77,12 @@ class _Drawing:
             self.sfr[_B] = 0
         self.sfr[_PSW] = self.sfr[_PSW] & 0xFE | self.sfr[_ACC].bit_count() & 1
 
-    def _byte(self, address):
+    def _byte(self, address: int) -> int:
         """A random byte of internal RAM; its value."""
         self.iram[address] = self.draw(256)
         return self.iram[address]
 
-    def _operand_bytes(self):
+    def _operand_bytes(self) -> list[int]:
         """What follows the opcode."""
         length = LENGTH[self.opcode]
         if self.row == 0x85:
@@ -100,7 +96,7 @@ class _Drawing:
         found += [self.draw(256) for _ in range(length - 1 - len(found))]
         return found
 
-    def _direct(self):
+    def _direct(self) -> int:
         """A direct address: RAM or register in equal parts."""
         if self.draw(2):
             return self._special(REGISTERS[self.draw(len(REGISTERS))])
@@ -108,7 +104,7 @@ class _Drawing:
         self._byte(address)
         return address
 
-    def _bit(self):
+    def _bit(self) -> int:
         if self.draw(2):
             bit = self.draw(0x80)
             self._byte(0x20 + (bit >> 3))
@@ -116,7 +112,7 @@ class _Drawing:
         addressable = [address for address in REGISTERS if address & 7 == 0]
         return self._special(addressable[self.draw(len(addressable))]) | self.draw(8)
 
-    def _special(self, address):
+    def _special(self, address: int) -> int:
         if address in _PORTS:
             self.pins[address] = self.draw(256) | _HIGH[address]
         elif address not in self.sfr:
@@ -128,7 +124,7 @@ class _Drawing:
             self.sfr[address] = value
         return address
 
-    def _stack(self):
+    def _stack(self) -> None:
         sp = self.sfr[_SP]
         if self.row in _CALLS:
             self._byte((sp + 1) & 0xFF)
@@ -141,7 +137,7 @@ class _Drawing:
         elif self.row == _POP:
             self._byte(sp)
 
-    def _registers(self):
+    def _registers(self) -> None:
         """Rn, or Ri and what it points at."""
         bank = self.sfr[_PSW] & 0x18
         if "Rn" in self.operands:
@@ -152,7 +148,7 @@ class _Drawing:
             if self.opcode not in _MOVX and address != pointer:
                 self._byte(address)
 
-    def _external(self):
+    def _external(self) -> None:
         if self.opcode in _MOVX:
             if self.opcode in (0xE0, 0xF0):
                 address = self.sfr[_DPH] << 8 | self.sfr[_DPL]
@@ -161,16 +157,16 @@ class _Drawing:
                 address = self.sfr[_P2] << 8 | self.iram[pointer]
             self.xram[address] = self.draw(256)
 
-    def _with_table(self, state):
+    def _with_table(self, state: State) -> State:
         code = dict(state.code)
         code.setdefault(table_address(state), self.draw(256))
         return State(state.pc, state.sfr, state.iram, state.xram, state.pins, sorted(code.items()))
 
 
-def draw_vectors(opcode, count, draw):
+def draw_vectors(opcode: int, count: int, draw: Draw) -> list[Vector]:
     """`count` vectors of one opcode; their results are those of our CPU."""
     bench = VectorRunner()
-    found = []
+    found: list[Vector] = []
     while len(found) < count:
         initial = _Drawing(opcode, draw).state()
         final, cycles = bench.run(initial)
@@ -179,14 +175,14 @@ def draw_vectors(opcode, count, draw):
     return found
 
 
-def _is_defined(final):
+def _is_defined(final: State) -> bool:
     """Not for states that end the clock, or that the next S5P2 changes: IEx set by software in level mode."""
     sfr = dict(final.sfr)
     flags = sfr.get(_TCON, 0)
     return not sfr.get(_PCON, 0) & _SWITCHED_OFF and not (flags >> 1) & ~flags & 0x05
 
 
-def _name(state):
+def _name(state: State) -> str:
     """The instruction's bytes and its text."""
     code = bytearray(0x10000)
     for address, value in state.code:
@@ -194,26 +190,3 @@ def _name(state):
     size = LENGTH[code[state.pc]]
     raw = " ".join(f"{code[(state.pc + offset) & 0xFFFF]:02x}" for offset in range(size))
     return f"{raw}  {disassemble(bytes(code), state.pc)}"
-
-
-def drawing(stream):
-    """Successive draws from a stream: `draw(n)` is an integer from 0 to n - 1."""
-    drawn = count()
-    return lambda n: stream.u32(next(drawn)) * n >> 32
-
-
-def write(folder, per_opcode=8, seed=1, opcodes=range(256)):
-    """Files `00.json` and so on into `folder`, which is made."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for opcode in opcodes:
-        draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
-        (folder / f"{opcode:02x}.json").write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--per-opcode", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
-    write(asked.out, asked.per_opcode, asked.seed)

@@ -51,13 +51,13 @@ class Vector(msgspec.Struct, frozen=True):
     cycles: list[list[Access]]
 
 
-def encode(vectors):
+def encode(vectors: list[Vector]) -> bytes:
     """A file: a JSON array, one vector a line."""
     lines = [msgspec.json.encode(vector) for vector in vectors]
     return b"[\n" + b",\n".join(lines) + b"\n]\n"
 
 
-def decode(content):
+def decode(content: bytes) -> list[Vector]:
     """The vectors in a file. Raises msgspec.ValidationError for what is not one."""
     return msgspec.json.decode(content, type=list[Vector])
 
@@ -67,21 +67,21 @@ class _VectorBus(Bus):
 
     NOT_STATE = ("accesses", "latches")
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.memory: dict[int, int] = {}
         self.accesses: list[Access] = []
         self.latches: list[Access] = []
 
-    def movx_read(self, address, tick):
+    def movx_read(self, address: int, tick: int) -> int:
         value = self.memory.get(address, 0)
         self.accesses.append((address, value, READ))
         return value
 
-    def movx_write(self, address, value, tick):
+    def movx_write(self, address: int, value: int, tick: int) -> None:
         self.memory[address] = value
         self.accesses.append((address, value, WRITE))
 
-    def port_written(self, port, latch, tick):
+    def port_written(self, port: int, latch: int, tick: int) -> None:
         self.latches.append((_PORTS[port], latch, LATCH))
 
 
@@ -90,11 +90,11 @@ class VectorRunner:
 
     NOT_STATE = ("bus", "cpu")
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.bus = _VectorBus()
         self.cpu = Cpu(self.bus)
 
-    def run(self, initial):
+    def run(self, initial: State) -> tuple[State, list[list[Access]]]:
         """What the instruction at `initial.pc` leaves behind, and its bus cycles.
 
         Raises ValueError if it changed what `initial` does not list.
@@ -120,7 +120,7 @@ class VectorRunner:
         )
         return final, self._cycles(initial)
 
-    def prepare(self, state):
+    def prepare(self, state: State) -> None:
         """Registers are written by instructions, ACC last; then PC is set."""
         cpu = self.cpu
         cpu.reset()
@@ -138,19 +138,19 @@ class VectorRunner:
             cpu.write_code(address, value)
         cpu.pc = state.pc
 
-    def _execute(self, instruction):
+    def _execute(self, instruction: bytes) -> None:
         for address, value in enumerate(instruction):
             self.cpu.write_code(address, value)
         self.cpu.pc = 0
         self.cpu.step()
 
-    def _registers(self):
+    def _registers(self) -> dict[int, int]:
         return {address: self.cpu.sfr(address) for address in REGISTERS}
 
-    def _iram(self):
+    def _iram(self) -> list[int]:
         return [self.cpu.peek_iram(address) for address in range(256)]
 
-    def _cycles(self, initial):
+    def _cycles(self, initial: State) -> list[list[Access]]:
         """Fetches by rule, then external memory in the second cycle, then latches in the last."""
         cycles = fetches(initial)
         if self.bus.accesses:
@@ -159,7 +159,7 @@ class VectorRunner:
         return cycles
 
 
-def fetches(state):
+def fetches(state: State) -> list[list[Access]]:
     """The program fetches of each machine cycle: two, at S1 and S4; those not needed are repeated at the byte
     after the instruction and dropped. A MOVX has none in its second cycle; a MOVC reads its table first in
     its second.
@@ -180,7 +180,7 @@ def fetches(state):
     return [accesses[first : first + _SLOTS] for first in range(0, slots, _SLOTS)]
 
 
-def table_address(state):
+def table_address(state: State) -> int:
     """Where a MOVC reads."""
     registers = {**RESET, **dict(state.sfr)}
     opcode = dict(state.code)[state.pc]
