@@ -5,6 +5,7 @@ from miro_robot.lm629.buffers cimport TrajectoryBuffer, fit_15
 from miro_robot.lm629.trajectory cimport ProfileGenerator
 
 
+cdef long long _NEVER, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
 cdef int _COMMAND_ERROR, _ACCELERATION_LOADED, _OUTPUT_8_BIT
@@ -46,3 +47,6 @@ cdef class Lm629(MotorAxis):
     @cython.locals(latest_tick=cython.longlong, late=cython.bint)
     cpdef int check_times(self, long long earliest_tick) except -1
     cpdef int status_at(self, long long tick) noexcept
+    @cython.final
+    @cython.locals(left=cython.longlong, length=cython.int)
+    cdef long long _due_tick(self) noexcept

@@ -35,6 +35,7 @@ from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 
 __all__ = ["PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 
+_NEVER, _SAMPLE_TICKS, _PWM_TICKS = NEVER_TICK, SAMPLE_TICKS, PWM_TICKS
 _HELD, _RESETTING, _RUNNING = 0, 1, 2
 _MOTOR_OFF = signals.MOTOR_OFF
 _ON_TARGET = signals.ON_TARGET
@@ -294,10 +295,10 @@ class Lm629(MotorAxis):
         self.writes_while_busy = self.port.writes_while_busy
         if self.reset_level == 0 and self.mode != _HELD:
             raise ValueError("the reset pin is low, but the chip is not in reset")
-        if self.mode != _RUNNING and (self.sample_tick != NEVER_TICK or self.pwm or self.pwm_magnitude):
+        if self.mode != _RUNNING and (self.sample_tick != _NEVER or self.pwm or self.pwm_magnitude):
             raise ValueError("the chip is in reset, but has a next sample or drives a motor")
         waiting = self.port.words_left if self.port.incoming else 0
-        if waiting > self._words_due():
+        if waiting and waiting > self._words_due():
             raise ValueError(
                 f"words_left is {waiting}, but command {self.port.command:02X}h takes {self._words_due()} more"
             )
@@ -316,7 +317,7 @@ class Lm629(MotorAxis):
 
     def check_times(self, earliest_tick: int) -> None:
         """Raises ValueError unless a restored chip goes on at `earliest_tick` or soon after."""
-        latest_tick = earliest_tick + 2 * SAMPLE_TICKS
+        latest_tick = earliest_tick + 2 * _SAMPLE_TICKS
         if self.next_tick < earliest_tick or (self.mode == _RUNNING and self.next_tick > latest_tick):
             raise ValueError(f"next_tick is {self.next_tick}, not from {earliest_tick} to {latest_tick}")
         if self.mode == _RUNNING and not earliest_tick <= self.sample_tick <= latest_tick:
@@ -331,12 +332,12 @@ class Lm629(MotorAxis):
 
         -1 when the period is none of the four before the next sample, or there is a pulse of no length.
         """
-        periods_left, off = divmod(self.sample_tick - self.period_tick, PWM_TICKS)
+        left = self.sample_tick - self.period_tick
         if self.pwm_magnitude == 0:
             return -1 if self.pwm else self.sample_tick
-        if off or not 1 <= periods_left <= SAMPLE_TICKS // PWM_TICKS:
+        if left % _PWM_TICKS or not _PWM_TICKS <= left <= _SAMPLE_TICKS:
             return -1
         length = 16 * self.pwm_magnitude
         if self.pulse_late:
-            return self.period_tick + (PWM_TICKS if self.pwm else PWM_TICKS - length)
-        return self.period_tick + (length if self.pwm else PWM_TICKS)
+            return self.period_tick + (_PWM_TICKS if self.pwm else _PWM_TICKS - length)
+        return self.period_tick + (length if self.pwm else _PWM_TICKS)
