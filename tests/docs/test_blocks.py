@@ -83,7 +83,6 @@ NOT_RUN = {
     "robot_fw/miro_robot/inspect/README.md": 2,
     "mirotwin/ports/README.md": 3,
     "mirotwin/campaign/README.md": 1,
-    "mirotwin/report/foxglove/README.md": 1,
     "mirotwin/fuzz/README.md": 2,
     "mirotwin/fuzz/afl/README.md": 1,
     "mirotwin/testing/README.md": 1,
