@@ -36,7 +36,7 @@ def shown_frame(fields):
     kind, seq = number["type"], number["seq"]
     if kind == 2:
         raised = [flag for flag in Flags if flag_is_set(fields[f"miro.telemetry.{flag.name.lower()}"])]
-        rest = {name: number[f"telemetry.{name}"] for name in TelemetryFrame.__slots__[3:]}
+        rest = {name: number[f"telemetry.{name}"] for name in TelemetryFrame.__struct_fields__[3:]}
         return TelemetryFrame(seq, number["telemetry.slot"], sum(raised), **rest)
     if kind == 1:
         data = SERVICE_DATA[number["service.opcode"]]
