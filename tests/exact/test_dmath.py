@@ -84,7 +84,7 @@ def test_log_is_within_one_ulp_also_near_one():
     assert worst_ulp(dmath.log, mpmath.log, cases) < 0.9
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(ANGLES)
 def test_sine_is_odd_cosine_even_and_sincos_is_both(x):
     assert dmath.sin(-x) == -dmath.sin(x)
@@ -92,7 +92,7 @@ def test_sine_is_odd_cosine_even_and_sincos_is_both(x):
     assert dmath.sincos(x) == (dmath.sin(x), dmath.cos(x))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(ANGLES)
 def test_wrap_pi_lands_in_the_half_open_turn_and_keeps_the_direction(x):
     wrapped = dmath.wrap_pi(x)
@@ -108,7 +108,7 @@ def test_wrap_pi_sends_minus_pi_to_plus_pi_and_leaves_plus_pi():
     assert abs(abs(dmath.wrap_pi(3 * math.pi)) - math.pi) < 1e-15
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(FINITE, FINITE)
 def test_atan2_is_odd_in_y_and_points_along_the_axes(y, x):
     assert dmath.atan2(-y, x) == -dmath.atan2(y, x)

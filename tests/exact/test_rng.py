@@ -45,7 +45,6 @@ def test_philox_gives_the_published_words(counter, key, expected):
     assert naive.philox4x32_10(counter, key) == expected
 
 
-@settings(deadline=None)
 @given(seeds, st.text(max_size=20), indices)
 def test_every_kind_of_draw_equals_its_naive_twin(seed, name, index):
     stream = Stream(seed, name)
@@ -53,7 +52,7 @@ def test_every_kind_of_draw_equals_its_naive_twin(seed, name, index):
         assert getattr(stream, draw)(index) == getattr(naive, draw)(seed, name, index)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(seeds, st.text(max_size=20), st.lists(st.tuples(st.sampled_from(DRAWS), indices), max_size=30))
 def test_compiled_and_plain_source_give_the_same_bits_in_any_order(plain, seed, name, wanted):
     ours, theirs = Stream(seed, name), plain.Stream(seed, name)
@@ -126,7 +125,6 @@ def test_the_half_normal_table_is_right_to_the_last_bit():
     assert HALF_NORMAL[-2] < 2**63
 
 
-@settings(deadline=None)
 @given(seeds, indices)
 def test_gauss_is_close_to_exact_inversion_of_the_same_draw(seed, index):
     exact = naive.exact_gauss(seed, "g", index)

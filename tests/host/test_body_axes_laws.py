@@ -115,7 +115,7 @@ def test_dynamic_feedback_equals_the_published_formula_above_the_guard(path, t, 
     assert (answer.v_m_s, answer.w_rad_s) == pytest.approx((v_next, float(w)), rel=1e-11, abs=1e-11)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.sampled_from(PATHS), TIMES, POSTURES, SPEEDS, TURNS)
 def test_the_surfaces_equal_their_definition(path, t, posture, v, w):
     r, g = path.at(t), BodyFrameParameters()
@@ -128,7 +128,6 @@ def test_the_surfaces_equal_their_definition(path, t, posture, v, w):
     assert (got.s1, got.s2) == pytest.approx([float(s) for s in expected], rel=1e-9, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(PATHS), IN_THE_RAMP | st.floats(0.6, 5.8), POSTURES, SPEEDS, TURNS)
 def test_the_surfaces_fall_as_they_are_told_while_no_guard_and_no_limit_is_met(path, t, posture, v, w):
     """s_i' = -Q_i s_i - P_i sat(s_i / layer_i), by a central difference along the motion."""
@@ -155,7 +154,6 @@ def test_the_surfaces_fall_as_they_are_told_while_no_guard_and_no_limit_is_met(p
     assert s2_rate == pytest.approx(-g.q2_per_s * c.s2 - g.p2_rad_s2 * sat2, abs=1e-4 * scale * scale)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(ALL), TIMES, POSTURES, st.floats(0.1, 0.9), TURNS)
 def test_the_mirrored_robot_gets_the_mirrored_answer(parameters, t, posture, v, w):
     r = StraightLine().at(t)

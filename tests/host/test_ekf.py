@@ -137,7 +137,7 @@ NOISES = st.lists(
 )
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(NOISES, st.sampled_from([P, EkfParameters(position_noise_m=1e-6, heading_noise_rad=1e-6)]))
 def test_the_covariance_stays_symmetric_and_positive(noises, parameters):
     one = parameters.estimator()

@@ -187,7 +187,7 @@ ANSWERS = st.builds(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.none() | ANSWERS, min_size=40, max_size=40))
 def test_whatever_an_answer_says_the_filter_goes_on(answers):
     loop = Loop(EkfTelemetryParameters(warp_m=0.005).estimator(), Robot(), blurred, answers=True)

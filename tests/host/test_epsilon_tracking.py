@@ -50,7 +50,7 @@ def beside(path, x_m, y_m, theta_rad):
 
 
 @pytest.mark.parametrize("gains", SETS, ids=NAMES)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(PATHS, TIMES, POSTURES)
 def test_velocities_equal_those_of_the_formula_in_complex_numbers(gains, path, t, posture):
     r, law = path.at(t), EpsilonTracking(gains)
@@ -83,7 +83,6 @@ def test_the_transformed_unicycle_is_the_nonholonomic_integrator(posture, v, w):
     assert rates == pytest.approx([u1, u2, here.x1 * u2 - here.x2 * u1], abs=1e-6)
 
 
-@settings(deadline=None)
 @given(PATHS, st.floats(0.6, 5.8), POSTURES)
 def test_the_invariant_sigma_falls_as_the_docstring_says(path, t, posture):
     g = msgspec.structs.replace(THEORY, max_v_m_s=1e6, max_w_rad_s=1e6)
@@ -229,7 +228,6 @@ def test_a_parameter_out_of_range_is_refused_by_name(key, value):
         msgspec.convert({"law": "epsilon_tracking", key: value}, EpsilonTrackingParameters)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(SETS), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-3.14, 3.14))
 def test_far_away_the_answer_is_finite_and_the_command_within_the_limits(gains, x, y, theta):
     command = Pilot(Arc(), gains.law()).update(Posture(x, y, theta), 1.0)

@@ -62,7 +62,7 @@ def agree(one, state, covariance, within_m, within_rad, within_spreads):
     assert (np.abs(matrix(one) - covariance) <= within_spreads * np.outer(spread, spread)).all()
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(RIM, RIM, st.floats(-3.1, 3.1), st.tuples(ASIDE, ASIDE), st.sampled_from([5, SIZE]))
 def test_one_cycle_agrees_with_the_textbook(left, right, theta, aside, size):
     """The prediction within 0.1 mm, 1e-6 rad and 2 % of the spreads (`motion` says why), the update within 1e-11."""
@@ -101,7 +101,7 @@ def test_one_cycle_agrees_with_the_textbook(left, right, theta, aside, size):
     agree(one, state, covariance, 1e-11, 1e-11, 1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(-0.01, 0.01), st.sampled_from([5, 6]))
 def test_a_count_agrees_with_the_textbook_and_begins_anew(extra_m, index):
     one = made(0.3, SIZE, (0.1, 0.2), (0.1, 0.0), 0.02)

@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
@@ -65,7 +65,6 @@ def test_the_wheel_commands_are_those_of_the_integrator():
     assert (command.left, command.right) == one.wheels.command(command.v_m_s, command.w_rad_s)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(ACCELERATIONS, ACCELERATIONS), max_size=30))
 def test_the_integrator_stays_within_its_limits_and_comes_back_at_once(inputs):
     limits = Limits()

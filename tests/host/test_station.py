@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import snapshot
@@ -27,7 +27,6 @@ def decoded(station, frames):
     return messages
 
 
-@settings(deadline=None)
 @given(SIZES, st.booleans(), st.data())
 def test_every_frame_decodes_to_what_was_commanded(n, telemetry, data):
     station = Station(n, telemetry)
@@ -53,7 +52,6 @@ def test_all_frames_of_a_network_have_the_same_length():
     assert {len(station.frame([REST] * 5)) for _ in range(20)} == {31}
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(0, 3), max_size=40))
 def test_at_most_every_eighth_frame_is_a_service_frame_and_none_is_lost(requests):
     station = Station(3, telemetry=False)

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.dmath import wrap_pi
@@ -16,7 +16,6 @@ NORMALS = st.tuples(*[st.floats(-9.0, 9.0)] * 3)
 ZERO = (0.0, 0.0, 0.0)
 
 
-@settings(deadline=None)
 @given(POSTURES, NORMALS)
 def test_a_measurement_is_off_by_at_most_the_bound_and_half_a_pixel(true, normals):
     seen = measure(true, normals, ERRORS)
@@ -27,7 +26,6 @@ def test_a_measurement_is_off_by_at_most_the_bound_and_half_a_pixel(true, normal
     assert -math.pi < seen.theta_rad <= math.pi
 
 
-@settings(deadline=None)
 @given(POSTURES, NORMALS)
 def test_positions_lie_on_the_pixel_grid(true, normals):
     seen = measure(true, normals, ERRORS)
@@ -36,7 +34,6 @@ def test_positions_lie_on_the_pixel_grid(true, normals):
         assert x / ERRORS.pixel_m == pytest.approx(round(x / ERRORS.pixel_m), abs=1e-9)
 
 
-@settings(deadline=None)
 @given(POSTURES, NORMALS)
 def test_without_errors_the_measurement_is_the_posture(true, normals):
     assert measure(true, normals, NO_ERRORS) == Posture(true.x_m, true.y_m, wrap_pi(true.theta_rad))

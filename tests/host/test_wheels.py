@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_host.wheels import Wheels, nearest
@@ -26,7 +26,6 @@ def test_turning_left_slows_the_left_wheel():
     assert WHEELS.split(0.2, 1.0) == pytest.approx((0.166, 0.234))
 
 
-@settings(deadline=None)
 @given(SPEEDS, TURNS)
 def test_no_command_exceeds_the_limit(v, w):
     left, right = WHEELS.command(v, w)
@@ -34,7 +33,6 @@ def test_no_command_exceeds_the_limit(v, w):
     assert max(abs(left), abs(right)) <= LIMIT
 
 
-@settings(deadline=None)
 @given(SPEEDS, TURNS)
 def test_the_limit_scales_both_wheels_by_one_factor(v, w):
     left, right = WHEELS.split(v, w)
@@ -46,14 +44,12 @@ def test_the_limit_scales_both_wheels_by_one_factor(v, w):
         assert (limited_left, limited_right) == (left, right)
 
 
-@settings(deadline=None)
 @given(st.floats(-1.46, 1.46))
 def test_a_command_is_the_nearest_quantum(speed):
     exact = Fraction(speed) * Fraction(WHEELS.units_per_m_s)
     assert abs(WHEELS.counts(speed) - exact) <= Fraction(1, 2) + Fraction(1, 10**9)
 
 
-@settings(deadline=None)
 @given(SPEEDS, TURNS)
 def test_backwards_and_the_other_way_round_are_mirror_images(v, w):
     left, right = WHEELS.command(v, w)
@@ -61,13 +57,11 @@ def test_backwards_and_the_other_way_round_are_mirror_images(v, w):
     assert WHEELS.command(v, -w) == (right, left)
 
 
-@settings(deadline=None)
 @given(st.integers(-LIMIT, LIMIT))
 def test_every_integer_is_its_own_quantum(count):
     assert WHEELS.counts(count / WHEELS.units_per_m_s) == count
 
 
-@settings(deadline=None)
 @given(st.floats(-1e6, 1e6))
 def test_rounding_is_to_the_nearest(x):
     assert abs(nearest(x) - Fraction(x)) <= Fraction(1, 2)

@@ -51,7 +51,7 @@ def away_from_switches(c):
 @pytest.mark.parametrize(
     "gains", [SATURATING, SWITCHING, SLOPED], ids=["saturation", "sign", "layer derivative"]
 )
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
 def test_surfaces_and_inputs_equal_the_papers_formulas(gains, path, t, posture, v, w):
     r = path.at(t)
@@ -66,7 +66,6 @@ def test_surfaces_and_inputs_equal_the_papers_formulas(gains, path, t, posture, 
     assert (got.s1, got.s2, got.u1, got.u2) == pytest.approx([float(x) for x in expected], rel=1e-9, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, st.floats(-0.3, 0.3), st.floats(-1.0, 1.0))
 def test_inserting_16_into_18_gives_21_and_22(path, t, posture, v, w, f1, f2):
     g, r = SWITCHING, path.at(t)
@@ -100,7 +99,6 @@ def test_the_derivative_of_the_absolute_angle_error_has_the_sign_of_the_change()
     assert YangKim(gains).control(r, ahead, 0.2, 0.0).u2 > 0.0  # |phi_e| falls: s2's switching term rises
 
 
-@settings(deadline=None)
 @given(TIMES, POSTURES, SPEEDS, TURNS, st.sampled_from([SATURATING, SWITCHING]))
 def test_the_mirrored_robot_on_the_line_gets_the_mirrored_answer(t, posture, v, w, gains):
     assume(abs(posture.y_m) > 1e-6)  # not on the seam of phi_e, where one side is as good as the other
@@ -111,7 +109,6 @@ def test_the_mirrored_robot_on_the_line_gets_the_mirrored_answer(t, posture, v, 
     assert (other.s1, other.u1, other.s2, other.u2) == (one.s1, one.u1, -one.s2, -one.u2)
 
 
-@settings(deadline=None)
 @given(PATHS, st.floats(-1.0, 7.0), POSTURES, SPEEDS, TURNS)
 def test_with_the_guards_every_posture_has_a_bounded_answer(path, t, posture, v, w):
     c = YangKim(SATURATING).control(path.at(t), posture, v, w)
@@ -159,7 +156,6 @@ def test_a_derivative_of_the_layer_is_refused_where_there_is_no_layer():
         Gains(switching="sign", layer_derivative=True)
 
 
-@settings(deadline=None)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
 def test_outside_the_layer_its_derivative_changes_no_bit(path, t, posture, v, w):
     published = YangKim(msgspec.structs.replace(SLOPED, layer_derivative=False)).control(

@@ -292,7 +292,7 @@ COMPLAINT = (
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.integers(1, len(RECORDED) - 1))
 def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size):
     if size < MESSAGES_OF_PERIODS[0]:
@@ -346,7 +346,7 @@ def test_one_wrong_bit_in_the_length_of_a_compressions_name_is_damage(place):
         refused_with_bit_turned(SECTIONS["CHUNK"][0] + 9 + 28 + place, bit)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.integers(0, len(RECORDED) - 1), st.integers(0, 7))
 def test_one_wrong_bit_anywhere_is_noticed(at, bit):
     refused_with_bit_turned(at, bit)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import msgspec
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -69,7 +69,6 @@ def commanded(v, w=0.0, **inner):
 # f of equation (15).
 
 
-@settings(deadline=None)
 @given(STEPS)
 def test_f_is_what_was_commanded_less_what_came_of_it(run):
     track, expected = track_of(run), naive.disturbances(run)
@@ -104,7 +103,6 @@ def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturba
 SURFACES = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-0.5, 0.5), SURFACES), min_size=2, max_size=20),
     st.floats(0.0, 20.0),
@@ -158,7 +156,6 @@ def on_the_seam(angles):
     return any(abs(abs(value) - math.pi) < 1e-9 for value in (*angles, *changes))
 
 
-@settings(deadline=None)
 @given(STEPS)
 def test_the_assumptions_are_those_of_the_slow_twin(run):
     run = [msgspec.structs.replace(run[0], control=commanded(0.0), reference=ORIGIN), *run[1:]]

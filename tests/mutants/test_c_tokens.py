@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.mutants.c_tokens import tokens, words
@@ -27,7 +27,6 @@ PIECES = (
 C_TEXT = st.lists(st.sampled_from(PIECES) | st.text(max_size=4), max_size=30).map("".join)
 
 
-@settings(deadline=None)
 @given(C_TEXT)
 def test_the_tokens_of_any_text_are_that_text_again(text):
     found = list(tokens(text))

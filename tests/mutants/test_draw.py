@@ -25,7 +25,7 @@ def test_a_name_says_where_the_old_text_stands():
         assert line.startswith(one.change.old, one.column - 1), one.id
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 200), st.integers(0, 200), st.integers(0, 1 << 62))
 def test_a_longer_draw_begins_with_the_shorter_one(one, other, seed):
     short, long = sorted((one, other))

@@ -1,7 +1,7 @@
 """A mutant differs from its text in one small place, and every place where an operator applies is found."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.mutants.c_tokens import words
@@ -21,7 +21,6 @@ def made(source, operator):
     return [change.applied(source) for change in changes(source) if change.operator == operator]
 
 
-@settings(deadline=None)
 @given(st.sampled_from(OF_A_TOKEN))
 def test_a_changed_token_is_the_only_difference(mutant):
     before, after = texts(SOURCES[mutant.file]), texts(mutant.change.applied(SOURCES[mutant.file]))
@@ -31,7 +30,6 @@ def test_a_changed_token_is_the_only_difference(mutant):
     assert len(new) == (4 if mutant.change.new.startswith("(-1") else 1)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(MUTANTS))
 def test_a_mutant_keeps_the_balance_of_brackets_and_is_not_its_source(mutant):
     source = SOURCES[mutant.file]

@@ -96,7 +96,7 @@ def test_every_burst_of_up_to_8_wire_bits_is_refused_through_the_uart_too(form):
     assert decode_lines(form, receive(bits), len(bits), frames.body) == (0, 0)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.data(), st.sampled_from([3, 5]), st.integers(1, 4), st.booleans())
 def test_one_to_four_wrong_bits_in_any_frame_are_refused(data, n, wrong, up):
     form = TELEMETRY if up else downlink(n)

@@ -1,7 +1,7 @@
 """The frame's check and the whitening string against their bitwise twins and the published values."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_protocol import crc, whitening
@@ -20,25 +20,21 @@ def test_the_reflected_polynomial_is_the_polynomial_reflected():
     assert int(f"{crc.POLYNOMIAL:016b}"[::-1], 2) == crc.POLYNOMIAL_REFLECTED
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=64))
 def test_the_crc_equals_its_bitwise_twin(data):
     assert crc.crc16(data) == naive.crc16(data)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=32), st.binary(max_size=32))
 def test_the_crc_may_be_computed_in_pieces(head, tail):
     assert crc.crc16(tail, crc.crc16(head)) == crc.crc16(head + tail)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=32))
 def test_a_message_with_its_crc_leaves_the_residue(data):
     assert crc.register(data + crc.crc16(data).to_bytes(2, "little")) == crc.residue()
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=32))
 def test_the_nibble_table_gives_the_same_crc(data):
     table = crc.nibble_table()
@@ -49,7 +45,6 @@ def test_the_nibble_table_gives_the_same_crc(data):
     assert register ^ crc.XOR_OUT == crc.crc16(data)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=32))
 def test_the_byte_table_gives_the_same_crc(data):
     table = crc.byte_table()
@@ -63,7 +58,6 @@ def test_the_whitening_string_is_the_one_written_out_and_the_pn9_sequence():
     assert whitening.STRING == LITERAL == naive.pn9(31)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=31))
 def test_whitening_twice_gives_the_bytes_back(data):
     assert whitening.whiten(whitening.whiten(data)) == data

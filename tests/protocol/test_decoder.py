@@ -36,7 +36,7 @@ def messages(events, n):
 streams = st.booleans().flatmap(lambda up: st.tuples(damaged_streams(telemetry=up), st.just(up)))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(streams, st.sampled_from([1, 3, 10, module.RUN_LIMIT]))
 def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
     heard, telemetry = stream
@@ -50,7 +50,6 @@ def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
     assert decoder.valid == sum(isinstance(event, Received) for event in events)
 
 
-@settings(deadline=None)
 @given(streams, st.lists(st.integers(0, 200)))
 def test_any_chunking_gives_the_same_events_and_the_same_state(stream, cuts):
     heard, telemetry = stream
@@ -65,7 +64,6 @@ def test_any_chunking_gives_the_same_events_and_the_same_state(stream, cuts):
     assert cut.flush() == whole.flush()
 
 
-@settings(deadline=None)
 @given(streams)
 def test_every_character_belongs_to_exactly_one_event(stream):
     heard, telemetry = stream
@@ -80,7 +78,6 @@ def test_every_character_belongs_to_exactly_one_event(stream):
         assert isinstance(event, Damaged) or event.last_tick == ticks[place - 1]
 
 
-@settings(deadline=None)
 @given(streams, st.integers(0, 200))
 def test_a_restored_snapshot_goes_on_as_the_decoder_would_have(stream, place):
     heard, telemetry = stream
@@ -93,7 +90,6 @@ def test_a_restored_snapshot_goes_on_as_the_decoder_would_have(stream, place):
     assert snapshot(other) == snapshot(decoder)
 
 
-@settings(deadline=None)
 @given(st.booleans().flatmap(lambda up: st.tuples(valid_streams(telemetry=up), st.just(up))))
 def test_undamaged_frames_all_come_out_in_order_with_their_preambles(stream):
     heard, telemetry = stream
@@ -105,7 +101,6 @@ def test_undamaged_frames_all_come_out_in_order_with_their_preambles(stream):
     assert decoder.rejected == 0
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.binary(max_size=60))), st.sampled_from([3, 5]))
 @example(noise=[(False, b"\x55\xff\x2d\xd4")], n=3)
 @example(noise=[(False, b"\x2d\xd4" * 20)], n=5)
@@ -213,7 +208,6 @@ def test_the_spacing_limits_are_1040_us_and_50_us_either_side_inclusive(spacing,
         assert decoder.valid == accepted
 
 
-@settings(deadline=None)
 @given(team_frames(3))
 def test_a_robot_of_another_network_size_takes_no_frame(frame):
     decoder = Decoder(5)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_protocol import frames, table
@@ -17,14 +17,12 @@ def body_of(wire):
     return whiten(wire[wire.index(b"\x2d\xd4") + 2 :])[:-2]
 
 
-@settings(deadline=None)
 @given(st.data(), robot_counts())
 def test_every_message_comes_back_as_it_was_sent(data, n):
     message = data.draw(st.one_of(host_frames(n), telemetry_frames(n)))
     assert frames.decode_fields(body_of(encode(message, n)), n) == message
 
 
-@settings(deadline=None)
 @given(st.data(), robot_counts())
 def test_all_host_frames_of_a_network_have_the_same_length(data, n):
     assert len(encode(data.draw(host_frames(n)), n)) == {3: 23, 5: 31}[n]
@@ -137,7 +135,6 @@ _anything = st.recursive(
 )
 
 
-@settings(deadline=None)
 @given(
     st.builds(TeamFrame, _anything, _anything, _anything | st.tuples(_anything, _anything, _anything))
     | st.builds(ServiceFrame, _anything, _anything, st.integers(0, 2) | _anything, _anything)
@@ -176,7 +173,6 @@ def test_a_body_that_no_rightful_host_sends_is_a_content_error(body, complaint):
         frames.decode_fields(bytes.fromhex(body), 3)
 
 
-@settings(deadline=None)
 @given(robot_counts(), st.data())
 def test_any_body_at_all_is_a_message_or_a_content_error(n, data):
     size = table.DOWNLINK[n].body_size

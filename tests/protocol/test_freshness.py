@@ -1,6 +1,6 @@
 """Only news acts: repeats, long steps back and a stuck host are stale; a host that comes back is fresh."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
@@ -48,7 +48,6 @@ def test_stale_frames_neither_move_the_window_nor_restart_the_clock():
     assert fresh.judge(20, 150 * MS)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 63), st.integers(0, 200 * MS))), st.integers(0, 50))
 def test_a_restored_snapshot_judges_the_rest_alike(frames, place):
     fresh, other, tick, verdicts = Freshness(), Freshness(), 0, []

@@ -26,7 +26,6 @@ def events(heard):
     return decoder.feed_symbols(heard.symbols) + decoder.flush()
 
 
-@settings(deadline=None)
 @given(damaged_streams())
 def test_pauses_are_plainly_none_or_plainly_some(heard):
     for (_, _, before), (_, _, after) in pairwise(heard.symbols):
@@ -52,7 +51,6 @@ def test_slips_are_drawn():
     find(damaged_streams(), shows, settings=ANY)
 
 
-@settings(deadline=None)
 @given(robot_counts().flatmap(lambda n: st.tuples(st.just(n), transmissions(n))))
 def test_transmissions_make_a_stream_file_and_do_not_overlap(drawn):
     _, sent = drawn

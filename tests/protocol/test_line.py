@@ -37,7 +37,7 @@ def test_edges_may_come_in_any_pieces(bits, cuts):
     assert found == whole
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(levels, st.integers(0, 155))
 def test_bits_that_hold_are_received_as_the_chip_does(bits, phase):
     """Against the naive twin of the 8051's receiver, 16 samples a bit at 156 ticks."""

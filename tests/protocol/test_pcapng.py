@@ -37,7 +37,6 @@ def read(data):
     return found, None
 
 
-@settings(deadline=None)
 @given(st.lists(packets, max_size=8))
 def test_what_is_written_comes_back_to_the_tick(some):
     assert read(render(some)) == (some, None)
@@ -69,7 +68,7 @@ def test_a_packet_that_cannot_be_written_is_refused_by_name(packet, message):
         render([packet])
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.integers(0, len(render(SOME)) - 1))
 def test_a_capture_cut_short_anywhere_gives_what_came_before_and_the_offset(size):
     found, error = read(render(SOME)[:size])
@@ -84,7 +83,7 @@ def test_a_capture_cut_short_anywhere_gives_what_came_before_and_the_offset(size
         assert str(error).startswith(f"a.pcapng: offset {error.offset}: ")
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.binary(max_size=200), st.integers(0, 300), st.booleans())
 def test_any_bytes_give_packets_or_one_capture_error_and_nothing_else(noise, place, replace):
     whole = render(SOME)

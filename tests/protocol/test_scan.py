@@ -33,7 +33,7 @@ def form_for(heard, telemetry):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(streams, st.sampled_from([1, 7, decoder.RUN_LIMIT]), st.integers(0, 200))
 def test_the_compiled_scanner_equals_its_source(stream, run_limit, cut):
     heard, telemetry = stream
@@ -51,7 +51,6 @@ def test_the_compiled_scanner_equals_its_source(stream, run_limit, cut):
 chunks = st.lists(st.tuples(st.binary(max_size=40), st.one_of(st.none(), st.integers(-(10**6), 10**7))))
 
 
-@settings(deadline=None)
 @given(chunks, st.sampled_from(FORMATS))
 def test_bytes_with_and_without_a_tick_give_the_same_in_both(parts, form):
     fast, slow = Scanner(form, 10), Twin(form, 10)
@@ -61,7 +60,6 @@ def test_bytes_with_and_without_a_tick_give_the_same_in_both(parts, form):
         assert snapshot(fast) == snapshot(slow)
 
 
-@settings(deadline=None)
 @given(streams)
 def test_columns_give_the_same_as_symbols(stream):
     heard, telemetry = stream

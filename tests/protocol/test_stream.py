@@ -48,7 +48,6 @@ HEADERS = [
 headers = st.sampled_from(HEADERS).map(stream_header.of_text)
 
 
-@settings(deadline=None)
 @given(in_order(plain))
 def test_what_version_1_has_words_for_is_written_in_it_and_read_back(entries):
     text = stream.format_stream(entries)
@@ -56,7 +55,7 @@ def test_what_version_1_has_words_for_is_written_in_it_and_read_back(entries):
     assert stream.parse(text).entries == entries
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(in_order(st.one_of(plain, flawed(), events)), headers)
 def test_what_is_written_is_read_back(entries, header):
     text = stream.format_stream(entries, header)
@@ -189,7 +188,7 @@ PIECES += ["#: ", "# ", "seed = 1\n", "[set]\n", "scenario = ", "'fig6'", "@", "
 texts = st.one_of(st.text(), st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.sampled_from(["", "# mirotwin stream 1\n", V2]), texts)
 def test_any_text_at_all_is_a_stream_or_a_stream_error(head, text):
     try:

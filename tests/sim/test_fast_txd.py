@@ -109,7 +109,7 @@ def test_any_cutting_gives_the_same_state(cut_ticks):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     slow=st.integers(1, 255),
     wait=st.integers(1, 255),

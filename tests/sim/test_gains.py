@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks import gains
@@ -31,7 +31,6 @@ class Record:
 
 
 @families
-@settings(deadline=None)
 @given(number=st.integers(0, 10**6), path=st.sampled_from(sorted(PATHS)), generation=st.integers(0, 5))
 def test_every_set_is_a_scenario_within_the_bounds_and_is_drawn_again_alike(family, number, path, generation):
     first = gains.drawn(family, number)

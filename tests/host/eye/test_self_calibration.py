@@ -93,7 +93,7 @@ def test_a_calibration_of_1997_is_right_to_half_a_millimetre_after_two_seconds(s
     assert worst_cm(learnt(told, 60)) < 0.05
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.tuples(*[st.floats(-0.3 * spread, 0.3 * spread) for spread in SPREADS[:-1]]), st.floats(-0.03, 0.05)
 )

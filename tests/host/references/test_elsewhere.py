@@ -36,7 +36,7 @@ def test_a_path_that_begins_elsewhere_is_the_same_path_moved_there(shape, t, hea
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(TIMES, ANGLES, st.floats(-2.5, 2.5), PLACES, PLACES)
 def test_its_polar_form_is_that_of_its_points(t, heading, curvature, x, y):
     assume(abs(t - 0.5) > 1e-3)
@@ -83,7 +83,7 @@ def test_an_arc_may_go_round_and_round():
     assert out_of_origin.at(3.3 + turn_s).rho_m > 0.0
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     *(TIMES, st.floats(0.05, 0.4), st.floats(0.1, 1.0), st.floats(-0.2, 0.2), st.floats(0.2, 1.5)),
     *(ANGLES, PLACES, PLACES),
@@ -100,7 +100,6 @@ def test_a_sine_and_all_its_derivatives_equal_the_cartesian_path(
     assert numbers(found) == pytest.approx([float(one) for one in expected], rel=1e-7, abs=1e-8)
 
 
-@settings(deadline=None)
 @given(
     SHAPES, st.floats(0.05, 0.4), st.floats(0.1, 1.0), st.floats(0.001, 0.02), st.floats(0.005, 0.1), ANGLES
 )

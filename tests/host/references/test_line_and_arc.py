@@ -15,7 +15,7 @@ from tests.naive import host_control as naive
 ANGLES = st.floats(-3.1, 3.1)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(0.01, 6.0), ANGLES, st.floats(-2.5, 2.5), st.floats(0.05, 0.4), st.floats(0.1, 1.0))
 def test_an_arc_and_all_its_derivatives_equal_the_cartesian_path(t, heading, curvature, speed, ramp):
     assume(abs(t - ramp) > 1e-3)
@@ -26,7 +26,7 @@ def test_an_arc_and_all_its_derivatives_equal_the_cartesian_path(t, heading, cur
     )
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.01, 6.0), ANGLES)
 def test_a_line_and_all_its_derivatives_equal_the_cartesian_path(t, heading):
     assume(abs(t - 0.5) > 1e-3)
@@ -71,7 +71,6 @@ PROFILES = st.builds(
 )
 
 
-@settings(deadline=None)
 @given(PROFILES, st.floats(0.0, 1.0))
 def test_a_ramp_down_is_the_ramp_up_run_backwards(ramp, part):
     t = part * ramp.duration_s
@@ -82,7 +81,6 @@ def test_a_ramp_down_is_the_ramp_up_run_backwards(ramp, part):
     assert ramp.at(ramp.duration_s)[1] == pytest.approx(0.0, abs=1e-12)
 
 
-@settings(deadline=None)
 @given(PROFILES, st.floats(0.01, 0.99))
 def test_speed_and_acceleration_of_a_ramp_down_are_the_derivatives_of_its_length(ramp, part):
     t, h = part * ramp.duration_s, 1e-6

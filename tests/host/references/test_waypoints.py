@@ -46,7 +46,7 @@ def turned(a, b):
     return abs(math.remainder(a - b, 2.0 * math.pi))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(POINTS, HEADINGS, BOUNDS, st.booleans())
 def test_at_every_camera_frame_speed_accelerations_and_turning_rate_are_within_their_bounds(
     points, given_headings, bounds, closed
@@ -61,7 +61,7 @@ def test_at_every_camera_frame_speed_accelerations_and_turning_rate_are_within_t
         assert all(math.isfinite(value) for value in numbers(r))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(POINTS, HEADINGS, st.booleans())
 def test_the_path_passes_each_point_with_its_heading(points, given_headings, closed):
     path = planned(points, given_headings, USUAL, closed)
@@ -72,7 +72,7 @@ def test_the_path_passes_each_point_with_its_heading(points, given_headings, clo
             assert turned(at.theta_rad, heading) < 1e-7
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(POINTS, HEADINGS, st.floats(0.02, 0.98), st.booleans())
 def test_velocities_are_the_derivatives_of_the_posture_and_accelerations_theirs(
     points, given_headings, part, closed
@@ -103,7 +103,7 @@ def bend_rate_is_steady(before, here, after):
     return before.w_dot_rad_s2 == pytest.approx(after.w_dot_rad_s2, abs=1e-3 + 1e-3 * abs(here.w_dot_rad_s2))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(POINTS, HEADINGS)
 def test_posture_speed_and_turning_rate_do_not_jump_anywhere(points, given_headings):
     path = planned(points, given_headings, USUAL, False)
@@ -115,7 +115,7 @@ def test_posture_speed_and_turning_rate_do_not_jump_anywhere(points, given_headi
         assert abs(a.w_rad_s - b.w_rad_s) < 1e-5
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.1), st.floats(0.0, 0.7)), min_size=2, max_size=4),
     st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),

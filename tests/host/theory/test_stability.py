@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from miro_host.laws.yang_kim import YangKim, sign
@@ -42,7 +42,6 @@ def near_no_seam(e):
     return all(abs(abs(angle) - math.pi) > 1e-3 for angle in (e.phi_e_rad, e.theta_e_rad))
 
 
-@settings(deadline=None)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, st.floats(-5.0, 5.0), st.floats(-20.0, 20.0))
 def test_the_rates_of_the_errors_and_surfaces_are_their_differences_along_the_motion(
     path, t, posture, v, w, v_dot, w_dot
@@ -67,7 +66,6 @@ def test_the_rates_of_the_errors_and_surfaces_are_their_differences_along_the_mo
         assert (two[i] - one[i]) / (2 * dt) == pytest.approx(found[i], abs=1e-5 * scale)
 
 
-@settings(deadline=None)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1, F2)
 def test_as_printed_v_falls_exactly_as_equation_23_says_wherever_theta_e_is_not_0(
     path, t, posture, v, w, f1, f2
@@ -110,7 +108,6 @@ def test_where_theta_e_crosses_0_v_jumps_by_the_product_that_the_proof_drops(rho
 # The boundary layer of remark 2.
 
 
-@settings(deadline=None)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
 def test_inside_the_layer_v_has_one_term_more_than_equation_23(path, t, posture, v, w):
     assume(radius(posture) > 0.05)

@@ -34,7 +34,7 @@ def test_a_quantile_and_a_mean_are_those_of_the_plain_loops(numbers, share):
     assert mean(array) == bootstrap.mean(numbers)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.integers(0, 12)), min_size=8, max_size=30))
 def test_intervals_are_those_of_the_plain_loops(rows):
     numbers, seeds = [one for one, _ in rows], [seed for _, seed in rows]

@@ -46,7 +46,7 @@ def asked(run, places, enough=CYCLES, others=None):
     return found, Flat(run.cpu).save()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(PLACES, st.integers(1, 20))
 def test_each_execution_is_asked_about_until_it_is_enough(places, enough):
     plain = machine()

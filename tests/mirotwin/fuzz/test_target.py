@@ -88,7 +88,7 @@ def test_both_engines_make_the_same_of_the_same_inputs():
     assert python.stdout.splitlines() == target_digest.lines()
 
 
-@settings(deadline=None, max_examples=25, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(SESSIONS)
 def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipped, data):
     begun = shipped.board.log.end
@@ -104,7 +104,7 @@ def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipp
     assert received(world.networks[0].robots[0].board.log, shipped.harness.begin_tick)[-len(there) :] == there
 
 
-@settings(deadline=None, max_examples=25, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(SESSIONS)
 def test_the_shipped_firmware_passes_the_fast_oracle_and_the_checks(shipped, data):
     assert shipped.run(data) == 0, shipped.failure

@@ -84,7 +84,7 @@ def fuzzed():
     found.close()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(_pieces, max_size=40))
 def test_no_negotiation_raises_or_grows_without_bound(fuzzed, pieces):
     if not fuzzed.open:

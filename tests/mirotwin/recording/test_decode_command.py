@@ -130,7 +130,7 @@ def test_raw_telemetry_is_found_to_come_from_a_robot():
     assert as_json(TEAM, "--direction", "up")[1][1]["event"] == "damage"
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_decoded(data):
     code, found, _ = as_json(data, "--format", "raw")

@@ -64,7 +64,7 @@ def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name):
     assert field.one.hex() != field.other.hex()
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.integers(24_000, 9_000_000), st.integers(0, 7))
 def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick, bit):
     found = first_difference(world(), planted_world(tick, flipped(0xF0, bit)))  # deep in the stack

@@ -92,7 +92,7 @@ LEVEL = st.integers(0, 1)
 PINS = st.tuples(LEVEL, LEVEL, LEVEL, LEVEL, st.sampled_from([0x02, 0xFF]))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, 12), PINS), max_size=40))
 def test_any_edges_break_what_they_break_for_one_who_keeps_them_all(edges):
     ours, theirs, tick = BusTiming(), NaiveBusTiming(), 0

@@ -37,7 +37,7 @@ VELOCITIES = st.integers(-16633, 16633)
 ORDERS = st.lists(st.tuples(VELOCITIES, VELOCITIES, st.integers(1, 40 * MS)), min_size=1, max_size=4)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(DRIVES, OPTIONS, ORDERS)
 def test_a_robot_drives_alike_with_and_without_a_probe(params, options, orders):
     rigs = [Rig(plant=DifferentialDrive(params), options=options) for _ in range(2)]
@@ -61,7 +61,7 @@ MOVES = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(MOVES, min_size=1, max_size=60), st.lists(st.integers(1, 3000), max_size=20))
 def test_pins_that_move_at_random_do_the_same_with_and_without_a_probe(moves, cuts):
     boards = [board_with("\n".join(["loop:", *moves, "LJMP loop"]), stop_on_fault=False) for _ in range(2)]
@@ -86,7 +86,7 @@ RESETS = st.integers(35_000, 36_000)
 """About where the firmware ends the first reset of both chips."""
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(st.one_of(RESETS, st.integers(1, 120_000)), min_size=2, max_size=12))
 def test_a_run_that_is_cut_from_power_up_on_ends_as_in_one_piece(cuts):
     whole, pieces = powered_up(), powered_up()

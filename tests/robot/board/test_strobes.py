@@ -33,7 +33,7 @@ def tell_everything(board, chips, ports, tick):
         chip.set_bus(tick, levels["cs"], levels["rd"], levels["wr"], levels["ps"], banks[DATA])
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(EDGES, st.booleans(), st.integers(1, 40))
 def test_both_chips_end_as_chips_that_are_told_every_level(edges, pulse, pause):
     options = Lm629Options(reset_clocks=300)

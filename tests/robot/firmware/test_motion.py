@@ -70,7 +70,7 @@ def test_velocities_saturate_at_the_top_speed(rig, sent, used):
     assert [(c.opcode, c.data) for c in rig.told(rig.board.left)] == expected(used)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     st.lists(st.tuples(VELOCITIES, VELOCITIES), min_size=1, max_size=4),
     st.sampled_from([(0, 3), (2, 3), (4, 5)]),

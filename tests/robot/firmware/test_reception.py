@@ -95,20 +95,20 @@ def test_only_one_to_eight_steps_forward_are_fresh(steps, counters):
     assert rig.counters == counters
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 2**32), st.sampled_from([3, 5]))
 def test_firmware_and_python_agree_on_long_damaged_streams(seed, n):
     compare(drawn_stream(seed, n, 25), n)
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(damaged_streams())
 def test_firmware_and_python_agree_on_any_damage(heard):
     compare(heard.symbols, heard.n)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.binary(max_size=200), st.sampled_from([3, 5]), st.integers(0, 63))
 def test_firmware_and_python_agree_on_any_bytes_with_frames_among_them(data, n, seq):
     cut = len(data) // 2
@@ -127,7 +127,7 @@ def test_the_comparison_sees_a_difference():
         )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.integers(0, 1), max_size=400), st.integers(1, 2 * BIT), st.sampled_from([3, 5]), st.booleans()
 )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_robot.image import Image, Symbol, Symbols, load_hex, parse_hex
@@ -31,7 +31,6 @@ def image_of(code, symbols=None):
         st.sampled_from(["_a", "_b", "_c"]), st.builds(Symbol, st.integers(0, 130), st.just("code"))
     ),
 )
-@settings(deadline=None)
 def test_every_loaded_byte_stands_in_exactly_one_row_and_names_begin_rows(code, symbols):
     image = image_of(code, symbols)
     names = SymbolNames(image)

@@ -108,7 +108,7 @@ def shown(steps):
 
 
 @given(PROGRAMS, CUTS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_a_watched_run_ends_in_the_same_state_and_tells_each_step(code, cuts):
     plain, watched, naive = cpu_of(code), cpu_of(code), cpu_of(code)
     log = Log()
@@ -122,7 +122,7 @@ def test_a_watched_run_ends_in_the_same_state_and_tells_each_step(code, cuts):
 
 
 @given(PROGRAMS, CUTS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_counters_and_activity_equal_the_naive_twin(code, cuts):
     cpu, naive = cpu_of(code), cpu_of(code)
     counters, activity = Counters(), Activity()

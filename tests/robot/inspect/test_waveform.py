@@ -280,7 +280,7 @@ ACTIONS = (
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.sampled_from(ACTIONS), min_size=1, max_size=30), st.lists(st.integers(1, 300), max_size=4))
 def test_whatever_a_program_does_is_as_a_look_on_every_tick_finds_it(actions, cuts):
     head, _, _ = TWO_PRIORITIES.partition("loop:")

@@ -93,7 +93,7 @@ def carries_into_th0(counts):
     return -counts % 256 >= 0xFE
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     st.lists(st.sampled_from([1, 2, 4]), min_size=1, max_size=40),
     st.integers(150, 700).filter(lambda counts: not carries_into_th0(counts)),

@@ -98,7 +98,7 @@ def test_a_line_is_full_when_more_than_2048_edges_wait_to_be_heard():
     assert len(line.edges()) == 2049  # heard is not forgotten
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     st.lists(st.integers(1, 40), min_size=1, max_size=20),
     st.integers(0, 9000),

@@ -121,7 +121,7 @@ def test_the_files_of_the_robot_belong_to_it():
     assert check_cdb(parse_cdb(CDB), IMAGE.code, LOADED) is None
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     filler=st.none() | st.integers(0, 255),
     boot_loader=st.binary(max_size=3),
@@ -185,7 +185,7 @@ def test_a_handful_of_names_or_line_records_proves_nothing():
     assert check_map(parse_map(area + "".join(names)), bytes(0x10000), bytes(0x10000)) is not None
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.text(alphabet="L:A$CSEG_mainbytes=()RELCODE 0123456789ABCDEF\n.,", max_size=300))
 def test_no_text_whatever_breaks_the_reading(text):
     check_map(parse_map(text), IMAGE.code, LOADED)

@@ -363,7 +363,7 @@ def bit_ticks(configuration):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(CONFIGURATION, ACTIONS, NOISE)
 def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actions, noise):
     cpu = Cpu(RecordingBus())

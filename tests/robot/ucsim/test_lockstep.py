@@ -26,7 +26,7 @@ def test_random_walks_of_fixed_seeds_agree(seed):
     assert sum(outcome.opcodes) == 750
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 1 << 32))
 def test_random_walks_of_any_seed_agree(seed):
     assert compare(seed, 120).difference == ""

@@ -59,7 +59,7 @@ def test_impulses_make_the_speeds_of_a_rigid_body():
     assert 0.5 * 0.068 * (force_right - force_left) == pytest.approx(4.7e-4 * w)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.one_of(SPEEDS, SLOW), st.one_of(SPEEDS, SLOW), st.integers(1, 2048))
 def test_friction_alone_never_adds_energy_and_never_reverses_a_shaft_of_its_own(left, right, ticks):
     one = body(ROUGH, left, right)
@@ -68,7 +68,7 @@ def test_friction_alone_never_adds_energy_and_never_reverses_a_shaft_of_its_own(
     assert one.kinetic_energy_j() <= before
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(SLOW, SLOW, IMPULSES, IMPULSES, st.integers(1, 2048))
 def test_friction_is_within_its_limit_and_against_the_speed_that_is_left(
     left, right, push_left, push_right, ticks
@@ -85,7 +85,6 @@ def test_friction_is_within_its_limit_and_against_the_speed_that_is_left(
             assert rub == pytest.approx(-math.copysign(most, speed), abs=1e-18)
 
 
-@settings(deadline=None)
 @given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.integers(1, 2048))
 def test_pushes_below_stiction_leave_the_robot_exactly_where_it_is(left, right, ticks):
     one = body(ROUGH)
@@ -103,7 +102,6 @@ def test_one_wheel_can_stick_while_the_other_turns():
     assert math.hypot(one.x_m, one.y_m) == pytest.approx(abs(one.theta_rad) * 0.034, rel=1e-3)
 
 
-@settings(deadline=None)
 @given(SPEEDS, SPEEDS, st.integers(0, 2048))
 def test_looking_ahead_is_pure_and_is_where_a_free_step_ends(left, right, ticks):
     one = body(SMOOTH, left, right)

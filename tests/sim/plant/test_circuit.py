@@ -27,7 +27,7 @@ def winding(drive, current):
     return made
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(DRIVES, CURRENTS, EMFS, TICKS)
 def test_current_and_charge_are_those_of_tiny_euler_steps(drive, current, emf, ticks):
     one = winding(drive, current)
@@ -37,7 +37,7 @@ def test_current_and_charge_are_those_of_tiny_euler_steps(drive, current, emf, t
     assert charge == pytest.approx(naive_charge, abs=0.006 * ticks, rel=0.005)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(DRIVES, CURRENTS, EMFS, TICKS)
 def test_winding_and_shaft_never_get_more_than_the_battery_gives(drive, current, emf, ticks):
     one = winding(drive, current)
@@ -47,7 +47,7 @@ def test_winding_and_shaft_never_get_more_than_the_battery_gives(drive, current,
     assert stored + emf * charge_c <= PARAMS.battery.voltage_v * battery_c + 1e-15
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(DRIVES, CURRENTS, EMFS, TICKS, TICKS)
 def test_two_intervals_in_a_row_are_one_long_interval(drive, current, emf, first, second):
     ticks = min(first + second, 2048)
@@ -59,7 +59,7 @@ def test_two_intervals_in_a_row_are_one_long_interval(drive, current, emf, first
         assert parts_charge == pytest.approx(charge, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(DRIVES, CURRENTS, EMFS, TICKS)
 def test_forward_and_backward_are_mirror_images_to_the_bit(drive, current, emf, ticks):
     one, other = winding(drive, current), winding(-drive, -current)
@@ -145,7 +145,7 @@ def test_a_reversal_while_the_bridge_drives_comes_after_the_delay_of_turning_off
     assert one.drive == -1
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(DRIVES, st.integers(1, 100)), min_size=1, max_size=12), EMFS)
 def test_intervals_cut_anywhere_see_the_bridge_switch_as_the_slow_twin_does(changes, emf):
     one, naive = Winding(LATE), NaiveBridge(LATE)
@@ -211,7 +211,6 @@ def test_an_interval_the_tables_do_not_cover_is_refused(ticks):
         winding(1, 0.0).step(ticks, 0.0)
 
 
-@settings(deadline=None)
 @given(DRIVES, CURRENTS, EMFS, TICKS)
 def test_a_snapshot_goes_on_with_the_same_bits(drive, current, emf, ticks):
     one = winding(drive, current)

@@ -150,7 +150,7 @@ def energy_j(drive):
     return drive.body.kinetic_energy_j() + sum(0.5 * 45e-6 * i * i for i in currents)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(MAGNITUDES, MAGNITUDES, st.integers(1, 2048)), min_size=1, max_size=150))
 def test_no_step_ends_with_more_energy_than_it_had_and_the_battery_gave(steps):
     drive = DifferentialDrive(PROMPT)
@@ -248,7 +248,7 @@ def test_a_long_advance_is_cut_into_pwm_periods():
     assert snapshot(one) == snapshot(other)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(MAGNITUDES, MAGNITUDES, MAGNITUDES, MAGNITUDES)
 def test_a_restored_drive_goes_on_with_the_same_bits(left, right, next_left, next_right):
     drive = DifferentialDrive(PARAMS)

@@ -2,7 +2,7 @@
 
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
@@ -23,7 +23,6 @@ def edges(encoder, moved, start_tick, ticks):
     return chip.encoder_edges
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(MOVES, TICKS), max_size=6))
 def test_edges_are_those_seen_by_looking_at_every_tick(steps):
     encoder = Quadrature(1.0)

@@ -51,7 +51,7 @@ def moving(params, left=0.0, right=0.0, v=0.0, u=0.0, w=0.0):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, TICKS)
 def test_friction_alone_never_adds_energy(kind, left, right, v, u, w, ticks):
     one = moving(KINDS[kind], left, right, v, u, w)
@@ -62,7 +62,7 @@ def test_friction_alone_never_adds_energy(kind, left, right, v, u, w, ticks):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, IMPULSES, IMPULSES, TICKS)
 def test_a_push_gives_no_more_energy_than_to_shafts_without_any_friction(
     kind, left, right, v, u, w, push_left, push_right, ticks
@@ -175,7 +175,7 @@ def test_a_turn_that_needs_more_than_the_grip_drifts_outwards():
     assert slow.u_m_s == 0.0
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.floats(0.05, 1.5), st.floats(-4.0, 4.0), st.floats(-0.04, 0.04), st.floats(0.01, 0.5))
 def test_the_ball_pulls_with_its_friction_against_its_way_over_the_ground(v, w, behind_m, friction):
     """A force at the ball and its yaw torque; shafts without friction, wheels on ice, so that nothing else acts."""
@@ -212,7 +212,7 @@ def test_the_ball_brakes_a_turn_on_the_spot():
     assert abs(dragged.velocity_at(dragged.tick)[0]) < 1e-9
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(1.05, 10.0), TICKS)
 def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, ticks):
     params = DriveParams(chassis=Chassis(stiction_ratio=ratio))
@@ -232,7 +232,7 @@ def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, tic
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "all"])
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(SPEEDS, SPEEDS, WAYS, TURNS, IMPULSES, IMPULSES)
 def test_left_and_right_are_mirror_images(kind, left, right, v, w, push_left, push_right):
     """To what is left by taking the left wheel first: in the sweeps, and in the resistance of wheels with play."""
@@ -246,7 +246,6 @@ def test_left_and_right_are_mirror_images(kind, left, right, v, w, push_left, pu
     )
 
 
-@settings(deadline=None)
 @given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, st.integers(0, 2048))
 def test_looking_ahead_is_pure_and_goes_on_at_the_speed_of_now(left, right, v, u, w, ticks):
     one = moving(ALL, left, right, v, u, w)

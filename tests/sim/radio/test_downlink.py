@@ -47,7 +47,7 @@ def announcements(radio, sent, others):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(params, seeds, flawed(), neighbours)
 def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(radio, seed, sent, others):
     links, lines = shared(radio, seed, others, (0, 2))
@@ -62,7 +62,7 @@ def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(ra
         assert line.settled_tick == UNTIL
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(params, seeds, flawed(), neighbours, cuts(UNTIL), st.data())
 def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(
     radio, seed, sent, others, ticks, data
@@ -84,7 +84,6 @@ def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(
     assert snapshot(cut) == snapshot(whole)
 
 
-@settings(deadline=None)
 @given(params, seeds, flawed(), neighbours, st.integers(1, UNTIL))
 def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, others, tick):
     links, first_lines = shared(radio, seed, others)
@@ -224,7 +223,6 @@ def test_a_bad_stop_bit_is_space_for_three_quarters_of_a_bit():
     ]
 
 
-@settings(deadline=None)
 @given(flawed())
 def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
     downlink, lines = band(clean(carrier="on"))

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_robot.mcs51.line import Line
@@ -30,7 +30,6 @@ def echo(params, seed, sent, until):
     return up.receive(until)
 
 
-@settings(deadline=None)
 @given(seeds, transmissions(), st.integers(0, 30_000))
 def test_a_wire_down_and_up_is_the_identity_on_bytes_and_their_ticks(seed, sent, latency):
     params = clean(squelch=True, latency_ticks=latency)
@@ -40,7 +39,6 @@ def test_a_wire_down_and_up_is_the_identity_on_bytes_and_their_ticks(seed, sent,
     assert echo(params, seed, sent, 2_500_000) == expected
 
 
-@settings(deadline=None)
 @given(seeds, st.binary(min_size=1, max_size=20))
 def test_a_character_of_marks_brings_the_uart_into_step_after_noise(seed, data):
     """A start bit of noise may begin just before the carrier; FFh outlasts the character it belongs to."""

@@ -40,14 +40,13 @@ def bytes_of(symbols):
 networks = st.lists(transmissions(), min_size=1, max_size=3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(params, seeds, networks)
 def test_symbols_are_those_of_a_naive_uart_on_a_naively_mixed_level(radio, seed, wires):
     edges = naive.uplink_edges(UNTIL, radio, seed, "net", [txd(sent)[1] for sent in wires])
     assert band(radio, seed, wires).receive(UNTIL) == naive.receive(edges, UNTIL, radio.bit_ticks)
 
 
-@settings(deadline=None)
 @given(params, seeds, networks, cuts(UNTIL))
 def test_symbols_and_snapshots_do_not_depend_on_how_receiving_is_cut(radio, seed, wires, ticks):
     whole, cut = band(radio, seed, wires), band(radio, seed, wires)
@@ -56,7 +55,6 @@ def test_symbols_and_snapshots_do_not_depend_on_how_receiving_is_cut(radio, seed
     assert snapshot(cut) == snapshot(whole)
 
 
-@settings(deadline=None)
 @given(params, seeds, networks, st.integers(1, UNTIL))
 def test_a_snapshot_at_any_tick_carries_the_half_received_character(radio, seed, wires, tick):
     first = Uplink(radio, seed, "net")
@@ -79,7 +77,6 @@ def test_a_snapshot_does_not_fit_a_network_of_another_size():
         restore(band(CLEAN, 0, [[]]), snapshot(band(CLEAN, 0, [[], []])))
 
 
-@settings(deadline=None)
 @given(transmissions(), st.sampled_from([2440, 2496, 2500, 2550]))
 def test_without_errors_every_byte_arrives_at_any_clock_within_two_percent(sent, bit_ticks):
     spaced = [(start + index * 20_000, data) for index, (start, data) in enumerate(sent)]

@@ -158,7 +158,7 @@ def scripted():
 
 
 @pytest.mark.slow
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.data())
 def test_when_an_action_is_announced_and_where_the_world_stops_change_no_bit(data):
     world = two_networks(script=[])

@@ -49,7 +49,7 @@ def test_injected_bytes_of_a_recording_give_the_digest_of_a_scripted_run():
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.data())
 def test_when_input_is_announced_changes_nothing(data):
     runs, digest = recorded(4)

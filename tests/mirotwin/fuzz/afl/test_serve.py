@@ -84,7 +84,7 @@ def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does():
         afl.hello()
         seen = {}
 
-        @settings(max_examples=1000, database=None, deadline=None)
+        @settings(max_examples=1000, database=None)
         @given(st.binary(max_size=8) | st.binary(max_size=4).map(lambda tail: WORD + tail))
         def one(data):
             status = afl.run(data)[1]

@@ -105,7 +105,7 @@ def test_firmware_that_waits_for_its_transmitter_is_awake_and_not_stuck():
     assert len(target.exchange().sent) == 200
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(INPUTS, st.sampled_from([POLLS, SLEEPS]), st.binary(max_size=60))
 def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, firmware, data):
     target = TARGETS[kind, firmware]

@@ -146,7 +146,7 @@ def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tm
 WHOLE = recording([(down(index * PERIOD),) for index in range(3)])
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.integers(0, len(WHOLE) - 1), st.integers(0, 7))
 def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at, bit):
     data = bytearray(WHOLE)

@@ -36,7 +36,6 @@ def read(path, format):
     return found, None
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=400))
 def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("raw") / "a"
@@ -50,7 +49,7 @@ def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):
         place += len(row.event.data)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     st.binary(max_size=200),
     st.sampled_from([b"", b"\x89MCAP0\r\n", b"\x0a\x0d\x0d\x0a"]),

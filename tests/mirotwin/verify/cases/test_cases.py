@@ -145,7 +145,7 @@ def test_waits_that_only_their_program_can_judge_make_no_check(condition):
     assert expect_of("never_happens", condition, 0, 1) is None
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.data())
 def test_a_trace_knows_what_happened_wherever_the_world_stands(data):
     world, _ = silent_world(ALL)

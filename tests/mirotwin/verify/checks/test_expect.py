@@ -227,7 +227,7 @@ VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
 def test_any_table_is_checks_or_a_scenario_error(table):
     scenario = msgspec.structs.replace(load("fig6").scenario, expect=table)

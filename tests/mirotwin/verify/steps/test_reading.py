@@ -179,7 +179,7 @@ VALUES = st.one_of(
 TABLES = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(TABLES, max_size=3))
 def test_any_table_is_read_or_refused_with_its_place(tables):
     scenario = msgspec.structs.replace(scenario_of(""), step=tuple(tables))
