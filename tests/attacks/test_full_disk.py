@@ -17,6 +17,7 @@ def limited():
     resource.setrlimit(resource.RLIMIT_FSIZE, (NOTHING_FITS, NOTHING_FITS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "named", "left"),
     [

@@ -53,12 +53,14 @@ def plain():
     return {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
 
 
+@pytest.mark.slow
 def test_processes_of_a_campaign_import_nothing_from_the_current_folder(folder):
     done = called(folder, "campaign", "short.toml", "--jobs", "2", "-q")
     assert done.returncode == 0, done.stderr
     assert (folder / "runs/short.parquet").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["hypothesis", "afl"])
 def test_processes_of_fuzzing_import_nothing_from_the_current_folder(folder, engine):
     if engine == "afl" and missing():

@@ -41,6 +41,7 @@ def run(site, out, *options):
     return done.returncode, done.stderr
 
 
+@pytest.mark.slow
 def test_its_scenario_meets_it_and_a_tighter_one_fails(site, tmp_path):
     assert run(site, tmp_path / "met") == (0, "")
     tighter = "network.robot.expect.turns_at_most_rad_s={limit_rad_s=0.05, from_s=0.5}"

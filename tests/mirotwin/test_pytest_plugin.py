@@ -46,6 +46,7 @@ def counted(folder, *arguments, child=False):
     return (folder / "fw.info").read_text()
 
 
+@pytest.mark.slow
 def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes_and_writes_once(tmp_path):
     alone = counted(tmp_path)
     assert "FNDA:2,_main" in alone
@@ -55,6 +56,7 @@ def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes_and_w
     assert (tmp_path / "collected").read_text() == "once\n"
 
 
+@pytest.mark.slow
 def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path):
     wanted = ("--firmware-coverage=fw.info", "--firmware-coverage-fail-under")
     assert session(tmp_path, *wanted, "5", tests=TESTS).returncode == 0
@@ -77,6 +79,7 @@ def pytest_runtestloop(session):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "how", "code"),
     [
@@ -120,6 +123,7 @@ def test_a_share_without_a_tracefile_is_a_usage_error(tmp_path):
     assert "goes with --firmware-coverage=FILE.info" in done.stderr
 
 
+@pytest.mark.slow
 def test_collecting_tests_writes_nothing(tmp_path):
     done = session(tmp_path, "--firmware-coverage=fw.info", "--collect-only", tests=TESTS)
     assert done.returncode == 0

@@ -49,6 +49,7 @@ def starts(source):
     return found
 
 
+@pytest.mark.slow
 def test_no_test_starts_a_process_otherwise():
     found = [
         f"{path.relative_to(TESTS.parent)}:{line}"

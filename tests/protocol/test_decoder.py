@@ -36,6 +36,7 @@ def messages(events, n):
 streams = st.booleans().flatmap(lambda up: st.tuples(damaged_streams(telemetry=up), st.just(up)))
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(streams, st.sampled_from([1, 3, 10, module.RUN_LIMIT]))
 def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
@@ -50,6 +51,7 @@ def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
     assert decoder.valid == sum(isinstance(event, Received) for event in events)
 
 
+@pytest.mark.slow
 @given(streams, st.lists(st.integers(0, 200)))
 def test_any_chunking_gives_the_same_events_and_the_same_state(stream, cuts):
     heard, telemetry = stream
@@ -64,6 +66,7 @@ def test_any_chunking_gives_the_same_events_and_the_same_state(stream, cuts):
     assert cut.flush() == whole.flush()
 
 
+@pytest.mark.slow
 @given(streams)
 def test_every_character_belongs_to_exactly_one_event(stream):
     heard, telemetry = stream
@@ -78,6 +81,7 @@ def test_every_character_belongs_to_exactly_one_event(stream):
         assert isinstance(event, Damaged) or event.last_tick == ticks[place - 1]
 
 
+@pytest.mark.slow
 @given(streams, st.integers(0, 200))
 def test_a_restored_snapshot_goes_on_as_the_decoder_would_have(stream, place):
     heard, telemetry = stream
@@ -90,6 +94,7 @@ def test_a_restored_snapshot_goes_on_as_the_decoder_would_have(stream, place):
     assert snapshot(other) == snapshot(decoder)
 
 
+@pytest.mark.slow
 @given(st.booleans().flatmap(lambda up: st.tuples(valid_streams(telemetry=up), st.just(up))))
 def test_undamaged_frames_all_come_out_in_order_with_their_preambles(stream):
     heard, telemetry = stream

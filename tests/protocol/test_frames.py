@@ -23,6 +23,7 @@ def test_every_message_comes_back_as_it_was_sent(data, n):
     assert frames.decode_fields(body_of(encode(message, n)), n) == message
 
 
+@pytest.mark.slow
 @given(st.data(), robot_counts())
 def test_all_host_frames_of_a_network_have_the_same_length(data, n):
     assert len(encode(data.draw(host_frames(n)), n)) == {3: 23, 5: 31}[n]

@@ -26,6 +26,7 @@ def events(heard):
     return decoder.feed_symbols(heard.symbols) + decoder.flush()
 
 
+@pytest.mark.slow
 @given(damaged_streams())
 def test_pauses_are_plainly_none_or_plainly_some(heard):
     for (_, _, before), (_, _, after) in pairwise(heard.symbols):
@@ -33,6 +34,7 @@ def test_pauses_are_plainly_none_or_plainly_some(heard):
         assert 0 <= pause <= 2 * NEAR_TICKS or pause >= FAR_TICKS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", Reason)
 def test_every_kind_of_damage_is_drawn(reason):
     def shows(heard):
@@ -51,6 +53,7 @@ def test_slips_are_drawn():
     find(damaged_streams(), shows, settings=ANY)
 
 
+@pytest.mark.slow
 @given(robot_counts().flatmap(lambda n: st.tuples(st.just(n), transmissions(n))))
 def test_transmissions_make_a_stream_file_and_do_not_overlap(drawn):
     _, sent = drawn

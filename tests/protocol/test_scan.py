@@ -60,6 +60,7 @@ def test_bytes_with_and_without_a_tick_give_the_same_in_both(parts, form):
         assert snapshot(fast) == snapshot(slow)
 
 
+@pytest.mark.slow
 @given(streams)
 def test_columns_give_the_same_as_symbols(stream):
     heard, telemetry = stream

@@ -163,6 +163,7 @@ def runs(process):
         return False
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
     (here / "short.toml").write_text(SHORT.replace("3-5", "0-19"))
     command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]

@@ -8,6 +8,7 @@ from tests.mirotwin.debug.runs import SECOND, debugger_of, golden_digest, robot_
 from tests.mirotwin.debug.walks import differences, walk
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_states_of_a_random_walk_are_those_of_an_unbroken_run(seed):
     debugger = debugger_of(robot_run())

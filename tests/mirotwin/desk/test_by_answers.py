@@ -85,6 +85,7 @@ def robot_with(name):
     return f"{ROBOT}&{QUICK}&firmware={made.image}"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not compiler(), reason="needs SDCC")
 @pytest.mark.parametrize("name", FOUND)
 def test_a_mistake_that_answers_show_is_found(mirotwin, name):

@@ -146,6 +146,7 @@ def carry(listening, number, keeps_s):
     robot.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "between",
     [

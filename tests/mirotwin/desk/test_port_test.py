@@ -152,6 +152,7 @@ def test_expectation(link):
 """
 
 
+@pytest.mark.slow
 def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     pytester.makepyfile(test_desk=TESTS)
     for name, steps in (("poll", POLL), ("inside", INSIDE)):

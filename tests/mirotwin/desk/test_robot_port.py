@@ -226,6 +226,7 @@ def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     assert re.search(said, told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_the_robot_and_leaves_what_was_recorded(tmp_path, number, code):
     (tmp_path / "drive.stream").write_text(stream_text(2000))

@@ -225,6 +225,7 @@ def test_a_device_is_not_replaced(mirotwin, short):
     assert not os.path.isfile(os.devnull)
 
 
+@pytest.mark.slow
 def test_the_encoder_wires_count_what_the_chip_counts(tmp_path):
     world = World(scenario_file.load("fig8").scenario, 0, load_hex(image_path()))
     board = world.networks[0].robots[0].board

@@ -59,6 +59,7 @@ def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to():
     assert explorer.target.executions == 3
 
 
+@pytest.mark.slow
 def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(
     monkeypatch,
 ):

@@ -117,6 +117,7 @@ def test_of_an_input_cut_short_all_that_could_be_read_is_written(mirotwin, tmp_p
     assert (tmp_path / "b.pcapng").read_bytes() == render(PACKETS[:2])
 
 
+@pytest.mark.slow
 def test_a_run_longer_than_a_packet_may_be_is_cut(mirotwin, tmp_path):
     data = bytes(300_000)
     (tmp_path / "a.stream").write_text(format_stream([Transmission(7, ">", data)]))

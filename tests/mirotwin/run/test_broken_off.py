@@ -254,6 +254,7 @@ def test_an_internal_error_shows_its_place_when_asked(mirotwin, short, tmp_path,
     assert "Traceback" in mirotwin("run", short, "--out", tmp_path / "out")[2]
 
 
+@pytest.mark.slow
 def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most():
     done = children.run(
         [sys.executable, "-m", "tests.mirotwin.shell.killed", "--times", "3"],

@@ -135,6 +135,7 @@ def test_the_engine_is_settled_before_a_command_is_loaded(words, engine):
     assert done.stdout == f"{engine}\n"
 
 
+@pytest.mark.slow
 def test_with_the_python_engine_a_command_loads_sources_alone(tmp_path):
     script = (
         "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"

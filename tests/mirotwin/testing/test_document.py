@@ -3,12 +3,15 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from tests.mirotwin.testing.sessions import session
 
 PAGE = Path(__file__).parents[3] / "mirotwin/testing/README.md"
 (PLUGIN,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_fixtures_pass(tmp_path):
     (tmp_path / "test_mine.py").write_text(PLUGIN)
     done = session(tmp_path)

@@ -122,6 +122,7 @@ def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixe
     assert report.strip() in (mixed / "out.txt").read_text()
 
 
+@pytest.mark.slow
 def test_the_printed_line_fails_in_the_same_way(mixed):
     out = (mixed / "out.txt").read_text()
     (line,) = re.findall(r"^  (pytest .*is_judged.*)$", out, re.MULTILINE)
@@ -154,6 +155,7 @@ def test_where_no_check_can_judge_what_was_sent_is_left(mixed):
     assert run(mixed, f"mirotwin replay left/{folder.name}/sent.stream").returncode == 0
 
 
+@pytest.mark.slow
 def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path):
     tests = "def test_one(world):\n    assert {}\n"
     session(tmp_path, "--mirotwin-artifacts=left", tests=tests.format("False"))
@@ -164,6 +166,7 @@ def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path):
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
+@pytest.mark.slow
 def test_the_last_events_are_frames_and_what_is_none_is_characters(tmp_path):
     tests = """
 def test_talks(link):

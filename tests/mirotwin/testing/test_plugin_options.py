@@ -47,6 +47,7 @@ def digests(out):
     return sorted(re.findall(r"^DIGEST .*$", out, re.MULTILINE))
 
 
+@pytest.mark.slow
 def test_the_ini_file_says_what_options_do_not(tmp_path):
     (tmp_path / "pytest.ini").write_text(
         "[pytest]\nmirotwin_seed = 3\nmirotwin_repeat = 2\nmirotwin_artifacts = left\nmirotwin_firmware = own.ihx\n"
@@ -95,6 +96,7 @@ def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path):
     assert "LOADED ['mirotwin', 'mirotwin.testing', 'mirotwin.testing.pytest_plugin']" in out
 
 
+@pytest.mark.slow
 def test_the_help_names_options_and_the_marker(tmp_path):
     out = session(tmp_path, "--help").stdout + session(tmp_path, "--markers").stdout
     for word in (
@@ -107,6 +109,7 @@ def test_the_help_names_options_and_the_marker(tmp_path):
     assert "its wheels" not in session(tmp_path, "--fixtures").stderr
 
 
+@pytest.mark.slow
 @needs_sdcc
 def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path):
     image = built_in(
@@ -146,6 +149,7 @@ def test_the_same_by_a_check(link, world):
     assert session(tmp_path).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path):
     (tmp_path / "a.scenario.toml").write_text('scenario = "silent"\n\n[[step]]\npause_ms = 5\n')
     tests = """
@@ -160,6 +164,7 @@ def test_it(world):
     assert "has 1 steps, which a test in Python does not do" in out
 
 
+@pytest.mark.slow
 def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path):
     (tmp_path / "session").mkdir()
     for suffix in (".ihx", ".map", ".cdb"):

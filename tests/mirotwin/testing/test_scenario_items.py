@@ -20,6 +20,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folder):
     done = session(folder, "-p", "no:xdist", "--junitxml=out.xml")
     assert done.returncode == 1, done.stdout
@@ -39,6 +40,7 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folde
     assert names == {"mirotwin_seed", "mirotwin_digest", "mirotwin_firmware_sha256", "mirotwin_reproduce"}
 
 
+@pytest.mark.slow
 def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder):
     assert "1 passed" in session(folder, "-k", "good", "-n", "1", child=True).stdout
     assert session(folder, "-p", "no:xdist").returncode == 1

@@ -1,5 +1,6 @@
 """A board takes short cuts; one with a probe does each step by itself, and ends with the same bits."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +62,7 @@ MOVES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.lists(MOVES, min_size=1, max_size=60), st.lists(st.integers(1, 3000), max_size=20))
 def test_pins_that_move_at_random_do_the_same_with_and_without_a_probe(moves, cuts):

@@ -74,6 +74,7 @@ def sampled(sampler, first_tick, end_tick):
     return wires
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("begin", "length", "moving"),
     [
@@ -196,6 +197,7 @@ def test_a_routine_that_began_before_the_recording_is_unknown_until_none_is_in_s
     assert read(out.getvalue().encode()).first_tick == began + SETTLING_TICKS
 
 
+@pytest.mark.slow
 def test_a_window_has_what_the_whole_has_there():
     whole = read(waveform_of(board_at(0), 0, 31 * MS).encode())
     first, end = SENT_AT + 22 * MS + 11, SENT_AT + 25 * MS + 3
@@ -280,6 +282,7 @@ ACTIONS = (
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.lists(st.sampled_from(ACTIONS), min_size=1, max_size=30), st.lists(st.integers(1, 300), max_size=4))
 def test_whatever_a_program_does_is_as_a_look_on_every_tick_finds_it(actions, cuts):

@@ -127,6 +127,7 @@ SMALL = st.integers(-400, 400)
 WIDE = st.integers(-(2**30), 2**30 - 1)
 
 
+@pytest.mark.slow
 @examples(300)
 @given(
     a=st.integers(0, 0x30000) | st.integers(0, 2**30 - 1),

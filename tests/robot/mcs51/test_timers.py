@@ -162,6 +162,7 @@ def push(cpu, pins):
 ALL_LOW = dict.fromkeys(("int0", "int1", "t0", "t1", "t2", "t2ex"), 0)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.lists(st.tuples(st.sampled_from(REGISTERS), NEAR_TOP), max_size=12), STEPS)
 @example([], [(4, ("T2CON", 0x08)), (1, ("pins", ALL_LOW)), (1, ("look", None)), (1, ("look", None))])

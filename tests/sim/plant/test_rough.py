@@ -111,6 +111,7 @@ def test_with_all_grip_that_it_needs_it_goes_as_the_body_that_only_rolls(magnitu
     assert drive.left_encoder.position == pytest.approx(plain.left_encoder.position, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["slip", "ice", "all", "slip, play and load friction"])
 def test_tiny_euler_steps_go_the_same_way(kind):
     params = KINDS[kind]

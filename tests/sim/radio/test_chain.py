@@ -27,6 +27,7 @@ RAYLEIGH = [
 ]
 
 
+@pytest.mark.slow
 @given(bursts() | dropouts, seeds, st.lists(st.integers(0, 1023), min_size=1, max_size=60))
 def test_any_slot_in_any_order_is_as_the_naive_chain_has_it_step_by_step(params, seed, slots):
     states = naive.chain_states(params, seed, "fade", 1024)

@@ -62,6 +62,7 @@ def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(ra
         assert line.settled_tick == UNTIL
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(params, seeds, flawed(), neighbours, cuts(UNTIL), st.data())
 def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(

@@ -40,6 +40,7 @@ def bytes_of(symbols):
 networks = st.lists(transmissions(), min_size=1, max_size=3)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(params, seeds, networks)
 def test_symbols_are_those_of_a_naive_uart_on_a_naively_mixed_level(radio, seed, wires):
@@ -55,6 +56,7 @@ def test_symbols_and_snapshots_do_not_depend_on_how_receiving_is_cut(radio, seed
     assert snapshot(cut) == snapshot(whole)
 
 
+@pytest.mark.slow
 @given(params, seeds, networks, st.integers(1, UNTIL))
 def test_a_snapshot_at_any_tick_carries_the_half_received_character(radio, seed, wires, tick):
     first = Uplink(radio, seed, "net")

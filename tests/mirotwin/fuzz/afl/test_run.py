@@ -97,6 +97,7 @@ def test_two_jobs_share_what_they_find(tmp_path):
     assert run.progress().stability_percent == 100.0
 
 
+@pytest.mark.slow
 def test_it_ends_by_itself_after_its_time(tmp_path):
     with campaign(tmp_path, seconds=2) as run:
         until(lambda: not run.running, "the end")

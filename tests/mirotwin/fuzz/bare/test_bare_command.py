@@ -68,6 +68,7 @@ def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwi
     assert (code, out.splitlines()[-1]) == (0, f"{len(cases)} passed")
 
 
+@pytest.mark.slow
 def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes, check, tmp_path):
     inputs = corpus(tmp_path, b"quiet")
     for number, more in enumerate(((), ("--check-all",))):

@@ -34,6 +34,7 @@ def stamp_ns(time):
     return time["sec"] * 1_000_000_000 + time["nsec"]
 
 
+@pytest.mark.slow
 def test_the_same_recording_gives_the_same_bytes(recording):
     assert rig.exported(recording)[0] == rig.exported(recording)[0]
 

@@ -54,6 +54,7 @@ def shown(results, *options):
     return json.loads(CliRunner().invoke(main, ["campaign", "show", str(results), "--json", *options]).stdout)
 
 
+@pytest.mark.slow
 def test_medians_and_their_intervals_are_those_of_campaign_show(results, markup):
     groups = shown(results)["groups"]
     assert len(groups) == 4
@@ -115,6 +116,7 @@ def test_what_is_no_campaign_is_refused(tmp_path):
     assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
 def test_in_a_browser_a_click_on_a_failed_run_shows_its_command_without_complaint(page):
     with browser.chromium() as driver:
@@ -142,6 +144,7 @@ def test_in_a_browser_a_click_on_a_failed_run_shows_its_command_without_complain
             assert min(frames) > 100, "names of arms leave no room for what is drawn"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_keyboards_focus_is_seen_on_every_control(page, theme):

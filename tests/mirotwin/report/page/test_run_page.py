@@ -52,6 +52,7 @@ def markup(fig6_page):
     return Markup(fig6_page)
 
 
+@pytest.mark.slow
 def test_a_page_fetches_nothing(markup):
     assert [place for place in markup.fetched if not place.startswith(("#", "data:"))] == []
     assert not re.search(r"@import|url\((?!data:)", "".join(markup.styles))
@@ -196,6 +197,7 @@ def test_the_path_and_the_digest_are_those_of_the_firmware_that_played(other_pag
     assert recorded not in found.text
 
 
+@pytest.mark.slow
 def test_a_case_of_another_firmware_says_so(fig6, other, tmp_path, mirotwin):
     case, page = tmp_path / "mine.stream", tmp_path / "case.html"
     own = json.loads((fig6 / "summary.json").read_text())["firmware"]["sha256"]
@@ -258,6 +260,7 @@ def test_a_page_that_is_there_is_replaced_by_force_only(fig6, tmp_path, mirotwin
     assert page.stat().st_size > 1_000_000
 
 
+@pytest.mark.slow
 def test_a_page_in_the_default_place_is_replaced_and_anything_else_there_is_not(
     fig6, tmp_path, mirotwin, monkeypatch
 ):

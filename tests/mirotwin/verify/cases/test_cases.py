@@ -39,6 +39,7 @@ def failing(tmp_path, expect="failsafe_stop_ms = 100.0"):
     return tmp_path / "a.stream"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["compiled", "python"])
 def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path, engine):
     path = failing(tmp_path)

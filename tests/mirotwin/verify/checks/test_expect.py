@@ -227,6 +227,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
 def test_any_table_is_checks_or_a_scenario_error(table):
