@@ -93,7 +93,8 @@ class Side:
     def command(self, *arguments: str) -> os.struct_rusage:
         """What `mirotwin ARGUMENTS` used, from start to end."""
         with open(os.devnull, "wb") as nothing:
-            child = subprocess.Popen(self._line(*arguments), env=self.tree.environment(), stdout=nothing)
+            line, environment = self._line(*arguments), self.tree.environment()
+            child = subprocess.Popen(line, cwd=self.folder, env=environment, stdout=nothing)
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
