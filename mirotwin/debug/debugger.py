@@ -52,7 +52,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     counted_to: int = 0
 
 
-class Said(NamedTuple):
+class LogOutput(NamedTuple):
     """What a log says, and where."""
 
     cycle: int
@@ -81,7 +81,7 @@ class Debugger:
         self.symbols = symbols
         self.everyone = everyone
         self.breakpoints: list[Breakpoint] = []
-        self.told: list[Said] = []
+        self.told: list[LogOutput] = []
         self._numbers = 0
 
     # Where it stands
@@ -183,7 +183,7 @@ class Debugger:
             if not one.count(bisect.bisect_left(one.hits, at) + 1):
                 return False
         if one.log is not None and not silent:
-            self.told.append(Said(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
+            self.told.append(LogOutput(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
         return one.log is None
 
     def _count_hits(self) -> None:

@@ -46,7 +46,7 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
-class Session(msgspec.Struct):
+class Opened(msgspec.Struct):
     """`said`: what there is to know before anything is asked; `why`: why it stands where it does."""
 
     debugger: Debugger
@@ -76,7 +76,7 @@ def _key(name: str) -> str:
     return first + "".join(one.capitalize() for one in others)
 
 
-def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
+def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
     """Stands at the start, at `--at`, or at the failed check of a case. Raises BadInput."""
     subject = options.subject
     if not subject:
@@ -94,7 +94,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Session:
     )
     symbols = Symbols(image, folders)
     timeline = Timeline(run)
-    session = Session(Debugger(timeline, symbols, everyone), [], "begin")
+    session = Opened(Debugger(timeline, symbols, everyone), [], "begin")
     if not image.symbols.names:
         session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
     elif not symbols.has_sources():

@@ -25,7 +25,7 @@ class LogEntry(NamedTuple):
         return f"{self.text} at tick {self.tick}"
 
 
-class Entry(Protocol):
+class TimedText(Protocol):
     """What can be put side by side."""
 
     @property
@@ -34,7 +34,7 @@ class Entry(Protocol):
     def text(self) -> str: ...
 
 
-E = TypeVar("E", bound=Entry)
+E = TypeVar("E", bound=TimedText)
 Pair = tuple[LogEntry | None, LogEntry | None]
 
 
@@ -136,7 +136,7 @@ def pairs(
     yield from ((None, there) for there in other[second:])
 
 
-def _follows(found: Sequence[Entry], index: int, wanted: Entry, within_ticks: int) -> bool:
+def _follows(found: Sequence[TimedText], index: int, wanted: TimedText, within_ticks: int) -> bool:
     """Whether one behind `index` says what `wanted` says, at its time."""
     for place in range(index + 1, len(found)):
         if found[place].tick > wanted.tick + within_ticks:

@@ -29,7 +29,7 @@ class CaseOptions(Options, frozen=True, kw_only=True):
     ] = None
 
 
-class DebugOptions(CaseOptions, frozen=True, kw_only=True):
+class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
     """What `mirotwin debug` is told of a case or a recording; the command has more options."""
 
     COMMAND = "debug"
@@ -41,7 +41,7 @@ def debug_line(
 ) -> str:
     """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
     image, at = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
-    return DebugOptions(file=f"{file}", firmware=image, at=at).command_line()
+    return DebugLineOptions(file=f"{file}", firmware=image, at=at).command_line()
 
 
 def replay_line(
