@@ -69,6 +69,7 @@ def changed(data, chance):
     return bytes(data)
 
 
+@pytest.mark.slow
 def test_a_journal_that_was_changed_is_refused_or_gives_results_of_these_runs(whole, unfinished, tmp_path):
     chance, names = random.Random(3), set(rows(whole)[0])
     for number in range(times(20)):

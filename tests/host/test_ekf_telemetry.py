@@ -187,6 +187,7 @@ ANSWERS = st.builds(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.lists(st.none() | ANSWERS, min_size=40, max_size=40))
 def test_whatever_an_answer_says_the_filter_goes_on(answers):

@@ -122,6 +122,7 @@ def test_the_robot_on_the_reference_is_driven_out_to_the_circle_and_not_along():
 # What the theory promises, in continuous time.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [StraightLine(), Arc()], ids=["line", "arc"])
 @pytest.mark.parametrize("start", [(0.0243, 0.0308, -0.96), (0.0292, 0.0185, 0.56), (0.0709, 0.0172, -0.38)])
 def test_with_the_theory_s_gains_sigma_vanishes_and_n_holds_epsilon_in_continuous_time(path, start):

@@ -44,6 +44,7 @@ def test_the_limit_scales_both_wheels_by_one_factor(v, w):
         assert (limited_left, limited_right) == (left, right)
 
 
+@pytest.mark.slow
 @given(st.floats(-1.46, 1.46))
 def test_a_command_is_the_nearest_quantum(speed):
     exact = Fraction(speed) * Fraction(WHEELS.units_per_m_s)

@@ -80,6 +80,7 @@ def written(steps):
     return stream.getvalue()
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(STEPS)
 def test_a_file_is_the_bytes_of_the_librarys_writer_whenever_it_was_flushed(steps):

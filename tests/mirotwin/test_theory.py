@@ -156,6 +156,7 @@ def on_the_seam(angles):
     return any(abs(abs(value) - math.pi) < 1e-9 for value in (*angles, *changes))
 
 
+@pytest.mark.slow
 @given(STEPS)
 def test_the_assumptions_are_those_of_the_slow_twin(run):
     run = [msgspec.structs.replace(run[0], control=commanded(0.0), reference=ORIGIN), *run[1:]]

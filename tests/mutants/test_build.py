@@ -22,6 +22,7 @@ def test_the_sources_as_they_are_make_the_shipped_image():
     assert build(changed("main.c", "/* The robot's", "/* A robot's")).is_shipped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -42,6 +43,7 @@ def test_an_image_is_that_of_a_build_from_nothing(change, tmp_path):
     assert not built.is_shipped
 
 
+@pytest.mark.slow
 def test_a_text_is_built_once(tmp_path):
     change = changed("failsafe.c", "age == FAILSAFE_STOP_MS", "age == 90")
     first = build(change, tmp_path)

@@ -64,6 +64,7 @@ def annotated_tests(source):
     return [test.name for test in tests if test.returns or any(arg.annotation for arg in test.args.args)]
 
 
+@pytest.mark.slow
 def test_no_test_is_annotated():
     found = {
         str(path.relative_to(ROOT)): annotated_tests(path.read_text("utf-8"))

@@ -136,6 +136,7 @@ _anything = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(
     st.builds(TeamFrame, _anything, _anything, _anything | st.tuples(_anything, _anything, _anything))
     | st.builds(ServiceFrame, _anything, _anything, st.integers(0, 2) | _anything, _anything)

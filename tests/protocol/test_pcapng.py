@@ -68,6 +68,7 @@ def test_a_packet_that_cannot_be_written_is_refused_by_name(packet, message):
         render([packet])
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.integers(0, len(render(SOME)) - 1))
 def test_a_capture_cut_short_anywhere_gives_what_came_before_and_the_offset(size):

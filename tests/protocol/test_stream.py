@@ -55,6 +55,7 @@ def test_what_version_1_has_words_for_is_written_in_it_and_read_back(entries):
     assert stream.parse(text).entries == entries
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(in_order(st.one_of(plain, flawed(), events)), headers)
 def test_what_is_written_is_read_back(entries, header):

@@ -44,6 +44,7 @@ def test_no_one_or_two_wrong_bits_anywhere_on_the_line_yield_another_frame(form,
     assert 0 < verdict.right < len(places)
 
 
+@pytest.mark.slow
 def test_bits_from_a_coin_get_past_the_crc_as_often_as_weight_enumeration_says():
     """At a bit-error rate of 1/2 errors are frequent enough to be counted here: once in 65536."""
     form, count = DOWNLINK[3], 150_000

@@ -38,6 +38,7 @@ def test_names_of_groups_and_parts_of_names_choose_cases():
     assert len(disturbances.chosen([""])) == len(disturbances.CASES)
 
 
+@pytest.mark.slow
 def test_a_table_of_one_seed_has_a_figure_in_each_cell(capsys):
     assert disturbances.main(["--only", "base", "--seeds", "0", "--jobs", "1"]) == 0
     out, err = capsys.readouterr()

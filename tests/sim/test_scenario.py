@@ -305,6 +305,7 @@ def damaged(draw):
     return "\n".join(lines)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.one_of(damaged(), st.text(), st.text(alphabet='[]{}="\n.a1')))
 def test_any_text_is_a_scenario_or_one_line_of_refusal(text):

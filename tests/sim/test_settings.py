@@ -52,6 +52,7 @@ EDITS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from(EDITS), unique_by=lambda edit: edit[0], max_size=6))
 def test_settings_do_what_an_editor_does(edits):
     text = builtin_text("fig6")
@@ -242,6 +243,7 @@ def test_any_setting_is_made_or_refused_in_one_line(setting):
 LAWS_OF_OURS = LAWS.names()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS_OF_OURS)
 def test_any_law_takes_the_place_of_any_other(law):
     key = "network.robot.controller.law"

@@ -46,6 +46,7 @@ def turned(a, b):
     return abs(math.remainder(a - b, 2.0 * math.pi))
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(POINTS, HEADINGS, BOUNDS, st.booleans())
 def test_at_every_camera_frame_speed_accelerations_and_turning_rate_are_within_their_bounds(

@@ -175,6 +175,7 @@ def test_u1_grows_like_one_over_the_sine_of_alpha(alpha, rho):
     assert u1 * math.sin(alpha) == pytest.approx(braces, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.slow
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1)
 def test_f1_moves_s1_by_its_part_along_the_line_of_sight_only(path, t, posture, v, w, f1):
     """What remark 1 sets against that: near the limit f1 counts as little as u1."""

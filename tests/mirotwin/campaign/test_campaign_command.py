@@ -189,6 +189,7 @@ def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
     assert (here / "runs/short.parquet").read_bytes() == whole.read_bytes()
 
 
+@pytest.mark.slow
 def test_ctrl_c_says_how_much_is_there_and_that_the_same_command_goes_on(here):
     (here / "short.toml").write_text(SHORT.replace("3-5", "0-99"))
     command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]

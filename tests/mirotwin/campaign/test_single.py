@@ -58,6 +58,7 @@ def test_of_several_robots_the_worst_error_has_a_column(short):
     assert (found["rms_position_cm"], found["worst_rms_position_cm"]) == (errors[0], max(errors))
 
 
+@pytest.mark.slow
 def test_outcomes_come_in_the_order_of_the_jobs_and_are_the_same_from_processes():
     plan = [*jobs(range(3)), *jobs(range(1), "network.robot.start_error_x_cm=40.0")]
     alone = [msgspec.structs.replace(run_single(one), run=run) for run, one in enumerate(plan)]

@@ -119,6 +119,7 @@ def waited(run, limit_s=60.0):
     raise AssertionError(f"nothing came in {limit_s} s: {run.progress()}")
 
 
+@pytest.mark.slow
 def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(tmp_path, seeds):
     crashes = []
     queue = []

@@ -46,6 +46,7 @@ def test_a_recording_replays_alike_under_every_rule(mirotwin, silent, kind):
     assert ("within" in out) == (kind != "bits")
 
 
+@pytest.mark.slow
 @needs_sdcc
 def test_a_build_that_is_only_slower_has_no_difference_under_commands(mirotwin, silent, slower):
     assert mirotwin("replay", silent, "--firmware", slower, "-q")[0] == 4

@@ -60,6 +60,7 @@ def mixed(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_each_test_has_its_verdict(mixed):
     out = (mixed / "out.txt").read_text()
     assert "6 failed, 2 passed, 2 errors" in out

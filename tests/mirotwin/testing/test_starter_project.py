@@ -67,6 +67,7 @@ def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(miro
     assert "SDCC" not in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [("scenarios",), ("scenarios", "pytest", f"IMAGE={image_path()}")],

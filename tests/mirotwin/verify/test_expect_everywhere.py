@@ -36,6 +36,7 @@ def test_a_test_is_judged_by_it_and_its_line_repeats_that(mirotwin):
     assert (code, out.splitlines()[-1]) == (0, "1 passed")
 
 
+@pytest.mark.slow
 def test_a_campaign_has_a_column_for_it_from_every_process(mirotwin, here):
     from mirotwin import campaign
 
@@ -102,6 +103,7 @@ def test_what_a_setting_leaves_out_is_told_once_for_all_tests(mirotwin):
     assert (code, err) == (0, f"mirotwin: note: --set camera.kind=gaussian {NOTE}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "more", "place"),
     [

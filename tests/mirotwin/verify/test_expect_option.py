@@ -139,6 +139,7 @@ def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished, t
     assert mirotwin(*stream)[::2] == (0, "")
 
 
+@pytest.mark.slow
 @needs_sdcc
 def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short, tmp_path):
     concerned = ALWAYS["stays in an interrupt"]

@@ -88,6 +88,7 @@ def test_a_wrong_event_in_hears_is_told_the_nearest_one_and_the_list(mirotwin):
     assert "; did you mean command? there are sent, heard, answer, received, " in said
 
 
+@pytest.mark.slow
 def test_the_other_commands_tell_the_same(mirotwin, here):
     assert mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--out", "run")[0] == 0
     file = here / "a.scenario.toml"

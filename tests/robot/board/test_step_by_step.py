@@ -88,6 +88,7 @@ RESETS = st.integers(35_000, 36_000)
 """About where the firmware ends the first reset of both chips."""
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.lists(st.one_of(RESETS, st.integers(1, 120_000)), min_size=2, max_size=12))
 def test_a_run_that_is_cut_from_power_up_on_ends_as_in_one_piece(cuts):

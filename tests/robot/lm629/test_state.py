@@ -35,6 +35,7 @@ def test_compiled_and_uncompiled_chips_see_the_same_session(seed):
     assert compiled.split()[1] == python.split()[1]
 
 
+@pytest.mark.slow
 @examples(60)
 @given(seed=st.integers(0, 2**32), before=st.integers(0, 40), extra=st.integers(0, 9000))
 def test_a_chip_restored_at_any_tick_goes_on_with_the_same_bits(seed, before, extra):

@@ -82,6 +82,7 @@ def test_ours_does_what_the_data_sheet_says(name, text, place, sheet, _):
         assert look(int(address, 16)) == sheet
 
 
+@pytest.mark.slow
 def test_ucsim_does_not():
     differing = {}
     for name, text, place, sheet, _ in CASES:

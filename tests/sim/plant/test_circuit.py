@@ -59,6 +59,7 @@ def test_two_intervals_in_a_row_are_one_long_interval(drive, current, emf, first
         assert parts_charge == pytest.approx(charge, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(DRIVES, CURRENTS, EMFS, TICKS)
 def test_forward_and_backward_are_mirror_images_to_the_bit(drive, current, emf, ticks):

@@ -1,5 +1,7 @@
 """Logs of a PC and of a robot's board, and cursors that read them on."""
 
+import pytest
+
 from miro_robot.event_log import EventLog
 from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
 
@@ -45,6 +47,7 @@ def test_a_cursor_on_a_robot_may_leave_out_characters():
     assert cursor.read() == []
 
 
+@pytest.mark.slow
 def test_a_cursor_counts_what_was_dropped_before_it_was_read():
     robot, host = robot_log(), host_log()
     on_robot, on_host = Cursor(robot), Cursor(host)

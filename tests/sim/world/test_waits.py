@@ -225,6 +225,7 @@ def test_robots_of_several_networks_are_waited_for_apart():
     assert world.digest == rest.digest
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(st.lists(st.tuples(st.sampled_from(sorted(WAITS)), st.integers(0, PERIOD)), max_size=6))
 def test_any_mixture_of_waits_and_stops_gives_the_digest_of_the_uncut_run(uncut_end, moves):

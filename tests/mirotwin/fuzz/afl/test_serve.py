@@ -78,6 +78,7 @@ def test_each_kind_of_finding_is_a_signal_that_kills(kind):
     assert os.WTERMSIG(status) > signal.SIGSYS, "none that a program dies of by itself"
 
 
+@pytest.mark.slow
 def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does():
     own = Double()
     with FakeAfl(spec()) as afl:

@@ -173,6 +173,7 @@ def other_page(folder, fig6, other, mirotwin):
     return page
 
 
+@pytest.mark.slow
 def test_another_firmware_shows_where_it_goes_apart(other_page):
     said = Markup(other_page).text
     assert "Another firmware (other.ihx) differs in control period" in said

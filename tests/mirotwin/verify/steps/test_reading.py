@@ -179,6 +179,7 @@ VALUES = st.one_of(
 TABLES = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.lists(TABLES, max_size=3))
 def test_any_table_is_read_or_refused_with_its_place(tables):
