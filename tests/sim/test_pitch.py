@@ -185,4 +185,4 @@ def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(
     message = refusal("", f'kind = "odd", how = "{how}"', 3.0)
     assert message.startswith(f"my.toml: {HERE}.reference: ")
     assert re.search(expected, message)
-    parse(text("", 'kind = "odd", how = "good"', 3.0), "my.toml")
+    parse(text("", 'kind = "odd", how = "good"', 86_400.0), "my.toml")

@@ -104,7 +104,8 @@ def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipp
     assert received(world.networks[0].robots[0].board.log, shipped.harness.begin_tick)[-len(there) :] == there
 
 
-@settings(max_examples=25, derandomize=True)
+@pytest.mark.slow
+@settings(max_examples=60, derandomize=True)
 @given(SESSIONS)
 def test_the_shipped_firmware_passes_the_fast_oracle_and_the_checks(shipped, data):
     assert shipped.run(data) == 0, shipped.failure

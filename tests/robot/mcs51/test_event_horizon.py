@@ -85,7 +85,7 @@ def state_after(code, levels, again):
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=40)
 @given(BODY, BODY, BODY, st.sampled_from([0x34, 0x04, 0x14]), BODY, st.lists(st.integers(0, 1), max_size=12))
 @example(
     ["CLR TF0"],
