@@ -1,7 +1,7 @@
 """Copies the fields of compiled parts to flat bytes and back, and packs those of other parts.
 
-What does not belong here: which fields there are and in what order, and what is wrong with a value (`state.py`). Used by the compiled engine only, so it has no uncompiled twin:
-tests/exact/test_state.py compares the bytes with those of `state.py`.
+`state.py` says which fields there are and in what order, and what is wrong with a value. Used by the compiled engine
+only, so it has no uncompiled twin: tests/exact/test_state.py compares the bytes with those of `state.py`.
 
 The parts must outlive a Memory, which therefore holds them. A part's fields stay where they are as long as it lives.
 """

@@ -35,7 +35,7 @@ def head_of(plan: Plan) -> Head:
 
 
 def refuse_many(plan: Plan, agreed: bool) -> None:
-    """Raises BadInput for a campaign that nobody can have meant, unless it was `agreed` to."""
+    """Raises BadInput for more than `MANY_RUNS` runs, unless the user `agreed`."""
     if plan.runs > MANY_RUNS and not agreed:
         what = f"has {plan.runs} runs, more than {MANY_RUNS}"
         raise BadInput(plan.file.path, "", what, "take fewer seeds or levels, or say --yes")

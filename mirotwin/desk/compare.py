@@ -42,7 +42,7 @@ STATUS = 0xA2
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 """A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
-"""Answers before and after one that tell how late frames were that nobody answered."""
+"""Answers before and after one that tell how late frames without an answer were."""
 
 
 class TimedAnswer(NamedTuple):

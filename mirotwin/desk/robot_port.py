@@ -47,7 +47,7 @@ SEEN = (Answer, Heard, Sent)
 """The conditions that a PC can see."""
 BAUD = 9600
 BLOCKED_S = 1.0
-"""A port that takes no characters for so long is blocked: its buffers are full, and nobody empties them."""
+"""A port that takes no characters for so long is blocked: its buffers are full, and no program reads them."""
 LOOK_S = 0.001
 """How often a port is looked at that cannot be waited for (`rfc2217://`)."""
 READ_BYTES = 4096
@@ -246,7 +246,7 @@ class RobotPort:
     def greet(self, robots: int | None = None, next_seq: int = 0) -> None:
         """Asks each robot of the network some times, standing; then silence, after which `next_seq` is fresh.
 
-        Raises BadInput where nobody answers.
+        Raises BadInput where no robot answers.
         """
         robots = robots or self.networks[0].spec.robots
         self._counted, first, cursor = {}, len(self.wire), Cursor(self.log)

@@ -42,7 +42,7 @@ _TWIN = (
     "expect={}",
     "step=[]",
 )
-"""Settings of the twin: an ideal radio, and a camera that nobody steers by."""
+"""Settings of the twin: an ideal radio, and a camera that no controller uses."""
 
 
 def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, quiet: bool) -> Path:

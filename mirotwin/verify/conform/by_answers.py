@@ -63,7 +63,7 @@ SURE_TICKS = 5 * TICKS_PER_MS
 robot has to act in, a quarter of the shortest margin of the silences."""
 TRIES = 4
 NOISY = {"P49": 16}
-"""More tries: noise between the frames of a keyed radio makes robots count windows that nobody sent."""
+"""More tries: noise between the frames of a keyed radio makes robots count windows in which no frame was sent."""
 
 
 class PortScript(TrialScript):
