@@ -84,6 +84,9 @@ def pytest_configure(config: pytest.Config) -> None:
     )
     _check_options(config)
     if config.getoption("--mirotwin-port"):
+        workers = config.getoption("numprocesses", None) or 0
+        if workers > 1:
+            raise pytest.UsageError(f"--mirotwin-port: {workers} workers cannot share one port; give -n 0")
         from mirotwin.testing import port_fixtures
 
         config.pluginmanager.register(port_fixtures.PortFixtures(config), port_fixtures.NAME)

@@ -177,6 +177,14 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     )
 
 
+@pytest.mark.parametrize("workers", ["2", "auto"])
+def test_a_port_is_not_shared_by_workers_of_xdist(pytester, monkeypatch, workers):
+    monkeypatch.setenv("PYTEST_XDIST_AUTO_NUM_WORKERS", "2")
+    found = pytester.runpytest_inprocess("-p", "xdist", "-n", workers, f"--mirotwin-port={ROBOT}")
+    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found.stderr.fnmatch_lines(["ERROR: --mirotwin-port: 2 workers cannot share one port; give -n 0"])
+
+
 def test_a_case_is_refused_before_anything_is_sent(mirotwin, at_port, tmp_path):
     at_port(POLL)
     body = stream_text(1).partition("\n")[2]
