@@ -20,13 +20,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import SimpleNamespace, TracebackType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import msgspec
 import serial
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK, TICKS_PER_SECOND, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, ticks
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Event as Decoded
 from miro_protocol.events import Received
@@ -37,9 +37,12 @@ from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import Answer, Condition, Heard, Sent, answer_of
 from miro_sim.world.events import Cursor, Event, HostLog
-from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
+from miro_sim.world.waits import Waits
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.recording.recorder import TOGETHER, Recorder
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
 
 PORT = "port"
 """`source` of a recording that was made here."""
@@ -123,7 +126,7 @@ class RobotPort:
         self.slots: tuple[int, ...] = ()
         self.delay_ticks = (0, 0)
         self.began_tick = self.free_tick = 0
-        self.stopped = self.told_to_stop = self.prompt = False
+        self.in_period = self.stopped = self.told_to_stop = self.prompt = False
         self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
         self._heard_tick = self._end_tick = self._recorded = 0
@@ -150,7 +153,7 @@ class RobotPort:
             if self.prompt:
                 realtime_priority(False)
             self._keep(self._decoder.flush(), self._heard_tick)
-            self._record(max(self._now, self.free_tick, self._end_tick) + TOGETHER * CONTROL_PERIOD_TICKS)
+            self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
 
@@ -185,7 +188,26 @@ class RobotPort:
         self.run_to(self.tick + for_ticks)
 
     def run_until(self, condition: Condition, *others: Condition, within: int | None = None) -> Event:
+        for one in (condition, *others):
+            if not isinstance(one, SEEN):
+                raise NotObservable(f"{one}")
         return self.waits.until([condition, *others], within)
+
+    def run_piece(self, tick: int) -> None:
+        """For `Waits`: until then, but no longer than to the next characters that come."""
+        self._take(self._read(max(0, tick - self.tick)))
+
+    def begin_period(self) -> None:
+        """For `Waits`, as the next three: time only goes on here, and what came is in the log."""
+
+    def rendezvous(self, tick: int) -> int:
+        return tick
+
+    def mark(self) -> RobotPort:
+        return self
+
+    def go_back(self, mark: RobotPort) -> None:
+        pass
 
     # ---- sending -----------------------------------------------------------------------------------------
 
@@ -274,7 +296,7 @@ class RobotPort:
             counted,
         )
         self.began_tick = self._now
-        self.waits = PortWaits(self)
+        self.waits = Waits(cast("World", self))
 
     def _why_nobody(self, robots: int, first: int, answered: bool) -> tuple[str, str]:
         """What came instead of answers, and what to do."""
@@ -290,10 +312,6 @@ class RobotPort:
         return what, "is this the radio's port, and is its rate 9600 baud?"
 
     # ---- reading -----------------------------------------------------------------------------------------
-
-    def read_one(self, tick: int) -> None:
-        """Waits until then, but no longer than to the next characters that come."""
-        self._take(self._read(max(0, tick - self.tick)))
 
     def _read(self, wait_ticks: int) -> bytes:
         """What is there, or is the first to come in this time."""
@@ -357,56 +375,19 @@ class RobotPort:
 
     def _record(self, until_tick: int) -> None:
         """Writes the periods that are over by then: what is broken off is there up to there."""
-        if self.recorder is None or until_tick < (self._recorded + TOGETHER) * CONTROL_PERIOD_TICKS:
-            return
-        while (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:
+        while self.recorder and (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:
             there = sorted((one for one in self.wire if one.tick < end_tick), key=lambda one: one.tick)
             self.wire = [one for one in self.wire if one.tick >= end_tick]
             begin_tick = self._recorded * CONTROL_PERIOD_TICKS
             self.recorder.write(Period(self._recorded, begin_tick, (), tuple(there), ""))
             self._recorded += 1
-        self.recorder.flush()
+            if self._recorded % TOGETHER == 0:
+                self.recorder.flush()
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("_"):
             raise AttributeError(name)
         raise NotObservable(f"`{name}` of a robot's world")
-
-
-class PortWaits:
-    """Waits on what the PC sees; each event is taken by one of them."""
-
-    def __init__(self, port: RobotPort) -> None:
-        self.port = port
-        self.cursor = Cursor(port.log)
-        self.backlog: list[Event] = []
-
-    def collect(self) -> None:
-        self.backlog += [event for _, event in self.cursor.read()]
-
-    def pass_over(self) -> None:
-        """What was collected does not count for the next wait."""
-        self.backlog.clear()
-
-    def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
-        """The next event for which one of them is true. Raises WaitExpired, NotObservable."""
-        for condition in conditions:
-            if not isinstance(condition, SEEN):
-                raise NotObservable(f"{condition}")
-        port, begun_tick = self.port, self.port.tick
-        deadline = NEVER_TICK if within is None else begun_tick + within
-        seen: list[Event] = []
-        while True:
-            self.collect()
-            while self.backlog and self.backlog[0].tick <= deadline:
-                event = self.backlog.pop(0)
-                if any(condition.met_by(event) for condition in conditions):
-                    return event
-                seen.append(event)
-            if port.finished or port.tick >= deadline:
-                why = "the run ended" if port.finished else f"{within} ticks passed"
-                raise WaitExpired(conditions, begun_tick, port.tick, why, seen[-SEEN_AT_MOST:])
-            port.read_one(min(deadline, port.end_tick))
 
 
 def _opened(url: str) -> Any:

@@ -7,7 +7,7 @@ that a wait for something else (`world`, `robot`) takes nothing away from it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import msgspec
 
@@ -45,20 +45,14 @@ class SentFrame(msgspec.Struct, frozen=True):
     data: bytes
 
 
-class AnyWaits(Protocol):
-    """Waits on the events of a world, or of robots at a port."""
-
-    def until(self, conditions: Sequence[Condition], within: int | None) -> Event: ...
-
-
 class Link(FrameSender):
     """The host's end of `network`. Sequence numbers count by themselves; `velocities` are those that were sent last."""
 
-    def __init__(self, world: World, network: int = 0, waits: AnyWaits | None = None) -> None:
+    def __init__(self, world: World, network: int = 0) -> None:
         super().__init__(world, network, -1)
         self.answers: list[tuple[int, TelemetryFrame]] = []
         """(tick, answer) of all that were heard."""
-        self._waits: AnyWaits = Waits(world) if waits is None else waits
+        self._waits = Waits(world)
         self._cursor = Cursor(world.networks[network].log)
         self._open: list[tuple[int, TelemetryFrame]] = []
         self._characters: list[Event] = []

@@ -13,7 +13,7 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.desk.robot_port import NotObservable, PortWaits, RobotPort, check_observable
+from mirotwin.desk.robot_port import NotObservable, RobotPort, check_observable
 from mirotwin.testing.link import Link
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.rig_options import marker_options, rig_options
@@ -60,7 +60,7 @@ class PortFixtures:
 
     @pytest.fixture
     def link(self, world: RobotPort) -> Link:
-        return Link(cast("World", world), waits=PortWaits(world))
+        return Link(cast("World", world))
 
     @pytest.fixture
     def links(self, link: Link) -> list[Link]:

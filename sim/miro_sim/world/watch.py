@@ -117,7 +117,7 @@ class Watch:
         networks = self.world.networks
         if not 0 <= condition.network < len(networks):
             raise ValueError(f"there is no network {condition.network}; there are {len(networks)}, from 0 on")
-        slot = condition.at_slot(networks[condition.network].robots[0].spec.slot)
+        slot = condition.at_slot(min(robot.slot for robot in networks[condition.network].spec.robot))
         if slot != PC:
             self.world.robot(condition.network, slot)
         return condition.network, slot
