@@ -95,7 +95,7 @@ def compare(
     found: list[Difference] = []
     beside, open_values = [], 0
     for slot in there:
-        both = _side_by_side(answers(port, [slot]), answers(twin, [slot]))
+        both = _side_by_side(answers(port, [slot]), answers(twin, [slot]), port[-1].tick - rule.within_ticks)
         late = [here.tick - there.tick for here, there in both if here is not None and there is not None]
         beside.append(RobotBesideTwin(slot, both, max(late, default=0)))
         for one in _judged(both, late, slot, sent, rule):
@@ -106,8 +106,10 @@ def compare(
     return PortComparison(beside, sorted(found, key=lambda one: one.tick), tuple(sorted(silent)), open_values)
 
 
-def _side_by_side(port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer]) -> list[AnswerPair]:
-    """With the ticks of the port less the shortest delay."""
+def _side_by_side(
+    port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer], until_tick: int
+) -> list[AnswerPair]:
+    """With the ticks of the port less the shortest delay. After `until_tick` none of its answers is missing."""
     heard = defaultdict(list)
     for answer in port:
         heard[answer.text].append(answer.tick)
@@ -119,7 +121,8 @@ def _side_by_side(port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer]) -> l
             delays.append(ticks[at] - answer.tick)
     way = min(delays, default=0)
     shifted = [answer._replace(tick=answer.tick - way) for answer in port]
-    return list(pairs(shifted, twin, 0, TOGETHER_TICKS))
+    both = pairs(shifted, twin, 0, TOGETHER_TICKS)
+    return [(here, there) for here, there in both if here or (there and there.tick + way <= until_tick)]
 
 
 class _Sent:

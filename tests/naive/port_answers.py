@@ -57,8 +57,11 @@ def fastest(sent, first_tick, last_tick):
     return max((abs(word) for pair in told for word in pair), default=0)
 
 
-def compared(port, twin, sent, within_counts, within_ticks):
-    """The differences of one robot as (tick, channel), in their order, and how many values time leaves open."""
+def compared(port, twin, sent, lost_tick, within_counts, within_ticks):
+    """The differences of one robot as (tick, channel), in their order, and how many values time leaves open.
+
+    `lost_tick`: when the port was there no longer.
+    """
     way = shortest_delay(port, twin)
     port = [(tick - way, said) for tick, said in port]
     questions = [(one, partner(one, port)) for one in twin]
@@ -71,7 +74,8 @@ def compared(port, twin, sent, within_counts, within_ticks):
     for one, other in questions:
         earlier = [both for both in full if both[0][0] < (one or other)[0]]
         if not (one and other):
-            if earlier:
+            still_to_come = one and one[0] + way + within_ticks > lost_tick
+            if earlier and not still_to_come:
                 differences.append(((one or other)[0], "answer"))
             continue
         at = full.index((one, other))

@@ -26,8 +26,9 @@ question = st.fixed_dictionaries(
 )
 
 
-def run(transmissions):
-    return [Period(0, 0, (), tuple(sorted(transmissions, key=lambda one: one.tick)), "")]
+def run(transmissions, end_tick=0):
+    wire = tuple(sorted(transmissions, key=lambda one: one.tick))
+    return [Period(0, 0, (), wire, ""), Period(1, end_tick, (), (), "")]
 
 
 @given(
@@ -35,8 +36,9 @@ def run(transmissions):
     st.integers(0, 60_000),
     st.integers(0, 65535),
     st.integers(0, 255),
+    st.integers(0, 200),
 )
-def test_the_comparison_finds_what_the_slow_one_finds(questions, way_us, offset, count):
+def test_the_comparison_finds_what_the_slow_one_finds(questions, way_us, offset, count, after_ms):
     tick, sent, port, twin = 1_000_000, [], [], []
     mine = theirs = (0, 0)
     accepted = 0
@@ -61,9 +63,10 @@ def test_the_comparison_finds_what_the_slow_one_finds(questions, way_us, offset,
     heard = [
         [Transmission(at - ANSWER_TICKS, UP, encode(said, 3)) for at, said in side] for side in (port, twin)
     ]
-    found = compare(run([*sent, *heard[0]]), run([*sent, *heard[1]]), 3)
+    lost_tick = sent[-1].end_tick + after_ms * MS
+    found = compare(run([*sent, *heard[0]], lost_tick), run([*sent, *heard[1]]), 3)
     frames = [(one.end_tick, asked["words"]) for one, asked in zip(sent, questions, strict=True)]
-    wanted = port_answers.compared(port, twin, frames, ANSWERS.within_counts, ANSWERS.within_ticks)
+    wanted = port_answers.compared(port, twin, frames, lost_tick, ANSWERS.within_counts, ANSWERS.within_ticks)
     if port:
         assert (sorted((one.tick, one.channel) for one in found.differences), found.not_judged) == (
             sorted(wanted[0]),

@@ -5,8 +5,9 @@ The robot is another world behind `miro://`, whose clock is virtual: each test g
 
 import pytest
 
+from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.recording import reader
-from tests.mirotwin.desk.rig import ROBOT
+from tests.mirotwin.desk.rig import PERIOD, ROBOT
 
 
 def test_an_equal_robot_answers_as_its_twin_does(mirotwin, drive):
@@ -49,6 +50,22 @@ def test_a_recording_made_at_a_port_is_one_like_any_other(mirotwin, drive):
         assert code == 0, err
     code, out, _ = mirotwin("replay", "desk", "-q")
     assert (code, "the robot answers as its twin does, 17 times" in out) == (0, True)
+
+
+@pytest.mark.parametrize("part", [5, 6, 7])
+def test_an_answer_that_a_lost_port_did_not_wait_for_is_not_missing(mirotwin, drive, monkeypatch, part):
+    read = RobotPort._read
+
+    def vanishing(port, wait_ticks):
+        if port._now > (50 + part / 4) * PERIOD:
+            raise PortError(port.url, "", "the port is lost")
+        return read(port, min(wait_ticks, 24_000))
+
+    monkeypatch.setattr(RobotPort, "_read", vanishing)
+    code, _, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", "--out", "desk")
+    assert (code, "the port is lost" in err) == (2, True)
+    code, out, err = mirotwin("replay", "desk/run.part.mcap", "-q")
+    assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
 
 
 def test_a_run_is_sent_again_as_a_stream_is(mirotwin, tmp_path, monkeypatch):
