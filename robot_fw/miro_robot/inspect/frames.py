@@ -12,10 +12,10 @@ from itertools import pairwise
 import msgspec
 
 from miro_robot.image import Image
-from miro_robot.inspect.stack_depth import VECTORS, StackReader
+from miro_robot.inspect.stack_depth import JMP_TABLE, VECTORS, StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import is_call, target
+from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, target
 
 _MOST_FRAMES = 128  # two bytes each fill internal RAM
 _LCALL_BYTES, _ACALL_BYTES = 3, 2
@@ -51,6 +51,7 @@ class Unwinder:
         for first, _ in names.functions:
             if first not in self._ways:  # called by a pointer, if at all
                 self._enter(first)
+        self._enter_nameless(image.used)
         self.heights = {
             address: found
             for address, ways in self._ways.items()
@@ -69,6 +70,20 @@ class Unwinder:
                 self._ways.setdefault(address, []).append((height, entry))
                 to = target(self.code, address) if is_call(self.code[address]) else None
                 waiting += [] if to is None else [to]
+
+    def _enter_nameless(self, used: list[tuple[int, int]]) -> None:
+        """The same of functions of a library that only a pointer calls: each begins where another one ends."""
+        waiting = sorted(self._ways)
+        while waiting:
+            address = waiting.pop()
+            opcode = self.code[address]
+            after = address + LENGTH[opcode]
+            ends = not goes_on(opcode) and opcode != JMP_TABLE
+            if ends and after not in self._ways and any(first <= after < end for first, end in used):
+                for place, height in self._reader.heights(after).items():
+                    if place not in self._ways:
+                        self._ways[place] = [(height, after)]
+                        waiting.append(place)
 
     def base(self, cpu: Cpu) -> int:
         """Of the function that `cpu` is in; SP itself where the code does not tell."""

@@ -18,14 +18,17 @@ from miro_robot.image import Image
 from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, is_conditional, target
 
 _SP = 0x81
-_RETI, _JMP_TABLE, _SJMP = 0x32, 0x73, 0x80
+_RETI, _SJMP = 0x32, 0x80
+JMP_TABLE = 0x73
 _PUSH, _POP, _INC, _DEC, _MOV_DATA, _MOV_DIRECT = 0xC0, 0xD0, 0x05, 0x15, 0x75, 0x85
-_FRAME = (0xE5, _SP, 0x24, -1, 0xF5, _SP)  # MOV A,SP; ADD A,#n; MOV SP,A
+_ROOM = (0xE5, _SP, 0x24, -1, 0xF5, _SP)  # MOV A,SP; ADD A,#n; MOV SP,A
+_FRAME = (0xE5, _SP, 0xF5, -1, 0x24, -1, 0xF5, _SP)  # with MOV bp,A after the first: the frame pointer is SP
 _WRITES = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x85, 0xC5, 0xD0, 0xD5, 0xF5}
 VECTORS = tuple(range(0x03, 0x2C, 8))
 _CALL_BYTES = 2
 _RAM_BYTES = 0x100
-_TABLE_JUMPS = (0x02, *range(0x01, 0x100, 0x20))  # LJMP and AJMP
+_LONGEST = 3  # bytes of an instruction
+_TABLE_JUMPS = (0x02, _SJMP, *range(0x01, 0x100, 0x20))  # LJMP, SJMP and AJMP
 
 
 class Depth(msgspec.Struct, frozen=True):
@@ -120,15 +123,15 @@ class StackReader:
             reached[address] = at
             size, after, odd = self._after(address, at)
             unknown |= odd
-            if size == len(_FRAME):  # three instructions, of which the last one moves SP
-                reached.update({address + 2: at, address + 4: at})
+            if size > _LONGEST:  # several instructions, of which the last one moves SP
+                reached.update(dict.fromkeys(range(address, address + size, 2), at))
             opcode = self.code[address]
             if goes_on(opcode):
                 waiting.append((address + size, after))
             to = self._branch(address)
             if to is not None:
                 waiting.append((to, after))
-            if opcode == _JMP_TABLE:
+            if opcode == JMP_TABLE:
                 unknown.add("a jump by a table")
                 waiting += [(place, after) for place in self._table(address + size)]
         return {address: at.height for address, at in reached.items()}, unknown
@@ -141,10 +144,12 @@ class StackReader:
 
     def _after(self, address: int, at: _At) -> tuple[int, _At, set[str]]:
         """Bytes of code taken, what holds after them, and what could not be told."""
-        code = self.code[address : address + 6].ljust(6, b"\0")
+        code = self.code[address : address + len(_FRAME)].ljust(len(_FRAME), b"\0")
         opcode, size, height = code[0], LENGTH[code[0]], at.height
-        if all(want in (-1, byte) for want, byte in zip(_FRAME, code, strict=True)):
-            return 6, _At(height + (code[3] ^ 0x80) - 0x80, at.frame), set()
+        for form, frame in ((_ROOM, at.frame), (_FRAME, height)):
+            if all(want in (-1, byte) for want, byte in zip(form, code, strict=False)):
+                room = code[len(form) - 3]
+                return len(form), _At(height + (room ^ 0x80) - 0x80, frame), set()
         if opcode == _MOV_DIRECT and code[1] == _SP:  # 85 source destination: the frame pointer is SP
             return size, _At(height, height), set()
         if opcode == _PUSH:

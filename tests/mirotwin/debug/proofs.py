@@ -25,8 +25,9 @@ from mirotwin.rerun.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.debug.runs import debugger_of, robot_run
 
-RETURNS, JBC = (0x22, 0x32), 0x10
+JBC = 0x10
 MIX = Path(__file__).parents[2] / "robot" / "ucsim" / "programs" / "mix.c"
+LIBRARY = Path(__file__).parent / "library.c"
 
 
 def written_bytes(run, begin_tick, end_tick, first, last):
@@ -91,7 +92,7 @@ class Shadow(Watcher):
 
     def __init__(self, image, share, seed=0):
         self.unwinder = Unwinder(image, SymbolNames(image))
-        self.calls = []
+        self.calls = []  # (address of return, SP when it was pushed)
         self.share, self.chance = share, random.Random(seed)
         self.compared, self.wrong = 0, []
 
@@ -99,19 +100,20 @@ class Shadow(Watcher):
         if self.chance.random() < self.share:
             frames = self.unwinder.frames(cpu)
             self.compared += 1
-            if [frame.pc for frame in frames[1:]] != self.calls[::-1] or not frames[-1].known:
+            calls = [back for back, _ in reversed(self.calls)]
+            if [frame.pc for frame in frames[1:]] != calls or not frames[-1].known:
                 self.wrong.append(cpu.pc)
 
     def executed(self, cpu, pc, start):
         opcode = cpu.code_at(pc)
         if is_call(opcode):
-            self.calls.append(pc + LENGTH[opcode])
-        elif opcode in RETURNS and self.calls and self.calls[-1] == cpu.pc:
-            self.calls.pop()  # any other RET is a jump: SDCC goes so to what a pointer names
+            self.calls.append((pc + LENGTH[opcode], cpu.sp))
+        while self.calls and self.calls[-1][1] > cpu.sp:
+            self.calls.pop()  # a RET alone may be a jump: SDCC goes so to what a pointer names
         self.compare(cpu)
 
     def interrupted(self, cpu, source, pc, start):
-        self.calls.append(pc)
+        self.calls.append((pc, cpu.sp))
         self.compare(cpu)
 
 
@@ -130,10 +132,10 @@ def assembled(source):
     return BareRun(BareMachine(image(source), stop_on_fault=False), None, None)
 
 
-def compiled(folder):
-    """A run of the C program that the lock-step with ucsim executes, built by SDCC."""
-    target = Path(folder) / "mix.ihx"
-    children.run(["sdcc", "-mmcs51", "--model-small", "--debug", str(MIX), "-o", str(target)], check=True)
+def compiled(folder, source, *options):
+    """A run of a C program, built by SDCC."""
+    target = Path(folder) / "program.ihx"
+    children.run(["sdcc", "-mmcs51", "--debug", *options, str(source), "-o", str(target)], check=True)
     return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
 
 
@@ -153,7 +155,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         runs = {
             "the robot's own": robot_run("sine"),
-            "SDCC's mix.c": compiled(folder),
+            "SDCC's mix.c": compiled(folder, MIX),
+            "SDCC's library": compiled(folder, LIBRARY),
+            "SDCC's library with --stack-auto": compiled(folder, LIBRARY, "--stack-auto"),
             "assembler": assembled(ASM),
         }
         for name, run in runs.items():

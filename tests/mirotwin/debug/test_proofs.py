@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from tests.mirotwin.debug.proofs import assembled, compiled, stacks, wrong_writers
+from tests.mirotwin.debug.proofs import LIBRARY, MIX, assembled, compiled, stacks, wrong_writers
 from tests.mirotwin.debug.runs import SECOND, robot_run
 from tests.mirotwin.debug.test_debug_command import ASM
 
@@ -28,7 +28,10 @@ def test_stacks_of_a_firmware_in_assembler_are_those_of_the_calls():
 
 
 @pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
-def test_stacks_of_a_program_of_sdcc_are_those_of_the_calls(tmp_path):
-    shadow = stacks(compiled(tmp_path), SECOND // 50, 0.1)
+@pytest.mark.parametrize(
+    "program", [(MIX,), (LIBRARY,), (LIBRARY, "--stack-auto")], ids=["mix", "library", "stack-auto"]
+)
+def test_stacks_of_a_program_of_sdcc_are_those_of_the_calls(tmp_path, program):
+    shadow = stacks(compiled(tmp_path, *program), SECOND // 10, 0.1)
     assert shadow.compared > 1000
     assert shadow.wrong == []

@@ -31,6 +31,10 @@ def depth(text):
             "PUSH 08h\nMOV 08h,SP\nMOV A,SP\nADD A,#28h\nMOV SP,A\nMOV SP,08h\nPOP 08h\nPUSH ACC\nend:\nSJMP end",
             0x29,
         ),
+        (
+            "PUSH 08h\nMOV A,SP\nMOV 08h,A\nADD A,#28h\nMOV SP,A\nMOV SP,08h\nPOP 08h\nPUSH ACC\nend:\nSJMP end",
+            0x29,
+        ),
         ("INC SP\nINC SP\nDEC SP\nend:\nSJMP end", 2),
     ],
 )
@@ -63,9 +67,11 @@ def test_each_instruction_that_makes_room_has_its_height():
     assert heights == {0: 0, 2: 1, 4: 1, 6: 1, 8: 0x29}
 
 
-def test_the_jumps_of_a_table_are_followed():
-    text = "JMP @A+DPTR\nLJMP one\nLJMP two\none:\nPUSH ACC\nend:\nSJMP end\ntwo:\nPUSH ACC\nPUSH B\nSJMP end"
-    assert depth(text).main.size == 2
+@pytest.mark.parametrize("jump", ["LJMP", "SJMP"])
+def test_the_jumps_of_a_table_are_followed(jump):
+    table = f"JMP @A+DPTR\n{jump} one\n{jump} two\n"
+    text = "one:\nPUSH ACC\nend:\nSJMP end\ntwo:\nPUSH ACC\nPUSH B\nSJMP end"
+    assert depth(table + text).main.size == 2
 
 
 PARTS = st.lists(st.sampled_from(["PUSH ACC", "POP B", "INC SP", "DEC SP", "NOP", "LCALL f"]), max_size=30)
