@@ -34,6 +34,7 @@ from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.expectations import CHECK
 
 
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
@@ -42,6 +43,10 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     resume: Annotated[str | None, RESUME.saying("Scenario: begin with a saved world of it.")] = None
+    check: Annotated[
+        str | None,
+        CHECK.saying("Case of a bare processor: FILE.py:FUNCTION, where its check is in a file."),
+    ] = None
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
 
@@ -57,7 +62,8 @@ class Opened(msgspec.Struct):
 def launched(given: Mapping[str, Any]) -> DebugSubject:
     """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput."""
     words: list[str] = []
-    names = {_key(name): name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject")}
+    fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "check")]
+    names = {_key(name): name for name in fields}
     for key in names.keys() & {key for key, value in given.items() if value is not None}:
         option = f"--{'set' if key == 'set' else names[key].replace('_', '-')}"
         values = given[key] if isinstance(given[key], list) else [given[key]]
@@ -85,6 +91,8 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
         subject = file_in(subject, (*RECORDINGS, *CASES))
         options = msgspec.structs.replace(options, subject=subject)
     case, judge = _opened(options)
+    if options.check is not None and not isinstance(case, CaseRun):
+        raise BadInput(subject, "--check", "is for a case of a bare processor", "leave it out")
     run = case if case is not None else open_run(options)
     assert isinstance(run, RobotRun | BareRun | CaseRun)
     if options.resume is not None:
@@ -139,7 +147,7 @@ def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
         what = "is for a bare processor, which has no firmware of its own"
         raise BadInput(path, "", what, "give --firmware IMAGE.ihx")
     image = load_firmware(options.firmware, SPACE_BYTES)
-    again, header = rerun_bare_case(path, image)
+    again, header = rerun_bare_case(path, image, options.check)
     failures = [] if again.failure is None else [again.failure]
     end_tick = max([again.end_tick, *(one.tick for one in failures)])
     playback = BarePlayback(image, again.line, again.script, end_tick, path)

@@ -93,7 +93,7 @@ def _print_crash(crash: Crash, more: int, out: Path, image: Image, check: str | 
     in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
     stream = out / crash.folder / f"{crash.name}.stream"
     show_line(f"    {replay_line(stream, foreign_path(image), in_file)}")
-    show_line(f"    {debug_line(stream, foreign_path(image))}")
+    show_line(f"    {debug_line(stream, foreign_path(image), check=in_file)}")
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:

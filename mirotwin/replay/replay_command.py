@@ -80,20 +80,23 @@ def replay_case(job: Job, quiet: bool) -> int:
     return verdict.code
 
 
-def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
+def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:
     """The same for a case of a bare processor. `check`: FILE.py:FUNCTION, for a case whose check is in a file."""
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
         raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
     from mirotwin.verify.bare.case import replay_bare  # loads the bare processor
 
-    return _say(replay_bare(path, load_firmware(firmware, SPACE_BYTES), check))
+    verdict = replay_bare(path, load_firmware(firmware, SPACE_BYTES), check)
+    _say(verdict)
+    if verdict.failure is not None and not quiet:
+        show(debug_line(path, firmware, check=check))
+    return verdict.code
 
 
-def _say(verdict: CaseVerdict) -> int:
+def _say(verdict: CaseVerdict) -> None:
     for line in verdict.lines:
         (show if verdict.code == DONE else complain)(line)
-    return verdict.code
 
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
@@ -160,7 +163,7 @@ def replay(options: ReplayOptions) -> int:
     if is_bare_case(file):
         _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
         choose_engine(options.engine)
-        return replay_bare_case(file, options.firmware, options.check)
+        return replay_bare_case(file, options.firmware, options.check, options.quiet)
     _refuse(file, "is for a case of a bare processor", options.given("check"))
     settings = (*options.settings, *as_settings(options.expected))
     if options.stack_from is not None and options.firmware is None:

@@ -37,11 +37,14 @@ class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
 
 
 def debug_line(
-    file: str | PathLike[str], firmware: str | PathLike[str] | None = None, at_tick: int | None = None
+    file: str | PathLike[str],
+    firmware: str | PathLike[str] | None = None,
+    at_tick: int | None = None,
+    check: str | None = None,
 ) -> str:
     """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
     image, at = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
-    return DebugLineOptions(file=f"{file}", firmware=image, at=at).command_line()
+    return DebugLineOptions(file=f"{file}", firmware=image, at=at, check=check).command_line()
 
 
 def replay_line(

@@ -71,7 +71,7 @@ class Unwinder:
                 to = target(self.code, address) if is_call(self.code[address]) else None
                 waiting += [] if to is None else [to]
 
-    def _enter_nameless(self, used: list[tuple[int, int]]) -> None:
+    def _enter_nameless(self, used: tuple[tuple[int, int], ...]) -> None:
         """The same of functions of a library that only a pointer calls: each begins where another one ends."""
         waiting = sorted(self._ways)
         while waiting:

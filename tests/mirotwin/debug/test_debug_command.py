@@ -8,6 +8,7 @@ from miro_robot.firmware import image_path
 from tests import children
 from tests.mirotwin.debug.runs import robot_run
 from tests.mirotwin.verify.bare.firmwares import SLEEPS
+from tests.mirotwin.verify.bare.test_case import CHECK
 from tests.mirotwin.verify.bare.test_case import case as bare_case
 from tests.robot.mcs51.asm import assemble
 
@@ -142,6 +143,24 @@ def test_a_case_of_a_bare_processor_stands_at_its_fault_and_goes_back(mirotwin, 
     code, _, err = mirotwin("debug", file, *commands("where"))
     assert code == 2
     assert err.endswith("give --firmware IMAGE.ihx\n")
+
+
+def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
+    firmware, check = tmp_path / "sleeps.ihx", tmp_path / "mine.py"
+    firmware.write_text(hex_text(assemble(SLEEPS)))
+    check.write_text(
+        "def too_long(run):\n    return f'{len(run.sent)} are too many' if len(run.sent) > 2 else None\n"
+    )
+    file = bare_case(tmp_path, b"abc", check=CHECK)
+    given = ("debug", file, "--firmware", firmware)
+    code, out, err = mirotwin(*given, "--check", f"{check}:too_long", *commands("rstepi"))
+    assert (code, err) == (0, "")
+    assert out.splitlines()[1].startswith("fails as recorded: too_long: tick ")
+    assert "  case: " in out
+    code, _, err = mirotwin(*given, *commands("where"))
+    assert (code, err.endswith("give it: --check FILE.py:too_long\n")) == (2, True)
+    code, _, err = mirotwin("debug", "fig6", "--check", f"{check}:too_long", *commands("where"))
+    assert (code, "is for a case of a bare processor" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

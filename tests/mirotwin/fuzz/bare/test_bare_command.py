@@ -80,7 +80,10 @@ def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes,
         case = next((out_folder / "crashes").glob("never_q-*.stream"))
         again = next(line for line in out.splitlines() if line.startswith(f"    mirotwin replay {case}"))
         assert again.endswith(f" --check {check}")
-        assert mirotwin(*shlex.split(again)[1:])[2].startswith("mirotwin: fails as recorded: never_q")
+        _, out, err = mirotwin(*shlex.split(again)[1:])
+        assert err.startswith("mirotwin: fails as recorded: never_q")
+        debug = f"mirotwin debug {case} --firmware {hexes['polls']} --check {check}"
+        assert out.splitlines() == [debug]
     code, out, _ = mirotwin("test", case, "--firmware", hexes["polls"], "--check", check)
     assert (code, "FAILED" in out) == (1, True)
     code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"], "--check", check)
