@@ -150,7 +150,7 @@ class BuildHot(build_ext):
         for extension in self.extensions:
             extension.sources = sources[extension.name]
             for source in map(Path, extension.sources):
-                self._write(source, from_file("constants").constants(source.read_text(encoding="utf-8")))
+                self._write(source, from_file("threaded").constants(source.read_text(encoding="utf-8")))
             if self.compiler.compiler_type == "unix":
                 extension.sources = [self._thread(Path(source)) for source in extension.sources]
             hottest = HOTTEST.fullmatch(extension.name)

@@ -21,7 +21,7 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_right
 
-from miro_exact.seed import MAX_SEED
+from miro_exact.domain import MAX_SEED
 
 INDICES = 1 << 56
 

@@ -15,7 +15,7 @@ import msgspec
 from miro_exact.domain import DomainError
 from miro_exact.state import Items
 from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, EstimatorInput
-from miro_host.estimators.none import NoEstimator
+from miro_host.estimators.predict import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
 from miro_host.plugins import PluginError

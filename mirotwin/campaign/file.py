@@ -38,8 +38,8 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
+from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
-from miro_exact.seed import MAX_SEED
 from miro_protocol.toml_text import TEXT_KIB, long_key_line, not_finite
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign import builtin

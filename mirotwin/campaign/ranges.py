@@ -13,7 +13,7 @@ from typing import Any, NoReturn, Protocol
 
 import click
 
-from miro_exact.seed import MAX_SEED
+from miro_exact.domain import MAX_SEED
 from mirotwin.campaign.design import Draw, Value
 from mirotwin.shell.command import Option
 

@@ -7,10 +7,9 @@ from typing import Annotated
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import PWM_PERIOD_TICKS
-from miro_robot.inspect.gtkw import write_save_file
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import HEADING, InstructionTrace
-from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform
+from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform, write_save_file
 from mirotwin.firmware.code_place import SYMBOL, functions_at
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.firmware.subject import WindowOptions, look, open_window

@@ -15,7 +15,7 @@ from urllib.parse import unquote
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.seed import MAX_SEED
+from miro_exact.domain import MAX_SEED
 from miro_sim.scenario.keys import MAX_NETWORKS
 from mirotwin.ports.serve_command import LONGEST_S
 from mirotwin.rerun.pacing import FASTEST

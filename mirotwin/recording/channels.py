@@ -11,13 +11,63 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from miro_exact.clock import nanoseconds
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
-from mirotwin.recording import images, topics
+from mirotwin.recording import topics
+
+IMAGE_SCHEMA_NAME = "foxglove.CompressedImage"
+SECOND_NS = 1_000_000_000
+
+_WHOLE = {"type": "integer", "minimum": 0}
+IMAGE_SCHEMA: dict[str, Any] = {
+    "title": IMAGE_SCHEMA_NAME,
+    "description": "A compressed image",
+    "type": "object",
+    "properties": {
+        "timestamp": {
+            "type": "object",
+            "title": "time",
+            "properties": {"sec": _WHOLE, "nsec": {**_WHOLE, "maximum": SECOND_NS - 1}},
+            "description": "Timestamp of image",
+        },
+        "frame_id": {"type": "string", "description": "Frame of reference for the image"},
+        "data": {
+            "type": "string",
+            "contentEncoding": "base64",
+            "description": "Compressed image data",
+        },
+        "format": {"type": "string", "description": "Image format"},
+        "tick": {**_WHOLE, "description": "Of the middle of the exposure"},
+    },
+}
+
+
+class TimeMessage(msgspec.Struct, frozen=True):
+    """Simulated time, rounded down to nanoseconds."""
+
+    sec: int
+    nsec: int
+
+
+class ImageMessage(msgspec.Struct, frozen=True):
+    """`camera/image`: a plain frame as the PC gets it; `data` is a file of this `format`, in base64 as JSON."""
+
+    timestamp: TimeMessage
+    frame_id: str
+    data: bytes
+    format: str
+    tick: Annotated[int, Meta(ge=0, le=MAX_TICK)]
+
+
+def image_message(network: int, tick: int, png: bytes) -> ImageMessage:
+    """The frame of a network's camera that was exposed at `tick`."""
+    at = TimeMessage(*divmod(nanoseconds(tick), SECOND_NS))
+    return ImageMessage(at, f"net{network}/camera", png, "png", tick)
 
 
 class TheoryMessage(msgspec.Struct, frozen=True):
@@ -212,7 +262,7 @@ OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
     topics.PERIOD: PeriodMessage,
     topics.WIRE: WireMessage,
     topics.ACTIONS: ActionMessage,
-    topics.IMAGE: images.ImageMessage,
+    topics.IMAGE: ImageMessage,
 }
 
 
@@ -347,3 +397,43 @@ def _axis(registers: RegistersMessage, duty: DutyMessage) -> Axis:
         pwm_magnitude=duty.magnitude,
         commands=tuple((one.tick, one.opcode, one.data) for one in registers.commands),
     )
+
+
+def schema_text(message: msgspec.Struct) -> bytes:
+    """The JSON schema of a message, as text."""
+    return _text(type(message), tuple(message.inner) if isinstance(message, ControlMessage) else None)
+
+
+@cache
+def _text(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> bytes:
+    """Made once: it takes longer than some control periods, and many robots have the same channels."""
+    return msgspec.json.encode(IMAGE_SCHEMA if kind is ImageMessage else _schema(kind, inner))
+
+
+def _schema(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> dict[str, object]:
+    """The schema with references resolved: viewers want one plain tree.
+
+    The keys of a map, `inner`, become properties, because viewers offer nothing else to choose from.
+    """
+    (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
+    resolved: dict[str, object] = _resolved(tree, parts)
+    if inner is not None:
+        names = {name: {"type": "number"} for name in inner}
+        named = {"type": "object", "properties": names, "required": list(names)}
+        resolved["properties"] = {**resolved["properties"], "inner": named}  # type: ignore[dict-item]
+    return resolved
+
+
+def _resolved(node: Any, parts: dict[str, Any]) -> Any:
+    if isinstance(node, dict):
+        if "$ref" in node:
+            return _resolved(parts[node["$ref"]], parts)
+        return {key: _resolved(value, parts) for key, value in node.items()}
+    return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
+
+
+def schema_name(message: msgspec.Struct) -> str:
+    """What its schema is called."""
+    if isinstance(message, ImageMessage):
+        return IMAGE_SCHEMA_NAME
+    return f"mirotwin.{type(message).__name__.removesuffix('Message')}"

@@ -18,8 +18,10 @@ from typing import Literal, get_args
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
-from miro_sim.periods import Period, RobotPeriod
-from mirotwin.recording import fields, sequences
+from miro_host.eye.track import Sighting
+from miro_host.posture import Posture
+from miro_sim.periods import Axis, Period, RobotPeriod
+from mirotwin.recording import sequences
 from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.sequences import LogEntry
 
@@ -90,18 +92,22 @@ def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> I
                 yield Difference(end_tick, here.index, -1, -1, DIGEST, here.digest, there.digest)
 
 
-Named = Iterator[tuple[str, fields.Value, fields.Value]]
+Value = int | float | str | None
+NamedValues = Iterator[tuple[str, Value]]
+COUNTERS = ("firmware accepted", "firmware rejected", "firmware stale")
+"""Absent where an image exports no such symbols: nothing is said about them then."""
+Named = Iterator[tuple[str, Value, Value]]
 
 
 def _values(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
     """Every value that is not the same."""
-    theirs = dict(fields.response(twin))
-    for name, value in fields.response(robot):
-        unknown = name in fields.COUNTERS and (value is None or theirs[name] is None)
+    theirs = dict(_response(twin))
+    for name, value in _response(robot):
+        unknown = name in COUNTERS and (value is None or theirs[name] is None)
         if value != theirs[name] and not unknown:
             yield name, value, theirs[name]
     if rule.host:
-        mine, theirs = dict(fields.of_host(robot)), dict(fields.of_host(twin))
+        mine, theirs = dict(_of_host(robot)), dict(_of_host(twin))
         for name in {**mine, **theirs}:
             if mine.get(name) != theirs.get(name):
                 yield name, mine.get(name), theirs.get(name)
@@ -161,3 +167,43 @@ def _unlike(
         if tick < known_tick or (here is not None and there is not None):
             texts = (None if here is None else str(here), None if there is None else str(there))
             yield Difference(tick, tick // CONTROL_PERIOD_TICKS, *place, *texts)
+
+
+def _response(robot: RobotPeriod) -> NamedValues:
+    """What the robot did: its counters, LM629s, PWM and motion."""
+    yield from zip(COUNTERS, (robot.accepted, robot.rejected, robot.stale), strict=True)
+    for side, axis in (("left", robot.left), ("right", robot.right)):
+        yield from _axis(side, axis)
+    yield from _posture("truth", robot.truth)
+    yield "truth v_m_s", robot.v_m_s
+    yield "truth w_rad_s", robot.w_rad_s
+
+
+def _of_host(robot: RobotPeriod) -> NamedValues:
+    """What its PC measured and commanded, and where it should be."""
+    yield from _posture("reference", robot.reference)
+    seen = robot.measurement
+    yield from _posture("measurement", seen)
+    if isinstance(seen, Sighting):
+        yield "measurement exposed_tick", seen.tick
+        yield "measurement confidence", seen.confidence
+    control = robot.control
+    yield "control v_m_s", None if control is None else control.v_m_s
+    yield "control w_rad_s", None if control is None else control.w_rad_s
+    yield "control left", None if control is None else control.left
+    yield "control right", None if control is None else control.right
+    if control is not None:
+        yield from ((f"control inner.{name}", value) for name, value in control.inner.items())
+        yield from ((f"control estimate.{name}", value) for name, value in control.estimate.items())
+
+
+def _axis(side: str, axis: Axis) -> NamedValues:
+    for name in ("real_position", "desired_position", "desired_velocity", "status"):
+        yield f"lm629 {side} {name}", getattr(axis, name)
+    yield f"pwm {side} sign", axis.pwm_sign
+    yield f"pwm {side} magnitude", axis.pwm_magnitude
+
+
+def _posture(name: str, at: Posture | None) -> NamedValues:
+    for field in ("x_m", "y_m", "theta_rad"):
+        yield f"{name} {field}", None if at is None else getattr(at, field)

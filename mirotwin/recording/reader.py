@@ -17,9 +17,8 @@ from miro_protocol.actions import Action
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import channels
-from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS, TheoryMessage
+from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS, ImageMessage, TheoryMessage
 from mirotwin.recording.container import Cut, RecordingError
-from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, ATTACHMENTS, Messages, brief
 from mirotwin.recording.recorder import (
     FIRMWARE_ATTACHMENT,

@@ -17,9 +17,8 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
-from mirotwin.recording import channels, schemas, topics
-from mirotwin.recording.channels import TheoryMessage
-from mirotwin.recording.images import image_message
+from mirotwin.recording import channels, topics
+from mirotwin.recording.channels import TheoryMessage, image_message
 from mirotwin.recording.writer import McapWriter, Writable
 
 if TYPE_CHECKING:
@@ -219,9 +218,9 @@ class Recorder:
 
     def _schema(self, message: msgspec.Struct) -> int:
         """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
-        text = schemas.schema_text(message)
+        text = channels.schema_text(message)
         if text not in self._schemas:
-            name = schemas.schema_name(message)
+            name = channels.schema_name(message)
             number = self._named[name] = self._named.get(name, 0) + 1
             name += str(number) if number > 1 else ""
             self._schemas[text] = self._writer.add_schema(name, "jsonschema", text)

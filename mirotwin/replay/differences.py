@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import click
@@ -10,10 +10,12 @@ import msgspec
 from rich.table import Table
 
 from miro_exact.clock import seconds
-from miro_protocol.transmission import DOWN
+from miro_protocol.events import Damaged
+from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
+from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
-from mirotwin.recording.capture.frame_list import FrameLine, frame_lines
 from mirotwin.recording.capture.recorded import transmissions_of
+from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.difference import WORDS, Difference, first_per_channel, shown
 from mirotwin.replay.builds import VariableDifference
 from mirotwin.replay.firmwares import FirmwareDifference
@@ -144,3 +146,40 @@ def print_response(replayed: Sequence[Period]) -> None:
         positions = (str(robot.left.real_position), str(robot.right.real_position))
         table.add_row(f"{robot.slot}", *counters, str(commands), *positions)
     show(table)
+
+
+class FrameLine(msgspec.Struct, frozen=True):
+    """A frame or a damaged run: first start bit, direction, network, sender's slot, what it says.
+
+    `slot` is -1 for the host's, and for what a robot sent that cannot be told from its bytes.
+    """
+
+    tick: int
+    direction: str
+    network: int
+    slot: int
+    text: str
+
+
+def frame_lines(sent: Iterable[Transmission], robots: Mapping[int, int]) -> Iterator[FrameLine]:
+    """The lines of everything in `sent`; `robots` is the layout (3 or 5) of each network.
+
+    What the host sent is listed as sent, before the radio.
+    """
+    for row in rows(sent, robots.__getitem__):
+        slot = row.message.slot if isinstance(row.message, TelemetryFrame) else -1
+        yield FrameLine(row.event.start_tick, row.direction, row.network, slot, _text(row))
+
+
+def _text(row: DecodedRow) -> str:
+    event, message = row.event, row.message
+    if isinstance(event, Damaged):
+        reason = event.reason.name.lower().replace("_", " ")
+        text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
+        return text + " .." if len(event.data) > 16 else text
+    if message is None:
+        return f"frame with unknown content: {row.unknown}"
+    text = describe(message)
+    if isinstance(message, TeamFrame):
+        text += "  " + " ".join(f"{left:+d}/{right:+d}" for left, right in message.velocities)
+    return text

@@ -12,7 +12,7 @@ import click
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.transmission import DOWN, Transmission
-from mirotwin.recording.capture import convert
+from mirotwin.recording.capture import render
 from mirotwin.recording.capture.detect import NAMES, TIMED, detect
 from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
@@ -148,10 +148,10 @@ def export(options: ExportOptions) -> int:
         source = open_source(given, format, complain)
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.sent, network, given, bar)
-        pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)
+        pieces = render.to_stream(exported, layouts.of) if layouts else render.to_pcapng(exported)
         try:
             _write(out, _some(pieces, exported, given.label))
-        except convert.ConversionError as error:
+        except render.ConversionError as error:
             raise BadInput(given.label, error.place, error.what, error.remedy) from None
     if not quiet and out != STDIN:
         show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")

@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_exact.seed import MAX_SEED
+from miro_exact.domain import MAX_SEED
 from miro_robot.image import Image
 from miro_sim.scenario.file import load, parse
 from miro_sim.scenario.keys import Scenario

@@ -24,7 +24,6 @@ import msgspec
 from miro_exact.inputs import read_input
 from miro_protocol import files, stream_header
 from miro_protocol.actions import WHO_CAN, Action, ScriptItem
-from miro_protocol.stream_error import StreamError as StreamError
 from miro_protocol.stream_header import PREFIX, Header
 from miro_protocol.stream_line import (
     FIRST_LINE,
@@ -35,6 +34,7 @@ from miro_protocol.stream_line import (
     format_line,
     needs_version_2,
 )
+from miro_protocol.stream_line import StreamError as StreamError
 from miro_protocol.transmission import Transmission
 
 __all__ = [

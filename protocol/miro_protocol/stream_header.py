@@ -17,8 +17,8 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.bad_input import did_you_mean
-from miro_exact.seed import MAX_SEED
-from miro_protocol.stream_error import StreamError
+from miro_exact.domain import MAX_SEED
+from miro_protocol.stream_line import StreamError
 from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
 
 PREFIX = "#:"

@@ -16,10 +16,18 @@ import re
 from dataclasses import dataclass, field
 from reprlib import repr as brief
 
+from miro_exact.bad_input import BadInput
 from miro_protocol.actions import Action, PinLevel, Power, RadioState, Reset, ScriptItem
-from miro_protocol.stream_error import StreamError
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission, check_bad_stop
+
+
+class StreamError(BadInput):
+    """A line that cannot be read: file, line and column (from 1), the reason, and what to do about it."""
+
+    def __init__(self, source: str, line: int, column: int, reason: str, remedy: str) -> None:
+        super().__init__(source, (line, column), reason, remedy)
+
 
 MAX_TICK = (1 << 61) - 1  # decoders count ticks in 64 bits
 MAX_NETWORK = 0xFFFF

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from miro_exact.state import restore, snapshot, values
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.dynamic_feedback import DynamicFeedbackParameters
-from miro_host.laws.errors import errors
-from miro_host.laws.interface import LawInput, Velocities
+from miro_host.laws.interface import LawInput, Velocities, errors
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.registry import LAWS
 from miro_host.pilot import PERIOD_S, Pilot

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
-from miro_host.estimators.none import NoEstimator
-from miro_host.estimators.predict import PredictParameters, moved
+from miro_host.estimators.predict import NoEstimator, PredictParameters, moved
 from miro_host.estimators.registry import ESTIMATORS
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.yang_kim import Gains

@@ -12,8 +12,8 @@ from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
-from mirotwin.recording.capture.frame_list import frame_lines
 from mirotwin.recording.compare import differences
+from mirotwin.replay.differences import frame_lines
 from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from miro_exact.constants import constants
+from miro_exact.threaded import constants
 
 
 def c_of(c_type, *settings):

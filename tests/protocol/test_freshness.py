@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
-from miro_protocol.freshness import Freshness
+from miro_protocol.robot_receiver import Freshness
 
 MS = 24_000
 

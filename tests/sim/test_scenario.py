@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_host.estimators.none import NoEstimator
-from miro_host.estimators.predict import PredictParameters
+from miro_host.estimators.predict import NoEstimator, PredictParameters
 from miro_sim.scenario.camera_keys import PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_text, load, parse
 from miro_sim.scenario.keys import Scenario

@@ -1,4 +1,6 @@
-"""Prediction through the dead time of the loop, from the velocities that were sent.
+"""Postures at the time of the next command: as measured, or predicted.
+
+Prediction goes through the dead time of the loop, from the velocities that were sent.
 
 A measurement is `age_s` old when it arrives, and a command takes effect `ahead_s` after it was computed. Between the
 exposure and the effect of the next command the robot does what was commanded in the last age_s + ahead_s: a known
@@ -72,3 +74,17 @@ def moved(posture: Posture, length_m: float, turn_rad: float) -> Posture:
     return Posture(
         posture.x_m + chord_m * cos, posture.y_m + chord_m * sin, wrap_pi(posture.theta_rad + turn_rad)
     )
+
+
+class NoEstimator(EstimatorParameters, frozen=True, kw_only=True, tag="none"):
+    """The paper's loop: a measurement is taken as the posture at the time at which it arrives."""
+
+    def estimator(self) -> "Unchanged":
+        return Unchanged(self)
+
+
+class Unchanged(Estimator[NoEstimator]):
+    """Hands on what the camera gives."""
+
+    def step(self, given: EstimatorInput) -> Estimate | None:
+        return None if given.measured is None else Estimate(given.t_s, given.measured)

@@ -22,7 +22,7 @@ ESTIMATORS: Registry[AnyEstimator] = Registry(
     key="kind",
     base="miro_host.estimators.interface:EstimatorParameters",
     own={
-        "none": "miro_host.estimators.none:NoEstimator",
+        "none": "miro_host.estimators.predict:NoEstimator",
         "ekf": "miro_host.estimators.ekf:EkfParameters",
         "ekf+telemetry": "miro_host.estimators.ekf_telemetry:EkfTelemetryParameters",
         "predict": "miro_host.estimators.predict:PredictParameters",

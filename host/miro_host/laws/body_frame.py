@@ -26,8 +26,7 @@ from msgspec import Meta
 
 from miro_exact.dmath import sincos
 from miro_host.integrator import clamp
-from miro_host.laws.errors import errors
-from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters
+from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters, errors
 from miro_host.posture import Posture
 from miro_host.references.interface import Reference
 

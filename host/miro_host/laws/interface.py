@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
+from miro_exact.dmath import sincos, wrap_pi
 from miro_host.integrator import Limits
 from miro_host.laws.registry import Controller
 from miro_host.memory import Remembering
@@ -108,3 +109,22 @@ class Law(Remembering, Generic[P]):
     def step(self, given: LawInput) -> Answer:
         """One control period. Called in the order of time; a period without a posture is left out."""
         raise NotImplementedError(f"{type(self).__name__} has no method `step`")
+
+
+class Errors(msgspec.Struct, frozen=True):
+    """Where the reference is, seen from the robot, as Kanayama et al. (ICRA 1990) define it.
+
+    x ahead, y to the left, theta anticlockwise in (-pi, pi]. They do not depend on where the origin of the world is.
+    """
+
+    x_m: float
+    y_m: float
+    theta_rad: float
+
+
+def errors(reference: Posture, robot: Posture) -> Errors:
+    """The errors of `robot` against `reference`."""
+    sin, cos = sincos(robot.theta_rad)
+    dx_m, dy_m = reference.x_m - robot.x_m, reference.y_m - robot.y_m
+    theta_rad = wrap_pi(reference.theta_rad - robot.theta_rad)
+    return Errors(cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m, theta_rad)

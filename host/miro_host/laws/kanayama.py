@@ -15,8 +15,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from miro_exact.dmath import sincos
-from miro_host.laws.errors import errors
-from miro_host.laws.interface import Law, LawInput, LawParameters, Velocities
+from miro_host.laws.interface import Law, LawInput, LawParameters, Velocities, errors
 
 Gain = Annotated[float, Meta(ge=0.0, le=1e4)]
 

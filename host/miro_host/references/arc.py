@@ -13,8 +13,15 @@ from msgspec import Meta
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
-from miro_host.references.polar import with_polar_form
+from miro_host.references.interface import (
+    DEGREE,
+    Cm,
+    Reference,
+    ReferenceParameters,
+    SamplingPace,
+    TurnDeg,
+    with_polar_form,
+)
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
 PI = 3.141592653589793

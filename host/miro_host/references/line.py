@@ -6,8 +6,15 @@ import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
-from miro_host.references.polar import with_polar_form
+from miro_host.references.interface import (
+    DEGREE,
+    Cm,
+    Reference,
+    ReferenceParameters,
+    SamplingPace,
+    TurnDeg,
+    with_polar_form,
+)
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
 

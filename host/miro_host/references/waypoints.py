@@ -11,17 +11,24 @@ within a cell of the table.
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
-from miro_exact.dmath import atan2
+from miro_exact.dmath import atan2, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.headings import headings
-from miro_host.references.interface import DEGREE, Cm, Reference, ReferenceParameters, SamplingPace, TurnDeg
-from miro_host.references.polar import with_polar_form
+from miro_host.references.interface import (
+    DEGREE,
+    Cm,
+    Reference,
+    ReferenceParameters,
+    SamplingPace,
+    TurnDeg,
+    with_polar_form,
+)
 from miro_host.references.speeds import Bounds, at_nodes, run_up, smooth, timed
 from miro_host.references.spline import SplinePiece, spline
 
@@ -197,3 +204,47 @@ def _planned(keys: WaypointsRef) -> Waypoints:
         Bounds(keys.speed_m_s, keys.accel_m_s2, keys.lateral_accel_m_s2, keys.turn_rad_s),
         keys.closed,
     )
+
+
+TURNS_BACK = 1e-3
+"""A sum of chords that is shorter than this share of them has no direction to speak of."""
+
+
+def headings(
+    points: Sequence[tuple[float, float]], given: Sequence[float | None], closed: bool
+) -> list[float]:
+    """Headings in rad, those `given` (rad or None) among them, for points in m.
+
+    Where none is given: at a point between two others that of the circle through the three; at an end that with which
+    a circular arc comes from, or leads to, the neighbour. Points on a circle so get its tangents.
+
+    `closed`: the last point is followed by the first. ValueError where the path turns back on itself.
+    """
+    count = len(points)
+    found: list[float | None] = list(given)
+    inner = range(count) if closed else range(1, count - 1)
+    for i in inner:
+        if found[i] is None:
+            found[i] = _on_circle(points[i - 1], points[i], points[(i + 1) % count], i)
+    if not closed:
+        for end, beside in ((0, 1), (count - 1, count - 2)):
+            if found[end] is None:
+                chord = _direction(points[min(end, beside)], points[max(end, beside)])
+                neighbour = found[beside]
+                found[end] = chord if neighbour is None else wrap_pi(2.0 * chord - neighbour)
+    return [wrap_pi(heading) for heading in found if heading is not None]
+
+
+def _direction(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return atan2(b[1] - a[1], b[0] - a[0])
+
+
+def _on_circle(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], number: int) -> float:
+    """Heading in b of the circle from a through b to c: each chord has the weight 1 / its length^2."""
+    x1, y1, x2, y2 = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+    square1, square2 = x1 * x1 + y1 * y1, x2 * x2 + y2 * y2
+    x, y = x1 * square2 + x2 * square1, y1 * square2 + y2 * square1
+    sum_of_both = math.sqrt(square1) * square2 + math.sqrt(square2) * square1
+    if math.sqrt(x * x + y * y) < TURNS_BACK * sum_of_both:
+        raise ValueError(f"points[{number}]: the path turns back on itself here; give heading_deg")
+    return atan2(y, x)

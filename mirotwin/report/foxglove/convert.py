@@ -19,10 +19,9 @@ from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording import reader, schemas
-from mirotwin.recording.channels import FaultMessage
+from mirotwin.recording import channels, reader
+from mirotwin.recording.channels import FaultMessage, ImageMessage
 from mirotwin.recording.container import Cut, RecordingError, records
-from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.topics import IMAGE, PERIOD, Topic, image_topic, topic_of
@@ -36,7 +35,7 @@ PREFIX = "foxglove."
 def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
     """Name and text of a message's schema: Foxglove's for its messages, ours for all others."""
     if type(message).__module__ != messages.__name__:
-        return schemas.schema_name(message), schemas.schema_text(message)
+        return channels.schema_name(message), channels.schema_text(message)
     name = type(message).__name__
     return PREFIX + name, _published(name)
 

@@ -14,9 +14,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import RobotId
-from mirotwin.recording.channels import SampleMessage
+from mirotwin.recording.channels import ImageMessage, SampleMessage
 from mirotwin.recording.container import Cut
-from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import Messages
 
 QUALITY = 72

@@ -15,12 +15,11 @@ from typing import ClassVar
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
-from miro_protocol.freshness import Freshness
+from miro_protocol.robot_receiver import Freshness
 from miro_protocol.table import downlink
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
-from miro_sim.radio.link_state import UP
-from miro_sim.radio.params import Radio
+from miro_sim.radio.params import UP, Radio
 from miro_sim.radio.probability import ONE
 from miro_sim.world.events import SIDES, Event
 from mirotwin.verify.checks.failsafe import ACTING_MS

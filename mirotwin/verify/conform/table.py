@@ -17,7 +17,6 @@ from mirotwin.verify.conform.rules import (
     reception,
     service,
     sound,
-    straps,
 )
 
 CHAPTERS: tuple[Chapter, ...] = (
@@ -30,7 +29,7 @@ CHAPTERS: tuple[Chapter, ...] = (
     answers.CHAPTER,
     sound.CHAPTER,
     chips.CHAPTER,
-    straps.CHAPTER,
+    boot.STRAPS,
     long.CHAPTER,
 )
 ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)

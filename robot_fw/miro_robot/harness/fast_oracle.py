@@ -13,7 +13,7 @@ sent.
 from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
-from miro_protocol.freshness import Freshness
+from miro_protocol.robot_receiver import Freshness
 from miro_protocol.robot_rules import (
     ACTING_TICKS,
     TO_RI_TICKS,

@@ -1,4 +1,4 @@
-"""What happened on a robot's wires, as a VCD file.
+"""What happened on a robot's wires, as a VCD file, and the save file with which GTKWave shows it.
 
 Time stamps are nanoseconds, rounded down (tick * 125 // 3 at 24 MHz, as in recordings): a crystal's period fits no
 decimal timescale, and this one loses nothing, since rounding up gives the tick again.
@@ -6,9 +6,11 @@ decimal timescale, and this one loses nothing, since rounding up gives the tick 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from operator import itemgetter
 from typing import IO, Any
 
+from vcd.gtkw import GTKWSave
 from vcd.writer import VCDWriter
 
 from miro_robot.board import Board
@@ -193,3 +195,30 @@ def _ticks_in_words(tick_hz: int) -> str:
 
 def _bit(signal: Signal, level: int, bit: int) -> int | str:
     return "x" if signal.bits == 1 and level == UNKNOWN else level >> bit & 1
+
+
+_CLOSED = ("ports",)
+"""Groups that are folded at first: most pins are there as what they are wired to already."""
+_ZOOM = -22.0  # about one control period on a screen
+
+
+def write_save_file(out: IO[str], vcd_name: str, signals: Sequence[Signal] = SIGNALS) -> None:
+    """Writes the save file for the VCD called `vcd_name` in the same folder. No wall clock, no absolute path."""
+    save = GTKWSave(out)
+    save.dumpfile(vcd_name, abspath=False)
+    save.zoom_markers(_ZOOM)
+    save.sst_expanded(False)
+    for scope in dict.fromkeys(signal.scope for signal in signals):
+        with save.group(scope or "link", closed=scope in _CLOSED):
+            for signal in signals:
+                if signal.scope == scope:
+                    _trace(save, signal)
+
+
+def _trace(save: GTKWSave, signal: Signal) -> None:
+    wires = [signal.path(wire) for wire in signal.wires()]
+    if signal.bits == 1:
+        save.trace(wires[0])
+        return
+    name = f"{signal.name.rstrip('_')}[{signal.bits - 1}:0]"
+    save.trace_combined(name, wires[::-1], datafmt="dec" if "magnitude" in name else "hex")

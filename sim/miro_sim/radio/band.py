@@ -19,8 +19,7 @@ from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
 from miro_exact.rng import Stream
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.link_state import DOWN, NOISE, UP
-from miro_sim.radio.params import Radio
+from miro_sim.radio.params import DOWN, NOISE, UP, Radio
 
 _NEVER = NEVER_TICK
 _BIT = 2500

@@ -22,8 +22,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.link_state import DOWN, NOISE, UP
-from miro_sim.radio.params import Radio
+from miro_sim.radio.params import DOWN, NOISE, UP, Radio
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
 

@@ -19,6 +19,17 @@ from miro_sim.radio.probability import (
     threshold,
 )
 
+LinkState = Literal["up", "down", "noise"]
+UP, DOWN, NOISE = 0, 1, 2
+LINK_STATES: tuple[LinkState, ...] = ("up", "down", "noise")
+"""Names, in the order of the numbers: whether the radio of a network works.
+
+up      as the parameters say
+down    the transmitters are off: receivers hear no carrier, which is mark if squelched, else noise
+noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
+"""
+
+
 BIT_S = 1 / 9600
 BIT_ERROR_RATE = 1e-4
 """What holds when a scenario names neither a bit-error rate nor Eb/N0."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 from miro_protocol.actions import Action, Power, RadioState, Reset
-from miro_sim.radio.link_state import LINK_STATES
+from miro_sim.radio.params import LINK_STATES
 
 if TYPE_CHECKING:
     from miro_sim.world.network import Network

@@ -30,7 +30,7 @@ from miro_protocol.events import Received
 from miro_robot import event_log
 from miro_robot.event_log import EventLog
 from miro_robot.lm629.commands import BY_OPCODE
-from miro_sim.radio.link_state import LINK_STATES
+from miro_sim.radio.params import LINK_STATES
 
 PC = -1
 """Slot of what happens at the PC."""

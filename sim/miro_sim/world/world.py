@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, ticks
-from miro_exact.seed import MAX_SEED
+from miro_exact.domain import MAX_SEED
 from miro_exact.state import TICK, Flat, Octets
 from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period, RobotPeriod
-from miro_sim.radio.link_state import LINK_STATES, LinkState
+from miro_sim.radio.params import LINK_STATES, LinkState
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.bodies import Bodies, Pair

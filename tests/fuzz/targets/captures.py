@@ -88,7 +88,7 @@ def _hex_text():
 
 def _capture():
     from miro_exact.bad_input import BadInput
-    from mirotwin.recording.capture import convert, render
+    from mirotwin.recording.capture import render
     from mirotwin.recording.capture.detect import FORMATS, detect
     from mirotwin.recording.capture.input import Input
     from mirotwin.recording.capture.layout import robots_in
@@ -116,7 +116,7 @@ def _capture():
             assert render.table_line(row, source.timed).isprintable()
             render.json_line(row, source.timed)
         try:
-            for convert_to in (convert.to_pcapng(sent), convert.to_stream(sent, layouts.__getitem__)):
+            for convert_to in (render.to_pcapng(sent), render.to_stream(sent, layouts.__getitem__)):
                 for _ in convert_to:
                     pass
         except BadInput as error:

@@ -7,9 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miro_host.references.arc import Arc, ArcRef
-from miro_host.references.interface import Paced
+from miro_host.references.interface import Paced, with_polar_form
 from miro_host.references.line import LineRef, StraightLine
-from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import Ramp
 from miro_host.references.sine import Sine, SineRef
 from tests.host.references.numbers import numbers

@@ -8,10 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miro_host.pilot import PERIOD_S
-from miro_host.references.headings import headings
 from miro_host.references.speeds import Bounds
 from miro_host.references.spline import spline
-from miro_host.references.waypoints import CELLS, Waypoint, Waypoints, WaypointsRef
+from miro_host.references.waypoints import CELLS, Waypoint, Waypoints, WaypointsRef, headings
 from tests.host.references.numbers import numbers
 from tests.naive import host_paths as naive
 

@@ -15,7 +15,7 @@ import sys
 
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.freshness import Freshness
+from miro_protocol.robot_receiver import Freshness
 from miro_protocol.table import FRESH_AGAIN_TICKS, downlink
 from tests.robot.firmware.rig import CHARACTER, MS, US, Rig, iram
 

@@ -1,4 +1,4 @@
-"""Rules about power-on: motors off, both chips reset together, ready in time."""
+"""Rules about power-on (motors off, both chips reset together, ready in time) and the pins that name the robot."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import Chapter
-from mirotwin.verify.conform.rules import POWER_ON
+from mirotwin.verify.conform.rule import Chapter, Topology
+from mirotwin.verify.conform.rules import POWER_ON, TURNS
 from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Power-on")
+STRAPS = Chapter("Straps")
 _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
 
 
@@ -108,3 +109,29 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
 
     script.expect(until_tick, "both motors off", ordered)
     script.expect(until_tick, "both motors off", driven)
+
+
+@STRAPS.rule(
+    "P60",
+    "A robot whose slot pins say N or more MUST never move and never answer.",
+    TURNS,
+    topologies=(
+        Topology(3, (1,)),
+        Topology(3, (1,), strap=3),
+        Topology(3, (1,), strap=4),
+        Topology(3, (1,), strap=7),
+        Topology(5, (3,), strap=5),
+    ),
+    presupposes=("P41",),
+)
+def no_slot(script: TrialScript) -> None:
+    for _ in range(2):
+        for slot in range(script.n):
+            script.team()
+            question = script.ask(slot, gap_ms=36.0)
+            if script.topology.strap is None:  # a robot that is there, beside them
+                script.obeyed(question)
+    if script.topology.strap is None:
+        return
+    script.unchanged(0, script.now, "the wheels of no robot of this network told anything")
+    script.silent(0, script.now, "no robot of this network is asked")
