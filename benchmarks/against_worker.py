@@ -10,6 +10,7 @@ import io
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from copy import copy
 from importlib import import_module
 from importlib.util import find_spec
@@ -27,15 +28,14 @@ MANY = 200
 """Executions of a task that takes microseconds."""
 WARM_PERIODS = 30
 
-NEW = {
-    "runner": "mirotwin.rerun.runner",
-    "recording": "mirotwin.recording.recorder",
-    "scenario": "miro_sim.scenario.file",
-    "world": "miro_sim.world.world",
-    "fuzz": "mirotwin.fuzz.target",
+PARTS = {
+    "runner": ("mirotwin.recording.runner", "mirotwin.rerun.runner", "mirotwin.runner"),
+    "recording": ("mirotwin.recording.recorder",),
+    "scenario": ("miro_sim.scenario.file",),
+    "world": ("miro_sim.world.world",),
+    "fuzz": ("mirotwin.fuzz.target",),
 }
-OLD = {**NEW, "runner": "mirotwin.runner"}
-"""Before `mirotwin` became a top folder."""
+"""Where each part is, and where it was before."""
 
 
 def without_editable_installs() -> None:
@@ -45,12 +45,20 @@ def without_editable_installs() -> None:
     ]
 
 
+def _there(names: tuple[str, ...]) -> str:
+    """The first of these modules that the checkout has."""
+    for name in names:
+        with suppress(ModuleNotFoundError):  # a package above it is not there
+            if find_spec(name):
+                return name
+    raise ModuleNotFoundError(names[0])
+
+
 class Tasks:
     """What is measured. Each method returns (processor seconds of one execution, result to compare)."""
 
     def __init__(self, folder: Path) -> None:
-        layout = NEW if find_spec("mirotwin.rerun") else OLD
-        self.parts: dict[str, Any] = {name: import_module(module) for name, module in layout.items()}
+        self.parts: dict[str, Any] = {name: import_module(_there(names)) for name, names in PARTS.items()}
         self.load_hex = import_module("miro_robot.image").load_hex
         self.image_path = import_module("miro_robot.firmware").image_path
         load = self.parts["scenario"].load

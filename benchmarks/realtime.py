@@ -15,8 +15,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
+from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
-from mirotwin.rerun import runner
 
 
 def ratio(name: str, recorded: bool) -> float:

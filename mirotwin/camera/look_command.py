@@ -9,7 +9,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.rerun.runner import report_faults
+from mirotwin.recording.runner import report_faults
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (

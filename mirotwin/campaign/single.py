@@ -19,10 +19,10 @@ from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.campaign.workers import now_s
+from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
-from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
 from mirotwin.verify.checks.expect import expectations_of

@@ -17,12 +17,11 @@ from miro_robot.image import SPACE_BYTES
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run, which_robot
-from mirotwin.replay.firmwares import LinesFrom, debugged_image, load_images
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
+from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, debugged_image, load_images
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import AT, RESUME, choose_engine
 from mirotwin.shell.outputs import RECORDINGS, file_in

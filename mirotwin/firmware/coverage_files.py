@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
 from rich.table import Table
 
-from miro_exact.bad_input import BadInput, one_line
+from miro_exact.bad_input import one_line
 from miro_exact.inputs import read_input
-from miro_robot.firmware import source_folder
 from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.coverage import (
@@ -27,9 +24,6 @@ from miro_robot.inspect.coverage import (
     missed,
 )
 from miro_robot.inspect.lcov import Tracefile, decode, encode
-from mirotwin.shell.command import Option
-from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import IMAGE, NAME
 from mirotwin.shell.outputs import whole_file
 
 
@@ -41,25 +35,8 @@ class Report(msgspec.Struct, frozen=True):
     listing: str | None
 
 
-def with_debug_files(image: Image) -> Image:
-    """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
-
-    if image.path.is_file():
-        return image
-    own = load_firmware(named=False)
-    return own if own.sha256 == image.sha256 else image
-
-
-def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
-    """The folders to look for C files in: those given, the image's own, and the robot's firmware's."""
-
-    own = source_folder()
-    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
-
-
 def has_listing(image: Image) -> bool:
     """Whether the lines that are counted are those of a listing: no debug file names C lines."""
-
     return not DebugInfo.of(image).lines
 
 
@@ -70,7 +47,6 @@ def listing_path(out: Path) -> Path:
 
 def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
     """Coverage of `image` with paths as seen from the current folder."""
-
     debug = DebugInfo.of(image)
     share = instruction_share(image, debug, counts)
     if debug.lines:
@@ -90,7 +66,6 @@ def is_of_another_image(report: Report, out: Path) -> bool:
 
 def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
     """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
-
     with ExitStack() as files:
         for path, text in ((listing_path(out), report.listing), (out, encode(total))):
             if text is not None:
@@ -101,7 +76,6 @@ def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
 
 def read_tracefile(path: Path) -> Tracefile:
     """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
-
     if not path.exists():
         return {}
     return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
@@ -109,7 +83,6 @@ def read_tracefile(path: Path) -> Tracefile:
 
 def table(tracefile: Tracefile) -> Table:
     """A row a file and a total: lines, branches, and the lines that never ran."""
-
     result = Table(box=None, pad_edge=False)
     for column in ("file", "lines", "branches", "never ran"):
         result.add_column(column, overflow="fold")
@@ -118,27 +91,3 @@ def table(tracefile: Tracefile) -> Table:
         result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
     result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
     return result
-
-
-SOURCES = Option(
-    "--sources",
-    metavar="FOLDER",
-    type=NAME,
-    help="Folder of the C files; may be repeated. Default: the image's folder.",
-    heading=IMAGE,
-)
-SourceFolders = Annotated[tuple[str, ...], SOURCES]
-
-
-def sources_of(image: Image, given: Sequence[str]) -> Sources:
-    """The folders to look in: those given, the image's own, and the robot's firmware's."""
-
-    return source_folders(image, checked_sources(given))
-
-
-def checked_sources(given: Sequence[str]) -> Sequence[str]:
-    """The folders of --sources. Raises BadInput for what is not one."""
-    for folder in given:
-        if not Path(folder).is_dir():
-            raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
-    return given

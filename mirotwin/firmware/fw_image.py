@@ -16,10 +16,10 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.vector_draw import draw_vectors
 from miro_robot.mcs51.vectors import encode
 from mirotwin.firmware.code_place import SPACE_BYTES, SYMBOL, functions_at
-from mirotwin.firmware.coverage_files import SourceFolders, sources_of
-from mirotwin.firmware.held_signals import held_signals
 from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.debug_files import SourceFolders, sources_of
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import FORCE, NAME, OUT, SEED, Engine, Whole, choose_engine
 from mirotwin.shell.outputs import OutputFolder, check_new, whole_file
 from mirotwin.shell.program import show_line

@@ -17,20 +17,18 @@ from miro_robot.inspect.lcov import Tracefile, add
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from mirotwin.firmware.coverage_files import (
-    SourceFolders,
     collect,
     has_listing,
     is_of_another_image,
     listing_path,
     read_tracefile,
-    sources_of,
     table,
-    with_debug_files,
     write,
 )
 from mirotwin.firmware.subject import WindowOptions, image_name, look, open_window
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.debug_files import SourceFolders, sources_of, with_debug_files
 from mirotwin.shell.options import FORCE, JSON, OUT
 from mirotwin.shell.outputs import check_new, check_not_input
 

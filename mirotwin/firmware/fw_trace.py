@@ -11,10 +11,10 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import HEADING, InstructionTrace
 from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform, write_save_file
 from mirotwin.firmware.code_place import SYMBOL, functions_at
-from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.firmware.subject import WindowOptions, look, open_window
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import FORCE, OUT
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 from mirotwin.shell.program import show_line

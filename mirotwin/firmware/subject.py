@@ -19,9 +19,9 @@ from mirotwin.firmware.bare_options import (
     report,
     target_of,
 )
+from mirotwin.recording.runner import report_faults
 from mirotwin.rerun.inspected_run import BareRun, RobotRun, Run, watch
 from mirotwin.rerun.job import load_job
-from mirotwin.rerun.runner import report_faults
 from mirotwin.shell.command import Argument, Options
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (

@@ -15,7 +15,6 @@ from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
-from mirotwin.firmware.coverage_files import sources_of
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
@@ -29,6 +28,7 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import Crash, Triage
 from mirotwin.shell.command import command_of
+from mirotwin.shell.debug_files import sources_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import choose_engine
 from mirotwin.shell.program import Terminated, complain

@@ -9,11 +9,11 @@ import click
 
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
-from mirotwin.firmware.coverage_files import SourceFolders
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.triage import MINIMISE_S
 from mirotwin.recording.decode_command import ROBOTS
 from mirotwin.shell.command import Argument, Option, Options
+from mirotwin.shell.debug_files import SourceFolders
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Engine, Whole
 from mirotwin.shell.times import WallTime

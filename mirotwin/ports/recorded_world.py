@@ -13,11 +13,11 @@ from serial.serialutil import SerialException
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
+from miro_sim.scenario.live import live_scenario
 from miro_sim.world.world import World
-from mirotwin.ports.serve_command import live_scenario
 from mirotwin.ports.url import UrlOptions
+from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, source_of
-from mirotwin.rerun import runner
 from mirotwin.rerun.pacing import Every
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder

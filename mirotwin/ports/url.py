@@ -17,7 +17,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
 from miro_sim.scenario.keys import MAX_NETWORKS
-from mirotwin.ports.serve_command import LONGEST_S
+from miro_sim.scenario.live import LONGEST_S
 from mirotwin.rerun.pacing import FASTEST
 
 SCHEME = "miro://"

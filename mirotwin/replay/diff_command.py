@@ -11,7 +11,6 @@ from rich.table import Table
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.scenario.file import parse as parse_scenario
-from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.recording.compare import differences
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.reader import Recording, parse
@@ -25,10 +24,11 @@ from mirotwin.replay.exact_difference import (
     locate,
     source_differences,
 )
-from mirotwin.replay.firmwares import LinesFrom, annotated_of, load_images
+from mirotwin.replay.firmwares import annotated_of
 from mirotwin.rerun.job import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.options import ALL, NAME, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain

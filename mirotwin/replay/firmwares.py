@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import msgspec
 
 from miro_robot.image import Image
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
+from miro_sim.world.world import World
+from mirotwin.recording.difference import Difference
 from mirotwin.replay.annotated_image import AnnotatedImage, same_layout
 from mirotwin.replay.builds import Builds, VariableDifference
 from mirotwin.replay.instructions import InstructionDifference, Stepper
-from mirotwin.replay.moved import Moved, moved
-
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
-
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated
-
-from miro_exact.bad_input import BadInput
-from miro_robot.firmware import source_folder
-from miro_sim.world.world import World
-from mirotwin.firmware.coverage_files import with_debug_files
-from mirotwin.recording.difference import Difference
 from mirotwin.replay.lockstep import LOOK_TICKS
+from mirotwin.replay.moved import Moved, moved
 from mirotwin.rerun.job import Job
-from mirotwin.shell.command import Option
-from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import IMAGE, NAME, plain_parameters
+from mirotwin.shell.debug_files import debugged_image
+from mirotwin.shell.options import plain_parameters
 
-Make = Callable[[Image], "World"]
+Make = Callable[[Image], World]
 """Gives a new world at tick 0 that runs an image."""
 
 
@@ -138,38 +126,6 @@ def _missing(annotated: tuple[AnnotatedImage, AnnotatedImage]) -> Iterator[str]:
             yield f"no symbols of {image.path}: {beside}"
         elif not one.has_lines:
             yield f"no C lines of {image.path}: {beside}"
-
-
-LinesFrom = Annotated[
-    tuple[str, ...],
-    Option(
-        metavar="IMAGE.ihx",
-        type=NAME,
-        help="A recorded image as a file, beside which its debug files lie: for its C lines; may be repeated. The"
-        " robot's own image needs none.",
-        heading=IMAGE,
-    ),
-]
-
-
-def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
-    """The images of --lines-from. Raises BadInput for one that was not recorded."""
-    codes = [image.code for image in recorded if image is not None]
-    images = [load_firmware(path) for path in paths]
-    for path, image in zip(paths, images, strict=True):
-        if image.code not in codes:
-            raise BadInput(
-                path, "--lines-from", "is not a recorded image", "give one that is, or leave it out"
-            )
-    return images
-
-
-def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, list[Path]]:
-    """The image with its debug files, those beside one of `images` or the robot's own, and where C files may be."""
-    known = next((one for one in images if one.code == image.code), with_debug_files(image))
-    folder = source_folder()
-    own = [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]
-    return known, [*own, *map(Path, sources)]
 
 
 def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:

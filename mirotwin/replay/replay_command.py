@@ -14,9 +14,9 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import SPACE_BYTES
 from miro_sim.periods import Period
 from mirotwin.desk.guard import HEADING, DeskOptions
-from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
+from mirotwin.recording.runner import report_faults
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import (
     SHOWN,
@@ -27,17 +27,11 @@ from mirotwin.replay.differences import (
     print_json,
     print_response,
 )
-from mirotwin.replay.firmwares import (
-    FirmwareDifference,
-    LinesFrom,
-    annotated_of,
-    firmwares_apart,
-    load_images,
-)
+from mirotwin.replay.firmwares import FirmwareDifference, annotated_of, firmwares_apart
 from mirotwin.rerun.job import Job, load_job, rerun_job
-from mirotwin.rerun.runner import report_faults
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     ALL,

@@ -20,9 +20,9 @@ from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
 from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.live import live_settings
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort, realtime_priority
-from mirotwin.ports.serve_command import live_settings
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput
-from mirotwin.firmware.coverage_files import SourceFolders, checked_sources
 from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.run_page import run_page
 from mirotwin.report.report_subject import PageSubject, is_campaign, material_of, page_of_port
 from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.debug_files import SourceFolders, checked_sources
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
 from mirotwin.shell.times import Time
 

@@ -12,7 +12,6 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
 from miro_robot.image import Image
-from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.frames import Extras, extras_of
@@ -21,6 +20,7 @@ from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job, replaying
+from mirotwin.shell.debug_files import source_folders
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar

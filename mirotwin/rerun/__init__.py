@@ -1,1 +1,1 @@
-"""A world run from its first period to its last: once, or again from what a file holds."""
+"""A world made from what a file holds, and run again."""

@@ -9,14 +9,14 @@ import click
 
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.firmware.held_signals import held_signals
 from mirotwin.recording.recorder import source_of
-from mirotwin.rerun.runner import report_faults
+from mirotwin.recording.runner import report_faults
 from mirotwin.run.run_files import RunFiles, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.run.run_stops import Stops
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import choose_engine, plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
 from mirotwin.shell.program import tell_notes

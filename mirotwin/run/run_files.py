@@ -21,12 +21,12 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.firmware.held_signals import Hold
+from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
-from mirotwin.rerun import runner
+from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar

@@ -13,11 +13,11 @@ import msgspec
 import tomli_w
 
 from miro_sim.world.world import World
-from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.report.page.bokeh_page import has_bokeh
 from mirotwin.report.page.document import MOST_BYTES
 from mirotwin.report.page.reproduction import reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, run_page
+from mirotwin.shell.debug_files import source_folders
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed, at
 from mirotwin.verify.cases.artifacts import leave

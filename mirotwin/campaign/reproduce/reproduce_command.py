@@ -30,8 +30,8 @@ from mirotwin.campaign.reproduce.plan import (
 from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
 from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
-from mirotwin.firmware.held_signals import Hold, held_signals
 from mirotwin.shell.command import Options, command_of
+from mirotwin.shell.held_signals import Hold, held_signals
 from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line

@@ -18,8 +18,8 @@ from miro_robot.inspect.profile import profile as profile_of
 from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period, RobotId
 from miro_sim.world.world import World
-from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.report.page.link import LinkLog, LinkMark
+from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.interface import Check, Expectation, Failure
 

@@ -5,10 +5,10 @@ import time
 from selectors import DefaultSelector
 from typing import TypeVar
 
+from miro_sim.scenario.live import live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
-from mirotwin.ports.serve_command import live_scenario
 from tests.mirotwin.ports.rig import own_image
 
 Port = TypeVar("Port", bound=Endpoint)

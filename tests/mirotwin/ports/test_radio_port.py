@@ -8,9 +8,9 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import source_text
+from miro_sim.scenario.live import live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
-from mirotwin.ports.serve_command import live_scenario
 from mirotwin.rerun.job import script_of
 from tests.mirotwin.ports.rig import own_image, question
 

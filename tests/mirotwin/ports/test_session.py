@@ -3,12 +3,12 @@
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_sim.scenario.live import live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
-from mirotwin.ports.serve_command import live_scenario
 from mirotwin.ports.session import Session
-from mirotwin.rerun import runner
+from mirotwin.recording import runner
 from mirotwin.rerun.job import script_of
 from tests.mirotwin.ports.rig import NO_SELECTOR, fake_pace, own_image, question
 

@@ -13,7 +13,7 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
-from mirotwin.rerun import runner
+from mirotwin.recording import runner
 from tests import children
 from tests.mirotwin.conftest import SHORT, hex_file
 

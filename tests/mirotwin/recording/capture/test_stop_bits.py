@@ -12,12 +12,12 @@ from miro_protocol.transmission import UP, Transmission
 from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
+from mirotwin.recording import runner
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.recorded import transmissions, transmissions_of
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
-from mirotwin.rerun import runner
 from tests.sim.world.rig import image
 
 PERIODS = 150

@@ -1,4 +1,4 @@
-"""Runs a world from its first control period to its last, and hands on what it leaves."""
+"""Runs a world from its first control period to its last, and records it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol

@@ -1,0 +1,81 @@
+"""Where the debug files and the C files of a firmware image are looked for: the options, and what they name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from miro_exact.bad_input import BadInput
+from miro_robot.firmware import source_folder
+from miro_robot.image import Image
+from miro_robot.image.debug_info import Sources
+from mirotwin.shell.command import Option
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import IMAGE, NAME
+
+SOURCES = Option(
+    "--sources",
+    metavar="FOLDER",
+    type=NAME,
+    help="Folder of the C files; may be repeated. Default: the image's folder.",
+    heading=IMAGE,
+)
+SourceFolders = Annotated[tuple[str, ...], SOURCES]
+LinesFrom = Annotated[
+    tuple[str, ...],
+    Option(
+        metavar="IMAGE.ihx",
+        type=NAME,
+        help="A recorded image as a file, beside which its debug files lie: for its C lines; may be repeated. The"
+        " robot's own image needs none.",
+        heading=IMAGE,
+    ),
+]
+
+
+def with_debug_files(image: Image) -> Image:
+    """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
+    if image.path.is_file():
+        return image
+    own = load_firmware(named=False)
+    return own if own.sha256 == image.sha256 else image
+
+
+def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
+    """The folders to look for C files in: those given, the image's own, and the robot's firmware's."""
+    own = source_folder()
+    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
+
+
+def sources_of(image: Image, given: Sequence[str]) -> Sources:
+    """The folders to look in: those given, the image's own, and the robot's firmware's."""
+    return source_folders(image, checked_sources(given))
+
+
+def checked_sources(given: Sequence[str]) -> Sequence[str]:
+    """The folders of --sources. Raises BadInput for what is not one."""
+    for folder in given:
+        if not Path(folder).is_dir():
+            raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
+    return given
+
+
+def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
+    """The images of --lines-from. Raises BadInput for one that was not recorded."""
+    codes = [image.code for image in recorded if image is not None]
+    images = [load_firmware(path) for path in paths]
+    for path, image in zip(paths, images, strict=True):
+        if image.code not in codes:
+            raise BadInput(
+                path, "--lines-from", "is not a recorded image", "give one that is, or leave it out"
+            )
+    return images
+
+
+def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, list[Path]]:
+    """The image with its debug files, those beside one of `images` or the robot's own, and where C files may be."""
+    known = next((one for one in images if one.code == image.code), with_debug_files(image))
+    folder = source_folder()
+    own = [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]
+    return known, [*own, *map(Path, sources)]
