@@ -98,7 +98,7 @@ def test_an_answer_that_gets_lost_is_missing_where_it_was(mirotwin, tmp_path, mo
     assert 40 <= found["period"] <= 44
 
 
-@pytest.mark.parametrize("key", ["robot.wheel_radius_mismatch=0.02", "radio.baud_offset_ppm=10000"])
+@pytest.mark.parametrize("key", ["robot.drive.chassis.wheel_radius_m=0.0204", "radio.baud_offset_ppm=10000"])
 def test_what_no_answer_depends_on_is_not_seen(mirotwin, tmp_path, key):
     assert first(mirotwin, tmp_path, f"{ROBOT}&set=network.{key}") is None
 
