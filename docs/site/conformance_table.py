@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
-from mirotwin.verify.conform.by_answers import LEFT_OUT, NOT_OBSERVABLE, ONLY_FAILURES
+from mirotwin.verify.conform.by_answers import LEFT_OUT, NOT_OBSERVABLE
 from mirotwin.verify.conform.rule import Rule, Topology
 from mirotwin.verify.conform.table import CHAPTERS
 
@@ -33,9 +33,7 @@ def _by_answers(rule: Rule) -> str:
     if rule.id in NOT_OBSERVABLE:
         return f"no: {NOT_OBSERVABLE[rule.id]}"
     left_out = [what for what, ids in LEFT_OUT.items() if rule.id in ids]
-    without = f", without {' and '.join(left_out)}" if left_out else ""
-    only = ONLY_FAILURES.get(rule.id)
-    return (f"only failures: {only}" if only else "yes") + without
+    return "yes" + (f", without {' and '.join(left_out)}" if left_out else "")
 
 
 def _source(source: str) -> str:

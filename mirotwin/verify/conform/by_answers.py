@@ -1,10 +1,9 @@
 """The rules that answers can show, tried on a robot at a port: what a PC can send and hear, and nothing else.
 
-A rule is seen in what the robot answers (`ANSWERS`), or in how many frames it has accepted by the end of the trial
-(`COUNTED`). What a PC cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses
-within a frame that are shorter than it can time. Where answers of a robot that breaks the rule may be the same, only a
-failure is a verdict (`ONLY_FAILURES`). A trial that fails is tried again: noise may have spoilt it. A rule fails
-where each trial failed, and in one of them characters came in time; where they never did, it is not judged.
+A rule is seen in what the robot answers, and in how many frames it has accepted by the end of the trial. What a PC
+cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses within a frame that are
+shorter than it can time. A trial that fails is tried again: noise may have spoilt it. A rule fails where each trial
+failed, and in one of them characters came in time; where they never did, it is not judged.
 """
 
 from __future__ import annotations
@@ -27,17 +26,15 @@ from mirotwin.verify.conform.run import Outcome, in_order
 from mirotwin.verify.conform.trial import trial_of
 from mirotwin.verify.conform.trial_script import Frame, How, Pairs, TrialScript
 
-ANSWERS = ("P41", "P43", "P44", "P45", "P48", "P49", "P50", "P61")
-COUNTED = ("P04", "P05", "P06", "P07", "P08", "P10", "P13", "P14", "P16", "P17", "P20", "P21", "P34")
 _REASONS: dict[str, tuple[str, ...]] = {
     "it is switched off and on, or reset": ("P01", "P02", "P03", "P19", "P55", "P56"),
     "no serial port sends a bad stop bit": ("P09",),
-    "a PC cannot time what decides": ("P11", "P18", "P42"),
+    "a PC cannot time what decides": ("P10", "P11", "P18", "P42"),
     "its trial tells wheels to go at full speed": ("P12",),
     "it is the radio's noise": ("P15",),
     "answers do not tell what wheels are told": (
         *("P22", "P23", "P24", "P25", "P26", "P27", "P28", "P29", "P30", "P31", "P32", "P33"),
-        *("P35", "P36", "P37", "P38", "P39", "P40", "P62"),
+        *("P34", "P35", "P36", "P37", "P38", "P39", "P40", "P62"),
     ),
     "answers are all that is known of the chips": ("P46", "P47"),
     "it is inside the robot": ("P51", "P52", "P53", "P54"),
@@ -45,14 +42,9 @@ _REASONS: dict[str, tuple[str, ...]] = {
 }
 NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids}
 """Why a rule cannot be seen at a port."""
-ONLY_FAILURES = {
-    "P10": "a keyed radio fills pauses with noise, which spoils the frame for every robot",
-    "P34": "answers tell that a service frame is fresh, and not what wheels are told",
-}
-"""Why a robot that does not fail a rule is not judged: one that breaks it may answer the same."""
 LEFT_OUT = {
     "bad stop bits": ("P04", "P13", "P43", "P49"),
-    "pauses within a frame of less than 5 ms": ("P04", "P10", "P13", "P49"),
+    "pauses within a frame of less than 5 ms": ("P04", "P13", "P49"),
     "the flags of power-on": ("P45",),
 }
 """What of the trials of rules that can be seen no PC can do."""
@@ -139,8 +131,7 @@ def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
                 raise
             return Outcome(rule.id, (), unsure=f"{error.what}; {error.remedy}")
         if failure is None:
-            only = ONLY_FAILURES.get(rule.id, "")
-            return Outcome(rule.id, (), unsure=only and f"it does not fail, but {only}")
+            return Outcome(rule.id, ())
         if unsure_ticks <= SURE_TICKS:
             sure = (failure,)
     late = f"characters come and go up to {unsure_ticks / TICKS_PER_MS:.1f} ms late"
@@ -181,7 +172,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
             if (what := one.test(seen)) is not None:
                 return failed(what[0], one.wanted, what[1])
     counts = [one.said.accepted for one in answered if one.said is not None]
-    if rule.id in COUNTED and counts != [script.fresh % 256]:
+    if counts != [script.fresh % 256]:
         found = f"{counts[0]}" if counts else "no answer"
         return failed(port.tick, f"{script.fresh % 256} frames accepted by {last.what}", found)
     return None, unsure
