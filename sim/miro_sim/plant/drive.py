@@ -111,20 +111,19 @@ class Winding:
         """Advances by 1..2048 ticks with the back-EMF held; returns the charge that passed, in A * ticks."""
         if ticks < 1 or ticks > LONGEST_STEP:
             raise ValueError(f"an interval lasts 1..2048 ticks, got {ticks}")
-        charge = 0.0
-        left = ticks
-        while True:
-            wait = self.wait_ticks
-            part = wait if 0 < wait < left else left
-            flow = self._flow(part, emf_v)
-            charge = flow if left == ticks else charge + flow
-            left -= part
-            if wait != 0:
-                self.wait_ticks = wait - part
-                if wait == part:
-                    self._switch(self.wanted)
-            if left == 0:
-                return charge
+        return self._pass(ticks, emf_v)
+
+    def _pass(self, ticks: int, emf_v: float) -> float:
+        wait = self.wait_ticks
+        if wait == 0:
+            return self._flow(ticks, emf_v)
+        if wait > ticks:
+            self.wait_ticks = wait - ticks
+            return self._flow(ticks, emf_v)
+        charge = self._flow(wait, emf_v)
+        self.wait_ticks = 0
+        self._switch(self.wanted)
+        return charge if wait == ticks else charge + self._flow(ticks - wait, emf_v)
 
     def _flow(self, ticks: int, emf_v: float) -> float:
         """The charge of an interval in which the bridge does not switch."""
@@ -200,20 +199,22 @@ class Quadrature:
         self.count = 0
 
     def turn(self, radians: float, start_tick: int, ticks: int, chip: Lm629 | None) -> None:
-        """Turns the shaft evenly from `start_tick` on for `ticks`, and tells the LM629 of its edges in order.
-
-        The index channel changes with A and B.
-        """
+        """Turns the shaft evenly from `start_tick` on for `ticks`, and tells the LM629 of its edges in order."""
         moved = radians * self.counts_per_radian
         start = self.position
-        self.position = start + moved
-        last = int(self.position)
-        if last > self.position:
+        position = start + moved
+        self.position = position
+        last = int(position)
+        if last > position:
             last -= 1
+        if last != self.count:
+            self._cross(start, last, ticks / moved, start_tick, ticks, chip)
+
+    def _cross(
+        self, start: float, last: int, ticks_per_count: float, start_tick: int, ticks: int, chip: Lm629 | None
+    ) -> None:
+        """The edges from `count` to `last`. The index channel changes with A and B."""
         count = self.count
-        if last == count:
-            return
-        ticks_per_count = ticks / moved
         while count != last:
             forward = last > count
             boundary = count + 1 if forward else count
@@ -254,10 +255,10 @@ class Quadrature:
         return f"Quadrature(position={self.position!r} A={self.a()} B={self.b()})"
 
 
-def _is_edge(chip: Lm629) -> bool:
-    """Whether the chip has nothing more to do at its next tick than to begin or end a pulse of PWM."""
+def _other_tick(chip: Lm629) -> int:
+    """The next tick at which the chip has more to do than to begin or end a pulse of PWM."""
     pulsing = chip.pwm_magnitude != 0 and chip.pulses != 0 and not chip.pulse_late
-    return pulsing and chip.next_tick < chip.sample_tick
+    return chip.sample_tick if pulsing else chip.next_tick
 
 
 def _pass_edge(chip: Lm629, winding: Winding) -> None:
@@ -331,23 +332,75 @@ class DifferentialDrive(Plant):
         if left is None or right is None:
             return 0
         begin = self.next_tick
+        until = min(tick, _other_tick(left) - 1, _other_tick(right) - 1)
+        if self.rough is None:
+            self._roll(until, left, right)
         while True:
-            left_tick = left.next_tick
-            right_tick = right.next_tick
-            now = min(self.next_tick, left_tick, right_tick)
-            if (
-                now > tick
-                or (left_tick == now and not _is_edge(left))
-                or (right_tick == now and not _is_edge(right))
-            ):
+            now = min(self.next_tick, left.next_tick, right.next_tick)
+            if now > until:
                 return self.next_tick != begin
             if self.tick < now:
                 self._step(now - self.tick, left, right)
             self.next_tick = now + LONGEST_STEP
-            if left_tick == now:
+            if left.next_tick == now:
                 _pass_edge(left, self.left_winding)
-            if right_tick == now:
+            if right.next_tick == now:
                 _pass_edge(right, self.right_winding)
+
+    def _roll(self, until: int, left: Lm629, right: Lm629) -> None:
+        """The same up to and including `until` for wheels that only roll: `Body.push` in one loop over locals."""
+        body = self.body
+        left_winding, right_winding = self.left_winding, self.right_winding
+        left_encoder, right_encoder = self.left_encoder, self.right_encoder
+        constant = self.torque_constant_nm_a
+        impulse = constant * TICK_S
+        inverse_ll, inverse_lr, inverse_rr = body.inverse_ll, body.inverse_lr, body.inverse_rr
+        left_rad_s, right_rad_s = body.left_rad_s, body.right_rad_s
+        x_m, y_m, theta_rad = body.x_m, body.y_m, body.theta_rad
+        begin = self.tick
+        now = min(self.next_tick, left.next_tick, right.next_tick)
+        while now <= until:
+            ticks = now - begin
+            if ticks > 0:
+                left_nms = impulse * left_winding._pass(ticks, constant * left_rad_s)
+                right_nms = impulse * right_winding._pass(ticks, constant * right_rad_s)
+                if left_rad_s != 0.0 or right_rad_s != 0.0 or left_nms != 0.0 or right_nms != 0.0:
+                    half_s = 0.5 * TICK_S * ticks
+                    most = 2.0 * half_s * body.friction_nm
+                    free_left = left_rad_s + inverse_ll * left_nms + inverse_lr * right_nms
+                    free_right = right_rad_s + inverse_lr * left_nms + inverse_rr * right_nms
+                    left_rub = most if free_left < 0.0 else -most
+                    right_rub = most if free_right < 0.0 else -most
+                    new_left = free_left + inverse_ll * left_rub + inverse_lr * right_rub
+                    new_right = free_right + inverse_lr * left_rub + inverse_rr * right_rub
+                    if not (new_left * free_left > 0.0 and new_right * free_right > 0.0):
+                        body._rub(free_left, free_right, most)
+                        new_left, new_right = body.left_rad_s, body.right_rad_s
+                    turned_left = half_s * (left_rad_s + new_left)
+                    turned_right = half_s * (right_rad_s + new_right)
+                    left_rad_s, right_rad_s = new_left, new_right
+                    if turned_left != 0.0 or turned_right != 0.0:
+                        left_m = body.left_m_rad * turned_left
+                        right_m = body.right_m_rad * turned_right
+                        half = 0.5 * (right_m - left_m) / body.track_m
+                        chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
+                        sine, cosine = dmath.sincos(theta_rad + half)
+                        x_m = x_m + chord_m * cosine
+                        y_m = y_m + chord_m * sine
+                        theta_rad = theta_rad + 2.0 * half
+                        left_encoder.turn(turned_left, begin, ticks, left)
+                        right_encoder.turn(turned_right, begin, ticks, right)
+                begin = now
+            if left.next_tick == now:
+                _pass_edge(left, left_winding)
+            if right.next_tick == now:
+                _pass_edge(right, right_winding)
+            next_tick = now + LONGEST_STEP
+            now = min(next_tick, left.next_tick, right.next_tick)
+            self.next_tick = next_tick
+        self.tick = begin
+        body.left_rad_s, body.right_rad_s = left_rad_s, right_rad_s
+        body.x_m, body.y_m, body.theta_rad = x_m, y_m, theta_rad
 
     def _step(self, ticks: int, left: Lm629 | None, right: Lm629 | None) -> None:
         constant = self.torque_constant_nm_a
