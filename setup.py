@@ -25,6 +25,7 @@ ROOTS = {
     "miro_robot": "robot_fw",
     "miro_host": "host",
     "miro_sim": "sim",
+    "mirotwin": ".",
 }
 STAMP = """
 
@@ -53,7 +54,7 @@ HOTTEST = re.compile(
     r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|chip|encoder|pid|trajectory))"
     r"|miro_robot\.mcs51\.(core|cpu|execute|interrupts|line|peripherals|timers|uart)"
     r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|drive)"
-    r"|miro_sim\.radio\.(band|listener|sender)"
+    r"|miro_sim\.radio\.(band|listener|sender)|mirotwin\.recording\.rows"
 )
 """What takes half a percent of a run or more. The others are compiled with -Og, which takes a third of the time."""
 # Cython's name for what runs once, at import: it is compiled without optimizing.

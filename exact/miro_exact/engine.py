@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from types import ModuleType
 
-PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim")
+PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
 ENGINES = ("compiled", "python")
 REMEDY = "reinstall with `pip install -e .` (or `pip install .`), or run with `--engine python`"
 

@@ -17,7 +17,7 @@ from miro_host.posture import Posture
 from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
-from miro_sim.periods import Axis, Control, Period, RobotPeriod
+from miro_sim.periods import Axis, Control, RobotPeriod
 from mirotwin.recording import topics
 
 IMAGE_SCHEMA_NAME = "foxglove.CompressedImage"
@@ -273,22 +273,8 @@ def message_type(topic: topics.Topic) -> type[msgspec.Struct] | None:
     return OTHER_CHANNELS.get(topic.channel)
 
 
-def messages(period: Period) -> list[tuple[str, int, msgspec.Struct]]:
-    """(topic, tick, message) of everything in a period, in the order of a recording."""
-    found: list[tuple[str, int, msgspec.Struct]] = []
-    tick = period.tick
-    for robot in period.robots:
-        _add_robot(found, robot, tick)
-    for sent in period.wire:
-        message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-        found.append((topics.wire_topic(sent.network), sent.tick, message))
-    for action in period.actions:
-        found.append((topics.actions_topic(action.network), action.tick, _action_message(action)))
-    found.append((topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)))
-    return found
-
-
-def _action_message(action: Action) -> ActionMessage:
+def action_message(action: Action) -> ActionMessage:
+    """What was done, as a message."""
     if isinstance(action, RadioState):
         return ActionMessage(action.tick, -1, action.state)
     if isinstance(action, Reset):
@@ -305,46 +291,6 @@ def action(network: int, message: ActionMessage) -> Action:
     if message.what == "power":
         return Power(message.tick, network, message.slot, message.value)
     return RadioState(message.tick, network, message.what)
-
-
-@cache
-def _robot_topics(network: int, slot: int) -> list[str]:
-    """Of what a robot leaves behind in each period, made once: a long recording has a thousand messages a second."""
-    names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
-    return [topics.robot_topic(network, slot, name) for name in names]
-
-
-def _add_robot(found: list[tuple[str, int, msgspec.Struct]], robot: RobotPeriod, tick: int) -> None:
-    """The same for one robot."""
-    names = _robot_topics(robot.network, robot.slot)
-    reference, truth, measurement, control, firmware, lm629, pwm = names
-    at, true, seen, answer = robot.reference, robot.truth, robot.measurement, robot.control
-    found.append((reference, tick, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)))
-    speeds = robot.v_m_s, robot.w_rad_s
-    found.append((truth, tick, TruthMessage(tick, true.x_m, true.y_m, true.theta_rad, *speeds)))
-    if seen is not None:
-        of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
-        message = MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture)
-        found.append((measurement, tick, message))
-    if answer is not None:
-        found.append((control, tick, ControlMessage(tick, *msgspec.structs.astuple(answer))))
-    accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
-    if accepted is not None and rejected is not None and stale is not None:
-        found.append((firmware, tick, FirmwareMessage(tick, accepted, rejected, stale)))
-    left, right = robot.left, robot.right
-    found.append((lm629, tick, Lm629Message(tick, _registers(left), _registers(right))))
-    duties = DutyMessage(left.pwm_sign, left.pwm_magnitude), DutyMessage(right.pwm_sign, right.pwm_magnitude)
-    found.append((pwm, tick, PwmMessage(tick, *duties)))
-
-
-def _registers(axis: Axis) -> RegistersMessage:
-    return RegistersMessage(
-        axis.desired_position,
-        axis.real_position,
-        axis.desired_velocity,
-        axis.status,
-        tuple([CommandMessage(*command) for command in axis.commands]),
-    )
 
 
 def transmission(network: int, message: WireMessage) -> Transmission:
@@ -399,14 +345,12 @@ def _axis(registers: RegistersMessage, duty: DutyMessage) -> Axis:
     )
 
 
-def schema_text(message: msgspec.Struct) -> bytes:
-    """The JSON schema of a message, as text."""
-    return _text(type(message), tuple(message.inner) if isinstance(message, ControlMessage) else None)
-
-
 @cache
-def _text(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> bytes:
-    """Made once: it takes longer than some control periods, and many robots have the same channels."""
+def schema_text(kind: type[msgspec.Struct], inner: tuple[str, ...] | None = None) -> bytes:
+    """The JSON schema of messages of a kind, as text; `inner`: names of the values that a law gives.
+
+    Made once: it takes longer than some control periods, and many robots have the same channels.
+    """
     return msgspec.json.encode(IMAGE_SCHEMA if kind is ImageMessage else _schema(kind, inner))
 
 
@@ -432,8 +376,8 @@ def _resolved(node: Any, parts: dict[str, Any]) -> Any:
     return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
 
 
-def schema_name(message: msgspec.Struct) -> str:
-    """What its schema is called."""
-    if isinstance(message, ImageMessage):
+def schema_name(kind: type[msgspec.Struct]) -> str:
+    """What the schema of messages of a kind is called."""
+    if kind is ImageMessage:
         return IMAGE_SCHEMA_NAME
-    return f"mirotwin.{type(message).__name__.removesuffix('Message')}"
+    return f"mirotwin.{kind.__name__.removesuffix('Message')}"

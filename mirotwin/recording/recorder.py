@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import msgspec
 
@@ -19,6 +19,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels, topics
 from mirotwin.recording.channels import TheoryMessage, image_message
+from mirotwin.recording.rows import Head, Rows
 from mirotwin.recording.writer import McapWriter, Writable
 
 if TYPE_CHECKING:
@@ -109,10 +110,10 @@ class Recorder:
     ) -> None:
         self._undisturbed = undisturbed or nullcontext()
         self._encoder = msgspec.json.Encoder()
-        self._channels: dict[str, int] = {}
         self._schemas: dict[bytes, int] = {}
         self._named: dict[str, int] = {}
         self._waiting: list[Period | _Message] = []
+        self._rows = Rows(self._add_channel, self._write)
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._writer.add_metadata(
             METADATA,
@@ -166,13 +167,12 @@ class Recorder:
 
     def _write_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
-        found: list[_Message] = []
-        for period in waiting:
-            if isinstance(period, tuple):
-                found.append(period)
+        for one in waiting:
+            if isinstance(one, tuple):
+                self._rows.message(*one)
             else:
-                found += channels.messages(period)
-        self._add(found)
+                self._rows.period(one)
+        self._rows.flush()
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
@@ -198,30 +198,19 @@ class Recorder:
             self._add([(topics.image_topic(network), tick, image_message(network, tick, png))])
 
     def _add(self, found: Iterable[_Message]) -> None:
-        """Writes messages, all that are of known channels at once."""
-        numbers = self._channels
-        heads: list[tuple[int, int]] = []
-        contents: list[msgspec.Struct] = []
-        for topic, tick, message in found:
-            channel = numbers.get(topic)
-            if channel is None:
-                self._write(heads, contents)
-                heads, contents = [], []
-                channel = numbers[topic] = self._writer.add_channel(topic, "json", self._schema(message))
-            heads.append((channel, tick * 125 // 3))  # `nanoseconds`
-            contents.append(message)
-        self._write(heads, contents)
+        for message in found:
+            self._rows.message(*message)
+        self._rows.flush()
 
-    def _write(self, heads: Sequence[tuple[int, int]], contents: Sequence[msgspec.Struct]) -> None:
-        lines = self._encoder.encode_lines(contents).split(b"\n")
-        self._writer.add_messages(heads, lines[:-1])  # each ends a line
+    def _write(self, heads: list[Head], values: list[Any]) -> None:
+        self._writer.add_rows(heads, self._encoder.encode_lines(values))
 
-    def _schema(self, message: msgspec.Struct) -> int:
-        """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
-        text = channels.schema_text(message)
+    def _add_channel(self, topic: str, kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> int:
+        """A new channel. A second law's inner values make the schema `mirotwin.Control2`, and so on."""
+        text = channels.schema_text(kind, inner)
         if text not in self._schemas:
-            name = channels.schema_name(message)
+            name = channels.schema_name(kind)
             number = self._named[name] = self._named.get(name, 0) + 1
             name += str(number) if number > 1 else ""
             self._schemas[text] = self._writer.add_schema(name, "jsonschema", text)
-        return self._schemas[text]
+        return self._writer.add_channel(topic, "json", self._schemas[text])

@@ -11,7 +11,6 @@ flushing changes no byte of a finished file.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable
 from typing import Protocol
 from zlib import crc32
 
@@ -33,6 +32,8 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from mirotwin.recording.rows import Chunk, Head
+
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 20
 """A chunk ends with the record that makes it longer than this."""
@@ -40,13 +41,9 @@ _CHUNK = struct.Struct(
     "<BQQQQIIQ"
 )  # opcode, length, times, size, CRC, compression's name (none), length of data
 _BEFORE_DATA = _CHUNK.size - 9  # what a chunk's length counts besides its data
-_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_BEFORE_CONTENT = _MESSAGE.size - 9
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of entries
 _ENTRY = 16  # bytes: time, offset
-_MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _FOOTER = struct.Struct("<BQQQ")  # what the summary's CRC takes in of the footer
-_NEVER_NS = 1 << 64
 
 
 class Writable(Protocol):
@@ -76,8 +73,6 @@ class McapWriter:
         self._chunks: list[ChunkIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
         self._times: list[int] = []  # of the first and last message of each chunk
-        self._first_ns: int = _NEVER_NS  # of the open chunk
-        self._last_ns: int = 0
         self._begin_chunk()
         self._put(MAGIC + _bytes(Header(profile, library)))
 
@@ -112,30 +107,21 @@ class McapWriter:
 
     def add_message(self, channel: int, time_ns: int, data: bytes) -> None:
         """Adds a message; `time_ns` is both when it was logged and published."""
-        self.add_messages([(channel, time_ns)], [data])
+        self._chunk.add(channel, time_ns, data)
+        if len(self._chunk.data) > CHUNK_SIZE:
+            self._end_chunk()
 
-    def add_messages(self, heads: Iterable[tuple[int, int]], contents: Iterable[bytes]) -> None:
-        """Adds messages in a row: channel and time of each, and its content."""
-        chunk, indexes = self._chunk, self._indexes
-        pack, opcode = _MESSAGE.pack, _MESSAGE_OPCODE
-        for (channel, time_ns), data in zip(heads, contents, strict=True):
-            index = indexes.get(channel)
-            if index is None:
-                index = indexes[channel] = []
-            index += (time_ns, len(chunk))
-            if time_ns < self._first_ns:
-                self._first_ns = time_ns
-            if time_ns > self._last_ns:
-                self._last_ns = time_ns
-            chunk += pack(opcode, _BEFORE_CONTENT + len(data), channel, 0, time_ns, time_ns)
-            chunk += data
-            if len(chunk) > CHUNK_SIZE:
+    def add_rows(self, heads: list[Head], text: bytes) -> None:
+        """Adds messages in a row; the values of all of them stand in `text`, a line each."""
+        place = at = 0
+        while place < len(heads):
+            place, at = self._chunk.fill(heads, place, text, at, CHUNK_SIZE)
+            if len(self._chunk.data) > CHUNK_SIZE:
                 self._end_chunk()
-                chunk, indexes = self._chunk, self._indexes
 
     def flush(self) -> None:
         """Brings everything so far into the file, so that it outlives this process."""
-        if self._indexes:
+        if self._chunk.indexes:
             self._store_chunk()
         self._stream.flush()
 
@@ -181,39 +167,36 @@ class McapWriter:
         ]
 
     def _begin_chunk(self) -> None:
-        self._chunk = bytearray()
-        self._indexes: dict[int, list[int]] = {}  # channel -> time and offset of each message, in one row
-        self._first_ns = _NEVER_NS
-        self._last_ns = 0
+        self._chunk = Chunk()
         self._stored = 0  # bytes of the chunk that are in the file
         self._chunk_checksum = 0  # of these
 
     def _add(self, record: bytes) -> None:
         """A schema or channel, which stands in the chunk of its first message."""
-        self._chunk += record
-        if len(self._chunk) > CHUNK_SIZE:
+        self._chunk.data += record
+        if len(self._chunk.data) > CHUNK_SIZE:
             self._end_chunk()
 
     def _end_chunk(self) -> None:
         """Closes the open chunk, if there is a message in it, and writes the indexes of its messages."""
-        if not self._indexes:
+        if not self._chunk.indexes:
             return
-        head = self._store_chunk()
-        start, size = self._end, len(self._chunk)
+        head, chunk = self._store_chunk(), self._chunk
+        start, size = self._end, len(chunk.data)
         self._end = start + len(head) + size
-        self._checksum = crc32(self._chunk, crc32(head, self._checksum))
+        self._checksum = crc32(chunk.data, crc32(head, self._checksum))
         index_start, offsets, rows = self._end, {}, bytearray()
-        for channel, index in self._indexes.items():
+        for channel, index in chunk.indexes.items():
             offsets[channel] = index_start + len(rows)
             entries = _ENTRY * (len(index) // 2)
             rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + entries, channel, entries)
             rows += struct.pack(f"<{len(index)}Q", *index)
             self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
         self._put(rows)
-        self._times += (self._first_ns, self._last_ns)
+        self._times += (chunk.first_ns, chunk.last_ns)
         length = len(head) + size
         self._chunks.append(
-            ChunkIndex(length, start, "", size, self._last_ns, len(rows), offsets, self._first_ns, size)
+            ChunkIndex(length, start, "", size, chunk.last_ns, len(rows), offsets, chunk.first_ns, size)
         )
         self._begin_chunk()
 
@@ -221,8 +204,8 @@ class McapWriter:
         """Writes the new records of the open chunk, then the head that takes them in; returns the head."""
         if not self._stored:  # its head first, of an empty chunk: what follows never stands in half a chunk
             self._write(self._end, self._chunk_head(0, 0))
-        new = bytes(memoryview(self._chunk)[self._stored :])
-        size = len(self._chunk)
+        new = bytes(memoryview(self._chunk.data)[self._stored :])
+        size = len(self._chunk.data)
         checksum = crc32(new, self._chunk_checksum)
         head = self._chunk_head(size, checksum)
         if new:
@@ -235,7 +218,8 @@ class McapWriter:
 
     def _chunk_head(self, size: int, checksum: int) -> bytes:
         length = _BEFORE_DATA + size
-        return _CHUNK.pack(Opcode.CHUNK, length, self._first_ns, self._last_ns, size, checksum, 0, size)
+        times = self._chunk.first_ns, self._chunk.last_ns
+        return _CHUNK.pack(Opcode.CHUNK, length, *times, size, checksum, 0, size)
 
     def _put(self, data: bytes | bytearray) -> None:
         """Appends to the file, outside of chunks."""

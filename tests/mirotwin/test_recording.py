@@ -15,15 +15,20 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from miro_exact.clock import nanoseconds
+from miro_host.eye.track import Sighting
+from miro_host.posture import Posture
 from miro_protocol.actions import Power, RadioState, Reset
-from miro_sim.periods import Control
-from mirotwin.recording import channels, topics
+from miro_protocol.transmission import Transmission
+from miro_sim.periods import Axis, Control, Period, RobotPeriod
+from mirotwin.recording import channels, topics, writer
 from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.writer import MAGIC
 from tests.mirotwin.synthetic import periods
+from tests.naive import recording_messages
 
 SOURCE = RunSource(
     scenario_name="fig6",
@@ -62,6 +67,68 @@ def test_what_was_done_to_robots_and_radios_comes_out_again():
     assert sorted(
         parse(stream.getvalue(), "run.mcap").periods[0].actions, key=lambda action: action.tick
     ) == [*actions]
+
+
+FINITE = st.floats(allow_nan=False)
+TICKS = st.integers(0, 1 << 54)
+POSTURES = st.builds(Posture, FINITE, FINITE, FINITE)
+MAPS = st.dictionaries(st.text(max_size=5), FINITE, max_size=3)
+WHOLE = st.integers(-(1 << 63), (1 << 63) - 1)
+AXES = st.builds(
+    Axis,
+    *[WHOLE] * 6,
+    commands=st.lists(st.tuples(TICKS, st.integers(0, 255), st.text("0123456789abcdef", max_size=8))).map(
+        tuple
+    ),
+)
+COUNTER = st.none() | st.integers(0, 65535)
+ROBOTS = st.builds(
+    RobotPeriod,
+    network=st.integers(0, 1),
+    slot=st.integers(0, 2),
+    reference=POSTURES,
+    truth=POSTURES,
+    v_m_s=FINITE,
+    w_rad_s=FINITE,
+    measurement=st.one_of(st.none(), POSTURES, st.builds(Sighting, *[FINITE] * 3, TICKS, FINITE)),
+    control=st.none() | st.builds(Control, FINITE, FINITE, WHOLE, WHOLE, MAPS, MAPS),
+    accepted=COUNTER,
+    rejected=COUNTER,
+    stale=COUNTER,
+    left=AXES,
+    right=AXES,
+)
+SENT = st.builds(Transmission, TICKS, st.sampled_from("<>"), st.binary(min_size=1), st.integers(0, 1))
+PERIODS = st.builds(
+    Period,
+    st.integers(0, 1 << 30),
+    TICKS,
+    st.lists(ROBOTS, max_size=2).map(tuple),
+    st.lists(SENT, max_size=3).map(tuple),
+    st.text("0123456789abcdef", min_size=64, max_size=64),
+    st.lists(
+        st.builds(Reset, TICKS, st.integers(0, 1), st.integers(0, 2), st.integers(0, 1)), max_size=1
+    ).map(tuple),
+)
+
+
+@settings(max_examples=40)
+@given(st.lists(PERIODS, max_size=3), st.sampled_from((300, 1 << 20)))
+def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, chunk_size):
+    stream = io.BytesIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(writer, "CHUNK_SIZE", chunk_size)
+        with Recorder(stream, SOURCE) as recorder:
+            for period in written:
+                recorder.write(period)
+    found = [
+        (channel.topic, message.log_time, message.data)
+        for _, channel, message in make_reader(io.BytesIO(stream.getvalue())).iter_messages(
+            log_time_order=False
+        )
+    ]
+    wanted = [message for period in written for message in recording_messages.messages(period)]
+    assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
 
 
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(

@@ -54,9 +54,10 @@ class Clean:
         """Puts the compiled modules of this tree into what was installed."""
         where = "import sysconfig; print(sysconfig.get_path('platlib'))"
         target = Path(self.must("python", "-c", where).strip())
-        for package in PACKAGE_FOLDERS:
+        for package in (*PACKAGE_FOLDERS, "mirotwin"):
+            base = ROOT if package == "mirotwin" else ROOT / package
             for path in (one for pattern in ENGINES for one in (ROOT / package).rglob(pattern)):
-                shutil.copy2(path, target / path.relative_to(ROOT / package))
+                shutil.copy2(path, target / path.relative_to(base))
 
 
 def source_archive(folder):

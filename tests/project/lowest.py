@@ -67,7 +67,7 @@ def copy_tree(target, patterns):
     """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
     tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
     names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
-    for package in PACKAGE_FOLDERS:
+    for package in (*PACKAGE_FOLDERS, "mirotwin"):
         names += [path.relative_to(ROOT) for pattern in patterns for path in (ROOT / package).rglob(pattern)]
     for name in names:
         (target / name).parent.mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,7 @@ PREFIX = "foxglove."
 def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
     """Name and text of a message's schema: Foxglove's for its messages, ours for all others."""
     if type(message).__module__ != messages.__name__:
-        return channels.schema_name(message), channels.schema_text(message)
+        return channels.schema_name(type(message)), channels.schema_text(type(message))
     name = type(message).__name__
     return PREFIX + name, _published(name)
 

@@ -256,7 +256,7 @@ def test_a_damaged_frame_is_bad_input():
     def add(recorder):
         recorder.write_image(0, 5, b"png")
         recorder.flush()
-        recorder._writer.add_message(recorder._channels["/net0/camera/image"], 250, b'{"tick":')
+        recorder._writer.add_message(recorder._rows.channels["/net0/camera/image"][0], 250, b'{"tick":')
 
     with pytest.raises(RecordingError, match="/net0/camera/image at 250 ns"):
         rig.exported(recorded(2, add))

@@ -1,0 +1,233 @@
+"""Messages on their way into a recording: values in the forms that they stand in, and the chunk that takes them.
+
+A form is a message as JSON, with a line end in place of each value. So the values of many messages are encoded at once,
+a line each, and only copied here. What belongs in a message says `channels`, where a chunk ends says `writer`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import msgspec
+from msgspec.structs import astuple
+
+from miro_host.eye.track import Sighting
+from miro_protocol.transmission import Transmission
+from miro_sim.periods import Axis, Control, Period, RobotPeriod
+from mirotwin.recording import channels, topics
+from mirotwin.recording.channels import CommandMessage
+
+Head = tuple[int, int, bytes]
+"""Channel, time and form of a message."""
+
+WHOLE = b"\n"
+"""The form of a message whose only value is all of it."""
+LAST_NS = (1 << 64) - 1
+_LINE_END = 10
+_MESSAGE = 5  # opcode
+_HEAD = 31  # bytes: opcode, length, channel, sequence, log time, publish time
+_BEFORE_LENGTH = 9
+
+
+@cache
+def form_of(kind: type[msgspec.Struct]) -> bytes:
+    """The form of messages of a kind; what a message in it holds are values too."""
+    fields = [
+        f'"{field.encode_name}":'.encode() + (form_of(field.type) if _is_message(field.type) else WHOLE)
+        for field in msgspec.structs.fields(kind)
+    ]
+    return b"{" + b",".join(fields) + b"}"
+
+
+def _is_message(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+class Chunk:
+    """The records of a chunk under way. `indexes`: channel -> time and offset of each message, in one row."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.indexes: dict[int, list[int]] = {}
+        self.first_ns = LAST_NS
+        self.last_ns = 0
+        self.end = 0  # where `_fill` came to
+
+    def add(self, channel: int, time_ns: int, content: bytes) -> None:
+        """Adds a message."""
+        begin = len(self.data)
+        self.data += bytes(_HEAD)
+        self._head(memoryview(self.data), begin, len(content), channel, time_ns)
+        self.data += content
+
+    def fill(self, heads: list[Head], first: int, text: bytes, at: int, limit: int) -> tuple[int, int]:
+        """Adds messages from `heads[first]` on, up to the one that makes the chunk longer than `limit`.
+
+        Their values stand in `text`, from `at` on. Returns where both go on.
+        """
+        end = len(self.data)
+        room = len(text) - at
+        for place in range(first, len(heads)):
+            room += _HEAD + len(heads[place][2])
+        self.data += bytes(room)
+        reached = self._fill(memoryview(self.data), end, heads, first, text, at, limit)
+        del self.data[self.end :]
+        return reached
+
+    def _fill(
+        self, out: memoryview, end: int, heads: list[Head], first: int, text: bytes, at: int, limit: int
+    ) -> tuple[int, int]:
+        place = first
+        while place < len(heads) and (place == first or end <= limit):
+            channel, time_ns, form = heads[place]
+            begin = end
+            end += _HEAD
+            for index in range(len(form)):
+                byte = form[index]
+                if byte != _LINE_END:
+                    out[end] = byte
+                    end += 1
+                    continue
+                while text[at] != _LINE_END:
+                    out[end] = text[at]
+                    end += 1
+                    at += 1
+                at += 1
+            self._head(out, begin, end - begin - _HEAD, channel, time_ns)
+            place += 1
+        self.end = end
+        return place, at
+
+    def _head(self, out: memoryview, begin: int, size: int, channel: int, time_ns: int) -> None:
+        """The head of a message whose content has `size` bytes, and its entry in the index."""
+        out[begin] = _MESSAGE
+        _put(out, begin + 1, size + _HEAD - _BEFORE_LENGTH, 8)
+        _put(out, begin + 9, channel, 2)
+        _put(out, begin + 11, 0, 4)
+        _put(out, begin + 15, time_ns, 8)
+        _put(out, begin + 23, time_ns, 8)
+        index = self.indexes.get(channel)
+        if index is None:
+            index = self.indexes[channel] = []
+        index.append(time_ns)
+        index.append(begin)
+        self.first_ns = min(self.first_ns, time_ns)
+        self.last_ns = max(self.last_ns, time_ns)
+
+
+def _put(out: memoryview, place: int, value: int, size: int) -> None:
+    """A number, the lowest byte first."""
+    for index in range(size):
+        out[place + index] = value >> 8 * index & 0xFF
+
+
+class Rows:
+    """Messages that wait: their heads, and the values of all of them.
+
+    `add_channel` makes a channel of a topic, from its first message's kind and the names of a law's inner values.
+    `write` takes heads and values, and is called before a channel is added too.
+    """
+
+    def __init__(
+        self,
+        add_channel: Callable[[str, type[msgspec.Struct], tuple[str, ...] | None], int],
+        write: Callable[[list[Head], list[Any]], None],
+    ) -> None:
+        self.add_channel = add_channel
+        self.write = write
+        self.channels: dict[str, tuple[int, bytes]] = {}  # by topic: number, form of the messages
+        self.heads: list[Head] = []
+        self.values: list[Any] = []
+
+    def flush(self) -> None:
+        """Writes what waits."""
+        heads, values = self.heads, self.values
+        self.heads, self.values = [], []
+        self.write(heads, values)
+
+    def message(self, topic: str, tick: int, message: msgspec.Struct) -> None:
+        """Any message, as its own only value."""
+        if topic not in self.channels:
+            self._add_channel(topic, type(message), WHOLE, None)
+        self._begin(topic, tick, type(message))
+        self.values.append(message)
+
+    def period(self, period: Period) -> None:
+        """All messages of a control period."""
+        tick = period.tick
+        for robot in period.robots:
+            self._robot(robot, tick)
+        for sent in period.wire:
+            self._wire(sent)
+        for action in period.actions:
+            self.message(topics.actions_topic(action.network), action.tick, channels.action_message(action))
+        self._begin(topics.PERIOD, tick, channels.PeriodMessage)
+        self.values += (tick, period.index, period.digest)
+
+    def _wire(self, sent: Transmission) -> None:
+        self._begin(_wire_topic(sent.network), sent.tick, channels.WireMessage)
+        self.values += (sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
+
+    def _robot(self, robot: RobotPeriod, tick: int) -> None:
+        """What one robot leaves behind."""
+        names: list[str] = _robot_topics(robot.network, robot.slot)
+        _, _, reference, truth, *speeds, seen, answer, accepted, rejected, stale, left, right = astuple(robot)
+        self._begin(names[0], tick, channels.PostureMessage)
+        self.values += (tick, *astuple(reference))
+        self._begin(names[1], tick, channels.TruthMessage)
+        self.values += (tick, *astuple(truth), *speeds)
+        if seen is not None:
+            self._begin(names[2], tick, channels.MeasurementMessage)
+            self.values += (tick, *astuple(seen))
+            if not isinstance(seen, Sighting):
+                self.values += (None, None)
+        if answer is not None:
+            self._control(names[3], answer, tick)
+        if accepted is not None and rejected is not None and stale is not None:
+            self._begin(names[4], tick, channels.FirmwareMessage)
+            self.values += (tick, accepted, rejected, stale)
+        self._begin(names[5], tick, channels.Lm629Message)
+        self.values.append(tick)
+        duties = self._registers(left) + self._registers(right)
+        self._begin(names[6], tick, channels.PwmMessage)
+        self.values += (tick, *duties)
+
+    def _control(self, topic: str, answer: Control, tick: int) -> None:
+        if topic not in self.channels:
+            kind = channels.ControlMessage
+            self._add_channel(topic, kind, form_of(kind), tuple(answer.inner))
+        self._begin(topic, tick, channels.ControlMessage)
+        self.values += (tick, *astuple(answer))
+
+    def _registers(self, axis: Axis) -> tuple[int, int]:
+        """The values of one chip in its message; returns sign and magnitude of its PWM, which stand in another."""
+        *registers, sign, magnitude, commands = astuple(axis)
+        self.values += registers
+        self.values.append([CommandMessage(tick, opcode, data) for tick, opcode, data in commands])
+        return sign, magnitude
+
+    def _begin(self, topic: str, tick: int, kind: type[msgspec.Struct]) -> None:
+        """A message, whose values are the next ones."""
+        found = self.channels.get(topic)
+        if found is None:
+            found = self._add_channel(topic, kind, form_of(kind), None)
+        self.heads.append((found[0], tick * 125 // 3, found[1]))  # `nanoseconds`
+
+    def _add_channel(
+        self, topic: str, kind: type[msgspec.Struct], form: bytes, inner: tuple[str, ...] | None
+    ) -> tuple[int, bytes]:
+        self.flush()
+        found = self.channels[topic] = self.add_channel(topic, kind, inner), form
+        return found
+
+
+@cache
+def _robot_topics(network: int, slot: int) -> list[str]:
+    """Of what a robot leaves behind in each period."""
+    names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
+    return [topics.robot_topic(network, slot, name) for name in names]
+
+
+_wire_topic = cache(topics.wire_topic)
