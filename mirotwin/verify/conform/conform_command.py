@@ -129,7 +129,7 @@ def conform(options: ConformOptions) -> int:
             _make_room(artifacts, rules)
         sha256, seed = firmware.sha256, f"{options.seed}"
         properties = {"firmware": firmware.path.name, "firmware_sha256": sha256, "seed": seed}
-        tried = try_all(rules, firmware, options.seed, keep=artifacts is not None)
+        tried = try_all(rules, firmware, options.seed, keep=artifacts is not None, ahead=True)
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
     with ProgressBar("trying rules", len(rules), quiet) as bar:

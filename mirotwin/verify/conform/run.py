@@ -19,6 +19,7 @@ from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.conform.ahead import tried_ahead
 from mirotwin.verify.conform.probe import why_lost
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.rule_monitor import ConformsTo
@@ -115,8 +116,10 @@ def _robots(world: World) -> list[RobotId]:
     return [(network.index, robot.slot) for network in world.networks for robot in network.robots]
 
 
-def try_all(rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False) -> Iterator[Outcome]:
-    """Each as soon as it is known, those that others presuppose first; see `with_faults`.
+def try_all(
+    rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False, ahead: bool = False
+) -> Iterator[Outcome]:
+    """Each as soon as it is known, those that others presuppose first; see `with_faults`. `ahead`: see `ahead.py`.
 
     A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run. Nor is it where the
     firmware did, before it failed, what another of `rules` forbids: what comes after that says nothing of the rule.
@@ -134,7 +137,8 @@ def try_all(rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = Fal
         hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
         return msgspec.structs.replace(outcome, hint=hint)
 
-    return in_order(rules, tried)
+    with tried_ahead(_presupposed_first(rules) if ahead else (), tried) as found:
+        yield from in_order(rules, found)
 
 
 def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
