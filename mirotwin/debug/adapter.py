@@ -43,6 +43,7 @@ _MOVES = {
 _MOST_FRAMES = 1000
 _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
 _REASONS = {"begin": "entry", "case": "exception", "interrupted": "pause", "goto": "goto", "step": "step"}
+_UNUSABLE = (AttributeError, LookupError, TypeError, ValueError)  # what comes of arguments of another form
 Shown = Callable[[], Value]
 Made = tuple[Breakpoint, Message]
 
@@ -82,7 +83,7 @@ class Adapter:
             body = handler(request["arguments"])
         except BadInput as error:
             self._respond(request, refused=str(error))
-        except (LookupError, TypeError, ValueError) as error:
+        except _UNUSABLE as error:
             self._respond(request, refused=f"{command}: arguments that cannot be used: {error!r}")
         else:
             self._respond(request, body)
@@ -147,7 +148,7 @@ class Adapter:
             moved = None if line.line == one["line"] else "the line has no code: the next one that has some"
             return self._add(one, addresses), {"line": line.line, "source": given["source"], "message": moved}
 
-        return self._set(f"breakpoint in {path}", given.get("breakpoints", ()), make)
+        return self._set(f"breakpoint in {path}", given.get("breakpoints") or (), make)
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
         def make(one: Message) -> Made:
@@ -189,7 +190,7 @@ class Adapter:
         for one in asked:
             try:
                 made, body = make(one)
-            except BadInput as error:
+            except _UNUSABLE as error:
                 found.append({"verified": False, "message": str(error)})
                 continue
             self.kinds[kind].append(made.number)
@@ -382,7 +383,7 @@ class Adapter:
 
     def on_evaluate(self, given: Message) -> Message:
         text = given["expression"].strip()
-        if given.get("context") != "repl" or text.partition(" ")[0] not in VERBS:
+        if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, "result")
         assert self.console is not None

@@ -97,6 +97,8 @@ class Console:
         verb = word if word in VERBS else next((name for name in VERBS if name.startswith(word)), "")
         if not verb:
             raise BadInput("", word, "is no command", f"there are {', '.join(VERBS)}")
+        if verb in MOVES and rest:
+            raise BadInput("", rest, f"is more than {verb} takes", "repeat it by an empty line")
         if verb in MOVES:
             self.say(self.debugger.move(verb))
         else:
@@ -133,9 +135,12 @@ class Console:
         self.say(self.debugger.go_to(tick))
 
     def _until(self, rest: str) -> None:
-        name, *keys = shlex.split(rest) or [""]
+        try:
+            name, *keys = shlex.split(rest) or [""]
+        except ValueError as error:
+            raise BadInput("", rest, str(error)) from None
         if name not in CONDITIONS:
-            raise BadInput("", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
+            raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
         run = self.timeline.run
         if not isinstance(run, RobotRun):
             what = "is a condition of a robot's world"

@@ -66,6 +66,8 @@ def debug(options: DebugOptions) -> int:
         show_line(f"{PROMPT}{line}")
         if not console.run(line):
             return BAD_INPUT
+        if console.ended:
+            break
     return DONE
 
 

@@ -20,7 +20,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.names import SFRS
 from miro_robot.mcs51.opcodes import LENGTH, is_call
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
-from mirotwin.debug.symbols import Moment, Symbols
+from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
 from mirotwin.rerun.inspected_run import RobotRun
 
@@ -100,6 +100,8 @@ class Debugger:
 
     def add(self, text: str, addresses: Collection[int], condition: str = "", count: str = "") -> Breakpoint:
         """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is not one."""
+        if not all(0 <= address < SIZES["code"] for address in addresses):
+            raise BadInput("", "breakpoint", "is beyond the last code address", "use 0x0000 to 0xffff")
         self._numbers += 1
         term = expression(condition) if condition else None
         found = Breakpoint(
@@ -124,7 +126,7 @@ class Debugger:
         if space == "bit":
             sfr = address >= 0x80
             space, address = ("sfr", address & 0xF8) if sfr else ("iram", 0x20 + (address >> 3))
-        if not size or space not in ("iram", "sfr", "xram"):
+        if not size or space not in ("iram", "sfr", "xram") or not 0 <= address <= SIZES[space] - size:
             raise NoValue(
                 f"{text} lies in no memory that can be watched", "name a variable: `print` says what it is"
             )
@@ -215,9 +217,10 @@ class Debugger:
         if tick > timeline.frontier:
             timeline.go_to(timeline.frontier)
             timeline.find({}, tick)
-        if not timeline.run.over:
+        if tick <= timeline.frontier:
             timeline.go_to(tick)
-        return self._at_end() or "goto"
+            return self._at_end() or "goto"
+        return self._at_end() or INTERRUPTED
 
     def step(self, how: How, back: bool = False, by_instruction: bool = False) -> str:
         """One line, or one instruction where it asks for that or no line is known. Raises BadInput."""

@@ -20,7 +20,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, shortened
 from miro_robot.image.c_types import CType, Fields, Member, value_of
 
-_TOKEN = re.compile(r"(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
+_TOKEN = re.compile(r"\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
 _MOST_TOKENS, _MOST_SHIFT = 128, 64
 _LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 _RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
@@ -118,7 +118,7 @@ def _member(value: Value, name: str) -> Value:
 def _element(value: Value, index: int) -> Value:
     kind = value.kind
     if kind is None or kind.element is None or kind.kind != "array":
-        raise NoValue("is no array")
+        raise NoValue("is no array and no pointer")
     if not 0 <= index < kind.count:
         raise NoValue(f"[{index}] is outside of {kind}", f"give 0 to {kind.count - 1}")
     part = None if value.number is None else value.number[index]
@@ -179,8 +179,11 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
     def applied(scope: Scope) -> Value:
         try:
             found = apply(*(number(term(scope), scope) for term in terms))
+            float(found)  # so that numbers do not grow without end
         except TypeError:
             raise NoValue(f"{sign} is for whole numbers") from None
+        except OverflowError:
+            raise NoValue(f"what {sign} gives is too large") from None
         return Value(number=int(found) if isinstance(found, bool) else found)
 
     return applied
@@ -277,12 +280,12 @@ class _Reader:
         return lambda scope: constant
 
 
-def _constant(token: str) -> int | None:
+def _constant(token: str) -> int | float | None:
     """Of digits or a character."""
     if len(token) > 2 and token[0] == "'":
         return _ESCAPES.get(token[2], ord(token[2])) if token[1] == "\\" else ord(token[1])
     with suppress(ValueError):
-        return int(token, 16 if token[:2].lower() == "0x" else 10)
+        return float(token) if "." in token else int(token, 16 if token[:2].lower() == "0x" else 10)
     return None
 
 

@@ -218,7 +218,7 @@ class Moment:
             return Value(_BYTE, "iram", cpu.bank + int(name[1]))
         if name in BITS:
             return Value(_BIT, "bit", BITS[name])
-        if name in SIZES and (name != "xram" or board is None):
+        if name in SIZES:
             return Value(CType("array", SIZES[name], element=_BYTE, count=SIZES[name]), name)
         if name == "pins":
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})

@@ -15,6 +15,7 @@ from miro_exact.bad_input import BadInput, shortened
 MOST_BYTES = 16 << 20
 _MOST_HEAD, _CHUNK_BYTES = 4096, 65536
 _LENGTH = re.compile(rb"^Content-Length:[ \t]*([0-9]{1,9})[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+_NULL = ("dataId",)  # what the protocol wants as null where there is none
 Message = dict[str, Any]
 
 
@@ -93,7 +94,7 @@ class Wire:
 
 def _given(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _given(one) for key, one in value.items() if one is not None}
+        return {key: _given(one) for key, one in value.items() if one is not None or key in _NULL}
     return [_given(one) for one in value] if isinstance(value, list) else value
 
 

@@ -134,7 +134,7 @@ def assembled(source):
 
 def compiled(folder, source, *options):
     """A run of a C program, built by SDCC."""
-    target = Path(folder) / "program.ihx"
+    target = Path(folder) / f"{source.stem}{''.join(options)}.ihx"
     children.run(["sdcc", "-mmcs51", "--debug", *options, str(source), "-o", str(target)], check=True)
     return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
 

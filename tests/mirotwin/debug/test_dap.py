@@ -133,6 +133,8 @@ def test_a_breakpoint_that_is_set_during_a_run_stops_it(adapter):
         ("continue", {}, "arguments that cannot be used"),
         ("variables", {"variablesReference": 77}, "is of a moment that is left"),
         ("evaluate", {"expression": "1 +"}, "lacks a name or a number"),
+        ("evaluate", {"expression": ""}, "lacks a name or a number"),
+        ("evaluate", {"expression": None}, "arguments that cannot be used"),
         ("readMemory", {"memoryReference": "moon:0x0", "count": 1}, "arguments that cannot be used"),
         ("scopes", {"frameId": 999}, "arguments that cannot be used"),
     ],
@@ -161,6 +163,31 @@ def test_breakpoints_that_cannot_be_set_say_why(adapter):
     found = client.ask("setBreakpoints", source=source, breakpoints=lines)["body"]["breakpoints"]
     assert [one["verified"] for one in found] == [False, False, False, True]
     assert all(one["message"] for one in found[:3])
+    places = [{"instructionReference": one} for one in ("0xffffff", "zz", "0x40")]
+    found = client.ask("setInstructionBreakpoints", breakpoints=places)["body"]["breakpoints"]
+    assert [one["verified"] for one in found] == [False, False, True]
+    places = [{"dataId": one} for one in ("iram:9999:1", "iram", "iram:48:1")]
+    found = client.ask("setDataBreakpoints", breakpoints=places)["body"]["breakpoints"]
+    assert [one["verified"] for one in found] == [False, False, True]
+    assert client.ask("dataBreakpointInfo", name="A")["body"]["dataId"] is None
+    client.send("reverseContinue", threadId=1)
+    assert client.until(event="stopped")["body"]["description"] == "the run begins here"
+
+
+def test_sources_are_told_by_their_names_and_breakpoints_may_be_none(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    for path in ("C:\\work\\failsafe.c", "file:///work/failsafe.c", "failsafe.c"):
+        answer = client.ask("setBreakpoints", source={"path": path}, breakpoints=[{"line": 146}])
+        assert answer["body"]["breakpoints"][0]["verified"]
+    assert client.ask("setBreakpoints", source={"path": path}, breakpoints=None)["body"]["breakpoints"] == []
+
+
+def test_the_verbs_of_the_console_work_in_the_debug_console(adapter):
+    _, client = adapter
+    client.begin(subject="fig6", at="20ms")
+    for text, said in (("r stepi", "step: "), ("where", "#0"), ("print tick", "tick = ")):
+        assert said in client.ask("evaluate", expression=text, context="repl")["body"]["result"]
 
 
 @pytest.mark.parametrize(

@@ -174,6 +174,8 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
+        ("until edge 'pin", "No closing quotation"),
+        ("next 3", "is more than next takes"),
         ("watch lm629.left.status", "lies in no memory that can be watched"),
         ("finish", "nothing called this function"),
         ("where 7", "there is no frame 7"),
@@ -186,6 +188,16 @@ def test_a_command_that_cannot_be_done_is_one_line_and_exit_code_2(mirotwin, lin
     assert code == 2
     assert said in err
     assert err.count("\n") == 1
+
+
+def test_goto_goes_back_from_the_end_of_the_run(mirotwin):
+    code, out, err = mirotwin("debug", "fig6", *commands("goto 9s", "goto 0s", "quit", "where"))
+    assert (code, err) == (0, "")
+    assert "\n6.0060000s  the run ends here: " in out
+    assert out.splitlines()[-2:] == [
+        "0.0000000s  goto: 0x0000 in reset   LJMP __sdcc_gsinit_startup",
+        "(mirotwin) quit",
+    ]
 
 
 def test_a_line_without_code_moves_to_the_next_and_says_so(mirotwin):

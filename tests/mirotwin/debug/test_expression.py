@@ -47,6 +47,7 @@ def value(text, scope=None):
         ("a == 7 == 1", 1),
         ("'A' + '\\n'", 75),
         ("a.0 + a.3", 1),
+        ("a * 1.5", 10.5),
     ],
 )
 def test_operators_have_the_ranks_of_c(text, expected):
@@ -64,7 +65,20 @@ def test_what_cannot_be_read_is_said(parts):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "1 +", "(1", "a b", "1 << 99", "1 / 0", "(" * 200 + "1" + ")" * 200, "a[0]", "*a", "&a"]
+    "text",
+    [
+        "",
+        "1 +",
+        "(1",
+        "a b",
+        "1 << 99",
+        "1 / 0",
+        "(" * 200 + "1" + ")" * 200,
+        "a[0]",
+        "*a",
+        "&a",
+        f"{9**300} * {9**300}",
+    ],
 )
 def test_what_has_no_value_is_refused(text):
     with pytest.raises(NoValue):
@@ -144,7 +158,7 @@ def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp
     ("text", "said"),
     [
         ("frames_acepted", "did you mean frames_accepted"),
-        ("xram[1]", "there is no xram"),
+        ("xram[1]", "is in external RAM, which the board has not"),
         ("iram[256]", "give 0 to 255"),
     ],
 )
