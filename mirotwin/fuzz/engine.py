@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from types import TracebackType
+from typing import Self
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
@@ -17,55 +19,73 @@ _TOKENS, _TOKEN = 32, 64
 
 
 class EngineProgress(msgspec.Struct, frozen=True):
-    """A campaign so far: `executions` since it began first, the rate of all its jobs together.
-
-    `edges`: of the job that has most, None as long as it has said nothing. `frames` and `characters`: what the machines
-    were fed. `stability_percent`: of the job with the least. `run_time_s` of wall time.
-    """
+    """A campaign so far: the rate is that of all its jobs together; `edges` is None as long as nothing is known."""
 
     executions: int = 0
     executions_per_s: float = 0.0
     edges: int | None = None
-    crashes: int = 0
-    corpus_count: int = 0
-    stability_percent: float | None = None
-    run_time_s: float = 0.0
-    frames: int = 0
-    characters: int = 0
 
 
-class Engine(Protocol):
-    """One campaign of an engine. Paths are files that hold an input each."""
+class Engine:
+    """One campaign of an engine, which gives paths of files that hold an input each.
 
-    def start(self) -> None: ...
-    def stop(self) -> None: ...
-    def progress(self) -> EngineProgress: ...
-    def new_crashes(self) -> list[Path]:
-        """Inputs that failed, since the last call."""
-        ...
+    This one makes up no inputs: there is none to begin with. The others derive from it.
+    """
 
-    def new_queue(self) -> list[Path]:
-        """Inputs that found something new, since the last call."""
-        ...
-
-
-class NoEngine:
-    """Where there is no input to begin with: it makes up none."""
+    def __init__(self) -> None:
+        self._handed_out: dict[Path, None] = {}
 
     def start(self) -> None:
-        """Nothing."""
+        """Starts all jobs."""
 
     def stop(self) -> None:
-        """Nothing."""
+        """Ends all jobs. A second call does nothing."""
 
     def progress(self) -> EngineProgress:
+        """How far it is."""
         return EngineProgress()
 
     def new_crashes(self) -> list[Path]:
-        return []
+        """Inputs with a failure that were not given before. Different jobs may find the same."""
+        return self._new("crashes")
 
     def new_queue(self) -> list[Path]:
+        """Inputs that executed something new and were not given before."""
+        return self._new("queue")
+
+    def _new(self, kind: str) -> list[Path]:
+        self._require_health()
+        found = [path for path in self._inputs(kind) if path not in self._handed_out and self._is_whole(path)]
+        self._handed_out.update(dict.fromkeys(found))
+        return found
+
+    def _inputs(self, kind: str) -> list[Path]:
+        """All that its jobs have left in `queue` or `crashes`."""
         return []
+
+    def _is_whole(self, path: Path) -> bool:
+        """Whether a job has written all of an input."""
+        return True
+
+    def _require_health(self) -> None:
+        """Raises BadInput for a job that has ended with an error, with its own line."""
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def check_jobs(jobs: int, program: str, absent: str | None) -> None:
+    """Raises BadInput for no job, and for a program of which `absent` says what is missing and how to get it."""
+    if jobs < 1:
+        raise BadInput("--jobs", "", f"{jobs}: there is nothing to do", "give 1 or more")
+    if absent:
+        raise BadInput(program, "", *absent.split("; ", 1))
 
 
 def engine_for(

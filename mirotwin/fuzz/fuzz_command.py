@@ -17,7 +17,7 @@ from miro_robot.image import Image
 from miro_sim.scenario.file import changed
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
-from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
+from mirotwin.fuzz.engine import Engine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.fuzz_options import FuzzOptions, bare_spec, load_bare_firmware
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
@@ -122,7 +122,7 @@ def _begun(
 ) -> Campaign:
     """A campaign that has looked at the inputs that fail, pass and execute no branch."""
     failing, passing, silent = inputs
-    engine: Engine = NoEngine()
+    engine = Engine()
     if passing:
         engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(options.jobs), options.seed)
         for note in notes:

@@ -29,8 +29,6 @@ class HarnessTarget:
         self.program = program
         self.slot = slot
         self.executions = 0
-        self.frames_fed = 0
-        self.characters_fed = 0
         self.use_map(bytearray(MAP_SIZE))
 
     @property
@@ -48,8 +46,7 @@ class HarnessTarget:
     def play(self, data: Any) -> int:
         """Puts the machine back and plays an input; how that ended, as of `Harness.play`."""
         program = self.program
-        self.characters_fed += program.read(data)
-        self.frames_fed += program.frames
+        program.read(data)
         self.executions += 1
         return self.harness.play(program)
 

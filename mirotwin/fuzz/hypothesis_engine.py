@@ -14,10 +14,9 @@ import time
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from types import TracebackType
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.engine import EngineProgress
+from mirotwin.fuzz.engine import Engine, EngineProgress, check_jobs
 from mirotwin.fuzz.hypothesis_process import KINDS, told
 from mirotwin.shell.program import python_module
 
@@ -32,12 +31,11 @@ def missing() -> str | None:
     return "Hypothesis is not installed; install it with `pip install 'mirotwin[hypothesis]'`"
 
 
-class HypothesisRun:
+class HypothesisRun(Engine):
     """A campaign: `jobs` processes, each with a target of its own and a seed of its own.
 
     Arguments as `AflRun` has them; a dictionary is not used, since inputs are made of whole operations. `seed`: of what
-    Hypothesis draws; the system's where none is given. Raises BadInput for Hypothesis that is missing; the methods
-    raise it when a process has ended with an error, with its last line.
+    Hypothesis draws; the system's where none is given. Raises BadInput for Hypothesis that is missing.
     """
 
     def __init__(
@@ -49,22 +47,17 @@ class HypothesisRun:
         jobs: int = 1,
         seed: int | None = None,
     ) -> None:
-        if jobs < 1:
-            raise BadInput("--jobs", "", f"{jobs}: there is nothing to do", "give 1 or more")
-        absent = missing()
-        if absent:
-            raise BadInput("Hypothesis", "", *absent.split("; ", 1))
+        check_jobs(jobs, "Hypothesis", missing())
+        super().__init__()
         self._target_args = list(target_args)
         self._seeds = seeds
         self._folders = [out / f"job{job}" for job in range(jobs)]
         self._seed = int.from_bytes(os.urandom(4), "little") if seed is None else seed
         self._stopped = False
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._handed_out: dict[str, dict[Path, None]] = {kind: {} for kind in KINDS}
         self._began_s = 0.0
 
     def start(self) -> None:
-        """Starts all processes."""
         self._began_s = time.monotonic()
         for number, folder in enumerate(self._folders):
             for kind in KINDS:
@@ -82,53 +75,19 @@ class HypothesisRun:
                 )
 
     def stop(self) -> None:
-        """Ends all processes at once. A second call does nothing."""
         self._stopped = True
         for process in self._processes:
             process.kill()
         for process in self._processes:
             process.wait()
 
-    @property
-    def running(self) -> bool:
-        """Is any process at work?"""
-        self._require_health()
-        return any(process.poll() is None for process in self._processes)
-
     def progress(self) -> EngineProgress:
-        """How far it is."""
         self._require_health()
         said = [one for one in (told(folder) for folder in self._folders) if one]
         run_time_s = time.monotonic() - self._began_s
         executions = sum(one.executions for one in said)
-        return EngineProgress(
-            executions=executions,
-            executions_per_s=executions / run_time_s if run_time_s > 0 else 0.0,
-            edges=max((one.edges for one in said), default=None),
-            crashes=len(self._all("crashes")),
-            corpus_count=len(self._all("queue")),
-            stability_percent=None,
-            run_time_s=run_time_s,
-            frames=sum(one.frames for one in said),
-            characters=sum(one.characters for one in said),
-        )
-
-    def new_crashes(self) -> list[Path]:
-        """Inputs with a failure that were not given before."""
-        return self._new("crashes")
-
-    def new_queue(self) -> list[Path]:
-        """Inputs that executed something new and were not given before."""
-        return self._new("queue")
-
-    def __enter__(self) -> HypothesisRun:
-        self.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+        per_s = executions / run_time_s if run_time_s > 0 else 0.0
+        return EngineProgress(executions, per_s, max((one.edges for one in said), default=None))
 
     def _require_health(self) -> None:
         for process, folder in zip(self._processes, self._folders, strict=False):
@@ -137,11 +96,5 @@ class HypothesisRun:
                 what = lines[-1] if lines else f"ended with exit code {process.returncode}"
                 raise BadInput("Hypothesis", "", what, f"see {folder / _LOG}")
 
-    def _all(self, kind: str) -> list[Path]:
+    def _inputs(self, kind: str) -> list[Path]:
         return [path for folder in self._folders for path in sorted((folder / kind).glob("id:*"))]
-
-    def _new(self, kind: str) -> list[Path]:
-        self._require_health()
-        found = [path for path in self._all(kind) if path not in self._handed_out[kind]]
-        self._handed_out[kind].update(dict.fromkeys(found))
-        return found

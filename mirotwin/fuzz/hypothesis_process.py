@@ -26,8 +26,6 @@ class Told(msgspec.Struct, frozen=True):
 
     executions: int
     edges: int
-    frames: int
-    characters: int
 
 
 def told(folder: Path) -> Told | None:
@@ -56,8 +54,7 @@ class _Kept:
         now_s = time.monotonic()
         if now_s - self.told_s >= TOLD_S:
             self.told_s = now_s
-            target = explorer.target
-            now = Told(target.executions, explorer.edges, target.frames_fed, target.characters_fed)
+            now = Told(explorer.target.executions, explorer.edges)
             _write(self.folder / _PROGRESS, msgspec.json.encode(now))
         return True
 

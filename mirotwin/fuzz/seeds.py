@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, encode
 from miro_protocol.table import DEFAULT_ACCELERATION, FrameType
 from miro_protocol.transmission import DOWN, Transmission
-from mirotwin.fuzz.inputs import FULL, SILENCE, input_of
+from mirotwin.fuzz.inputs import SILENCE, input_of
 
 MS = 24_000
 _BETWEEN_MS = 12
@@ -65,11 +65,3 @@ def seeds(kind: str, robots: int, slot: int) -> list[bytes]:
         found += [one + bytes([SILENCE, 39]) for one in found[:1]]  # 120 ms of silence at the end
         found += [one + bytes([SILENCE, 173]) for one in found[:1]]  # 522 ms
     return list(dict.fromkeys(found))
-
-
-def foreign_seeds(kind: str) -> list[bytes]:
-    """Inputs for a target of which nothing is known: a few characters, or bodies of frames of several sizes."""
-    if kind == "bytes":
-        return [b"\0", b"A", bytes(range(8)), b"\x55" * 16]
-    bodies = [bytes([count - 1, *range(count)]) for count in (1, 4, 16)]
-    return [bytes([FULL]) + body for body in bodies] if kind == "session" else bodies

@@ -43,8 +43,6 @@ class Target(Protocol):
     map_size: int
     image: Image
     executions: int
-    frames_fed: int
-    characters_fed: int
 
     @property
     def cpu(self) -> Cpu: ...

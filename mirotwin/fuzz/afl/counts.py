@@ -1,7 +1,6 @@
-"""What only the target process knows of a campaign: executions, frames and characters fed.
+"""What only the target process knows of a campaign: how many inputs it has run.
 
-The file is mapped into memory: writing costs no system call, and what was written survives the process. A campaign
-that is taken up again counts on.
+The file is mapped into memory: writing costs no system call, and what was written survives the process.
 """
 
 from __future__ import annotations
@@ -10,51 +9,28 @@ import mmap
 import struct
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
 
-import msgspec
-
-_FORM = struct.Struct("<QQQ")
-
-
-class Counted(Protocol):
-    """What is counted."""
-
-    executions: int
-    frames_fed: int
-    characters_fed: int
-
-
-class Fed(msgspec.Struct, frozen=True):
-    """Counters of one target process, with those of the processes before it."""
-
-    executions: int = 0
-    frames: int = 0
-    characters: int = 0
+_FORM = struct.Struct("<Q")
 
 
 class Counts:
-    """The file at `path`, kept up to date; nothing is kept where `path` is None."""
+    """The file at `path`, kept up to date; nothing is kept where `path` is None.
+
+    It counts on from what processes before this one have written there.
+    """
 
     def __init__(self, path: Path | None) -> None:
-        self.before = Fed() if path is None else read_counts(path)
+        self.before = 0 if path is None else read_executions(path)
         self._memory: mmap.mmap | None = None
         if path is not None:
-            path.write_bytes(_FORM.pack(self.before.executions, self.before.frames, self.before.characters))
+            path.write_bytes(_FORM.pack(self.before))
             with path.open("r+b") as stream:
                 self._memory = mmap.mmap(stream.fileno(), _FORM.size)
 
-    def keep(self, target: Counted) -> None:
-        """Writes what `target` has counted."""
+    def keep(self, executions: int) -> None:
+        """Writes what this process has run."""
         if self._memory is not None:
-            before = self.before
-            _FORM.pack_into(
-                self._memory,
-                0,
-                before.executions + target.executions,
-                before.frames + target.frames_fed,
-                before.characters + target.characters_fed,
-            )
+            _FORM.pack_into(self._memory, 0, self.before + executions)
 
     def __enter__(self) -> Counts:
         return self
@@ -66,10 +42,10 @@ class Counts:
             self._memory.close()
 
 
-def read_counts(path: Path) -> Fed:
-    """The counters at `path`; zeros where there is no such file, or none that is whole."""
+def read_executions(path: Path) -> int:
+    """The number at `path`; 0 where there is no such file, or none that is whole."""
     try:
         content = path.read_bytes()
     except OSError:
-        return Fed()
-    return Fed(*_FORM.unpack(content)) if len(content) == _FORM.size else Fed()
+        return 0
+    return int(_FORM.unpack(content)[0]) if len(content) == _FORM.size else 0

@@ -9,10 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.counts import Fed, read_counts
+from mirotwin.fuzz.afl.counts import read_executions
 from mirotwin.fuzz.afl.ending import why_ended
 from mirotwin.fuzz.afl.settings import end_with_parent
-from mirotwin.fuzz.afl.statistics import Statistics, read_plot, read_statistics
 
 PATIENCE_S = 10.0
 """Time for afl-fuzz to write its last files after a SIGINT."""
@@ -93,26 +92,15 @@ class AflJob:
         if self.log.exists() and self.log.stat().st_size > LOG_BYTES:
             os.truncate(self.log, 0)  # it is open for appending: the next line is its first
 
-    def fed(self) -> Fed:
-        """What the target was fed, as it says."""
-        return read_counts(self._counts)
-
-    def statistics(self) -> Statistics | None:
-        """What afl-fuzz has said last, None if nothing yet."""
-        rows = read_plot(self.folder / "plot_data")
-        said = read_statistics(self.folder / "fuzzer_stats")
-        return max((one for one in (said, *rows[-1:]) if one), key=lambda one: one.executions, default=None)
-
-    def stability_percent(self) -> float | None:
-        """Share of the edges that an input executes each time, None if nothing was said yet."""
-        said = read_statistics(self.folder / "fuzzer_stats")
-        return said.stability_percent if said and said.edges else None
+    def executions(self) -> int:
+        """How many inputs the target has run, as it says."""
+        return read_executions(self._counts)
 
     def inputs(self, kind: str, jobs: Sequence[str]) -> list[Path]:
         """Inputs that it has left in `queue` or `crashes`, by number, without those taken over from one of `jobs`."""
         try:
             names = sorted(os.listdir(self.folder / kind))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return []
         return [self.folder / kind / name for name in names if _is_own(name, jobs)]
 

@@ -1,34 +1,29 @@
 """One campaign of afl-fuzz: its jobs, how far they are, and the inputs that they leave.
 
 The folder, beside what afl-fuzz makes itself (`JOB/queue`, `JOB/crashes`, ..): `JOB.log` is afl-fuzz's output,
-`JOB.target` what the target process complained of, `JOB.counts` what it was fed. A folder that holds a campaign is gone
-on with: afl-fuzz reads its queue again, and renames `JOB/crashes` to `JOB/crashes.DATE`.
+`JOB.target` what the target process complained of, `JOB.counts` what it was fed.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.job import AflJob
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
-from mirotwin.fuzz.engine import EngineProgress
+from mirotwin.fuzz.engine import Engine, EngineProgress, check_jobs
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
-from collections import Counter
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from mirotwin.fuzz.target import Target
-
-
+MAP_BYTES = 8192
+RATE_S = 1.0
+"""The rate is measured over at least so long."""
 _ONE_IF_ANY = bytes([0]) + bytes([1]) * 255
 
 
@@ -96,22 +91,15 @@ def bound(proc: Path) -> Counter[int]:
     return found
 
 
-MAP_BYTES = 8192
-RATE_S = 1.0
-"""The rate is measured over at least so long."""
-
-
-class AflRun:
+class AflRun(Engine):
     """A campaign: `jobs` times afl-fuzz, each with a target process of its own.
 
     `target_args`: the arguments of the target process, which are the JSON of a `TargetSpec`. `seeds`: a folder of
-    inputs. `out`: the folder of the campaign, made if it is not there. `seconds`: afl-fuzz ends by itself after so
-    long, 0 is never. `seed`: of its random numbers. `lengths`: the shortest and the longest input in bytes that it
-    makes. `watch`: a target by which new edges are counted at once, else they are known when afl-fuzz says them, after
-    a minute.
+    inputs. `out`: the folder of the campaign, made if it is not there. `seed`: of its random numbers. `watch`: a target
+    by which new edges are counted at once: afl-fuzz says them after a minute. `lengths`: the shortest and the longest
+    input in bytes that it makes.
 
-    Raises BadInput for AFL++ that is missing and a folder without seeds; `start` for a program that cannot be started;
-    all other methods when an afl-fuzz has ended with an error, with its own line.
+    Raises BadInput for AFL++ that is missing and a folder without seeds; `start` for a program that cannot be started.
     """
 
     def __init__(
@@ -123,25 +111,19 @@ class AflRun:
         jobs: int = 1,
         seed: int | None = None,
         *,
-        seconds: int = 0,
+        watch: Target,
         lengths: tuple[int, int] = (1, LONGEST_BYTES),
-        map_bytes: int = MAP_BYTES,
-        watch: Target | None = None,
     ) -> None:
-        if jobs < 1:
-            raise BadInput("--jobs", "", f"{jobs}: there is nothing to do", "give 1 or more")
-        absent = missing()
-        if absent:
-            raise BadInput("AFL++", "", *absent.split("; ", 1))
+        check_jobs(jobs, "AFL++", missing())
+        super().__init__()
         _require_seeds(seeds)
-        self._call = Call(tuple(target_args), seeds, out, dictionary, seconds, seed, lengths)
-        self._environment = environment(os.environ, map_bytes)
+        self._call = Call(tuple(target_args), seeds, out, dictionary, seed, lengths)
+        self._environment = environment(os.environ, MAP_BYTES)
         self._out = out
         self.jobs = [AflJob(out, job_name(job, jobs)) for job in range(jobs)]
-        self._handed_out: dict[str, dict[Path, None]] = {"queue": {}, "crashes": {}}
-        self._union = None if watch is None else EdgeUnion(watch)
+        self._union = EdgeUnion(watch)
         self._counted: dict[Path, None] = {}
-        self._began_s = self._rate_s = 0.0
+        self._rate_s = 0.0
         self._rate_executions = 0
         self._per_s = 0.0
 
@@ -153,64 +135,21 @@ class AflRun:
     def start(self) -> None:
         """Starts all jobs. An afl-fuzz that ends at once is told by the next call of another method."""
         self._out.mkdir(parents=True, exist_ok=True)
-        self._began_s = self._rate_s = time.monotonic()
+        self._rate_s = time.monotonic()
         self._rate_executions = self._executions()
         cores: list[int | None] = [*cores_for(len(self.jobs))] or [None] * len(self.jobs)
         for number, (job, core) in enumerate(zip(self.jobs, cores, strict=True)):
             job.start(self._call.line(number, len(self.jobs)), self._environment, core)
 
     def stop(self) -> None:
-        """Ends all jobs and waits for them. A second call does nothing."""
         for job in self.jobs:
             job.interrupt()
         for job in self.jobs:
             job.wait()
 
-    @property
-    def running(self) -> bool:
-        """Is any job at work?"""
-        self._require_health()
-        return any(job.running for job in self.jobs)
-
     def progress(self) -> EngineProgress:
-        """How far it is."""
         self._require_health()
-        said = [one for one in (job.statistics() for job in self.jobs) if one]
-        stable = [share for share in (job.stability_percent() for job in self.jobs) if share is not None]
-        fed = [job.fed() for job in self.jobs]
-        return EngineProgress(
-            executions=self._executions(),
-            executions_per_s=self._rate(),
-            edges=self._edges([one.edges for one in said]),
-            crashes=len(self._all("crashes")),
-            corpus_count=len(self._all("queue")),
-            stability_percent=min(stable, default=None),
-            run_time_s=time.monotonic() - self._began_s,
-            frames=sum(one.frames for one in fed),
-            characters=sum(one.characters for one in fed),
-        )
-
-    def new_crashes(self) -> list[Path]:
-        """Inputs with a failure that were not given before. Different jobs may find the same."""
-        return self._new("crashes")
-
-    def new_queue(self) -> list[Path]:
-        """Inputs that executed something new and were not given before, the seeds among them."""
-        return self._new("queue")
-
-    def earlier_crashes(self) -> list[Path]:
-        """Inputs with a failure of the times before: a campaign that was killed may not have looked at them."""
-        now = [job.folder / "crashes" for job in self.jobs]
-        return [path for path in sorted(self._out.glob("*/crashes*/id:*")) if path.parent not in now]
-
-    def __enter__(self) -> AflRun:
-        self.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+        return EngineProgress(self._executions(), self._rate(), self._edges())
 
     # ---- what the jobs leave -------------------------------------------------------------------------------
 
@@ -219,19 +158,15 @@ class AflRun:
             _ = job.running
             job.shorten_log()
 
-    def _all(self, kind: str) -> list[Path]:
+    def _inputs(self, kind: str) -> list[Path]:
         names = [job.name for job in self.jobs]
         return [path for job in self.jobs for path in job.inputs(kind, names)]
 
-    def _new(self, kind: str) -> list[Path]:
-        self._require_health()
-        known = self._handed_out[kind]
-        found = [path for path in self._all(kind) if path not in known and _content(path)]
-        known.update(dict.fromkeys(found))
-        return found
+    def _is_whole(self, path: Path) -> bool:
+        return bool(_content(path))
 
     def _executions(self) -> int:
-        return sum(job.fed().executions for job in self.jobs)
+        return sum(job.executions() for job in self.jobs)
 
     def _rate(self) -> float:
         now_s, executions = time.monotonic(), self._executions()
@@ -241,10 +176,8 @@ class AflRun:
             self._rate_s, self._rate_executions = now_s, executions
         return self._per_s
 
-    def _edges(self, said: Sequence[int]) -> int | None:
-        if self._union is None:
-            return max(said, default=None)
-        for path in self._all("queue"):
+    def _edges(self) -> int:
+        for path in self._inputs("queue"):
             if path not in self._counted and (data := _content(path)):
                 self._counted[path] = None
                 self._union.add(data)

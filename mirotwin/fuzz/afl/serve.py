@@ -3,7 +3,7 @@
     python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
 
 SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,
-`BESIDE.counts` the counters that only this process knows (`counts`).
+`BESIDE.counts` how many inputs it has run (`counts`).
 
 AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
 puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too
@@ -17,6 +17,7 @@ cases come through shared memory (a length of 4 bytes, then as many bytes).
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import struct
@@ -34,8 +35,6 @@ from mirotwin.fuzz.spec import spec_of
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
-
-import ctypes
 
 _FAILED = ctypes.c_void_p(-1).value
 
@@ -90,8 +89,6 @@ class Served(Protocol):
 
     map_size: int
     executions: int
-    frames_fed: int
-    characters_fed: int
 
     def use_map(self, edges: memoryview) -> None: ...
     def run(self, data: memoryview) -> int: ...
@@ -100,11 +97,6 @@ class Served(Protocol):
 def wait_status(kind: int) -> int:
     """What AFL++ is told of a run that gave `kind`: 0, or a signal, which is the number in a crash's file name."""
     return min(FIRST_SIGNAL + kind - 1, LAST_SIGNAL) if kind else 0
-
-
-def kind_of_signal(number: int) -> int:
-    """The kind of failure that a signal stands for."""
-    return number - FIRST_SIGNAL + 1
 
 
 def hello(map_size: int) -> bytes:
@@ -141,7 +133,7 @@ def serve(target: Served, counts: Counts, control: int = CONTROL_FD, status: int
         if CASES_VARIABLE not in os.environ:
             raise BadInput("AFL++", "", f"{CASES_VARIABLE} is not set", "install AFL++ 4.00c or newer")
         cases = attach(int(os.environ[CASES_VARIABLE]))
-        answer(target, cases, control, status, lambda: counts.keep(target))
+        answer(target, cases, control, status, lambda: counts.keep(target.executions))
     return True
 
 

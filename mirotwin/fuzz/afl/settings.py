@@ -31,7 +31,6 @@ REASONS = {
     "AFL_NO_UI": "the output goes to a file",
     "AFL_NO_AFFINITY": "the command binds each job to a core itself: see `cores`",
     "AFL_NO_CRASH_README": "folders hold inputs only",
-    "AFL_AUTORESUME": "a folder that is there is a campaign to go on with",
     "AFL_FORKSRV_INIT_TMOUT": "milliseconds in which the target has to be ready",
 }
 """Variable -> why the command sets it. Those that only switch something on are 1. None is here that afl-fuzz 4.04c does
@@ -48,17 +47,14 @@ def environment(inherited: Mapping[str, str], map_size: int) -> dict[str, str]:
 class Call(msgspec.Struct, frozen=True):
     """One call of afl-fuzz, without what differs from job to job.
 
-    `lengths`: the shortest and the longest input in bytes that it makes.
-
-    `seconds`: it ends by itself after so long, 0 is never. `seed`: of its random numbers; afl-fuzz then takes all
-    inputs for equally fast, so that its choices do not depend on time. None takes one from the system.
+    `lengths`: the shortest and the longest input in bytes that it makes. `seed`: of its random numbers; afl-fuzz then
+    takes all inputs for equally fast, so that its choices do not depend on time. None takes one from the system.
     """
 
     target: tuple[str, ...]
     seeds: Path
     out: Path
     dictionary: Path | None = None
-    seconds: int = 0
     seed: int | None = None
     lengths: tuple[int, int] = (1, LONGEST_BYTES)
 
@@ -74,8 +70,6 @@ class Call(msgspec.Struct, frozen=True):
             options += ["-M" if job == 0 else "-S", name]
         if self.dictionary is not None:
             options += ["-x", str(self.dictionary)]
-        if self.seconds:
-            options += ["-V", str(self.seconds)]
         if self.seed is not None:
             options += ["-s", str(self.seed + job)]
         beside = str(self.out / name)

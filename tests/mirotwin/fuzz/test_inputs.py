@@ -9,7 +9,7 @@ from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
 from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of
-from mirotwin.fuzz.seeds import foreign_seeds, seeds, sent, talks
+from mirotwin.fuzz.seeds import seeds, sent, talks
 
 NUMBERS = st.integers(-32767, 32767)
 
@@ -114,8 +114,3 @@ def test_each_built_in_seed_is_read_as_what_it_says(kind, robots, slot):
         assert len(characters) == sum(len(one.data) for one in wire)
         if kind != "frames":
             assert characters == b"".join(one.data for one in wire)
-
-
-@pytest.mark.parametrize("kind", INPUTS)
-def test_seeds_for_a_foreign_target_are_not_empty(kind):
-    assert all(foreign_seeds(kind))

@@ -14,7 +14,7 @@ class Toy:
     map_size = 64
 
     def __init__(self):
-        self.executions = self.frames_fed = self.characters_fed = 0
+        self.executions = 0
         self.failure: TargetFailure | None = None
         self.edges: Any = bytearray(self.map_size)
 
@@ -23,7 +23,6 @@ class Toy:
 
     def run(self, data):
         self.executions += 1
-        self.characters_fed += len(data)
         self.edges[0] = 1
         self.edges[1] = int(data[:1] == b"F")
         self.edges[2] = len(data) & 0xFF

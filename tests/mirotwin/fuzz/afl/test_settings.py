@@ -14,11 +14,11 @@ from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
 from mirotwin.fuzz.spec import TargetSpec, spec_of
-from tests.mirotwin.fuzz.afl.double import spec
+from tests.mirotwin.fuzz.afl.double import Double, spec
 
 
 def test_one_job_is_not_distributed_and_several_are():
-    call = Call(("{}",), Path("seeds"), Path("out"), Path("words"), seconds=60, seed=7)
+    call = Call(("{}",), Path("seeds"), Path("out"), Path("words"), seed=7)
     alone, main, other = call.line(0, 1), call.line(0, 2), call.line(1, 2)
     assert not {"-M", "-S"} & set(alone)
     assert main[main.index("-M") + 1] == "main"
@@ -27,12 +27,11 @@ def test_one_job_is_not_distributed_and_several_are():
     server = [sys.executable, "-P", "-m", "mirotwin.fuzz.afl.serve", "{}"]
     assert alone[alone.index("--") + 1 :] == [*server, "out/default"]
     assert alone[alone.index("-x") + 1] == "words"
-    assert alone[alone.index("-V") + 1] == "60"
 
 
 def test_what_is_not_asked_for_is_not_on_the_command_line():
     line = Call(("{}",), Path("seeds"), Path("out")).line(0, 1)
-    assert not {"-x", "-V", "-s"} & set(line)
+    assert not {"-x", "-s"} & set(line)
 
 
 @given(image=st.text("@/x", max_size=8))
@@ -74,7 +73,7 @@ def test_what_is_missing_says_how_to_get_it():
 def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(BadInput, match=r"^AFL\+\+: afl-fuzz is not on the PATH; install AFL\+\+"):
-        AflRun([spec().text()], tmp_path, tmp_path / "out")
+        AflRun([spec().text()], tmp_path, tmp_path / "out", watch=Double())
 
 
 @pytest.mark.parametrize(
@@ -82,7 +81,7 @@ def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
 )
 def test_a_campaign_of_no_job_is_refused(tmp_path, jobs, said):
     with pytest.raises(BadInput, match=said):
-        AflRun([spec().text()], tmp_path, tmp_path / "out", jobs=jobs)
+        AflRun([spec().text()], tmp_path, tmp_path / "out", jobs=jobs, watch=Double())
 
 
 # ---- cores -------------------------------------------------------------------------------------------------
