@@ -70,5 +70,5 @@ cdef class CpuTap(Watcher):
     cdef int _leave_unseen(self, long long tick) except -1
     cdef int _take_outputs(self, Cpu cpu) except -1
     @cython.locals(tick='long long')
-    cdef int _take_line(self, int place, Line line, long long settled_tick) except -1
+    cdef int _take_line(self, int place, Line line, long long until_tick) except -1
     cdef inline int _see(self, long long tick, int place, int level) except -1

@@ -212,6 +212,7 @@ class CpuTap(Watcher):
         self._take_outputs(cpu)
 
     def ran(self, cpu: Cpu, start: int) -> None:
+        self._take_outputs(cpu)
         self.cycles = cpu.cycles
         self.told()
 
@@ -270,13 +271,14 @@ class CpuTap(Watcher):
             source += 1
 
     def _take_outputs(self, cpu: Cpu) -> None:
-        self._take_line(_TXD, cpu.txd, cpu.txd.settled_tick)
-        self._take_line(_SHIFT, cpu.peripherals.shift.data, cpu.txd.settled_tick)
+        """Those that are known: a line without a listener keeps some thousand edges. The end of a run settles it."""
+        self._take_line(_TXD, cpu.txd, _TICKS * cpu.cycles)
+        self._take_line(_SHIFT, cpu.peripherals.shift.data, _TICKS * cpu.cycles)
 
-    def _take_line(self, place: int, line: Line, settled_tick: int) -> None:
-        """The edges below `settled_tick` that are new."""
+    def _take_line(self, place: int, line: Line, until_tick: int) -> None:
+        """The edges below `until_tick` that are new."""
         tick = line.next_edge(self.line_ticks[place])
-        while tick < settled_tick and tick < _NEVER:
+        while tick < until_tick and tick < _NEVER:
             self._see(tick, place, line.level_at(tick))
             self.line_ticks[place] = tick
             tick = line.next_edge(tick)

@@ -60,11 +60,13 @@ class Inspector:
             return Executor.run(cpu, until_cycle)
         for watcher in self.watchers:
             watcher.starting(cpu)
+        cpu.begin_run()
         while reason == 0 and cpu.cycles < until_cycle:
             if cpu.idle or cpu.powered_down:
                 reason = self._sleep(until_cycle)
             else:
                 reason = self._step()
+        cpu.end_run()
         for watcher in self.watchers:
             watcher.ran(cpu, began)
         return reason
@@ -75,7 +77,7 @@ class Inspector:
         pc = cpu.pc
         start = cpu.cycles
         executed = cpu.instructions
-        reason = Executor.run(cpu, start + 1)
+        reason = Executor.go_on(cpu, start + 1)
         if cpu.instructions != executed:
             for watcher in self.watchers:
                 watcher.executed(cpu, pc, start)
@@ -92,10 +94,8 @@ class Inspector:
         cpu.until = until_cycle
         cpu.stop = 0
         cpu.limit = 0
-        cpu.begin_run()
         while ended == 0 and (cpu.idle or cpu.powered_down):
             ended = cpu.boundary()
-        cpu.end_run()
         woken = cpu.idle == 0 and cpu.powered_down == 0
         end = cpu.cycles - (_CALL_CYCLES if woken else 0)
         if end > start:

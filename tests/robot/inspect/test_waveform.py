@@ -134,6 +134,17 @@ def test_without_a_board_there_are_the_wires_of_the_cpu_alone():
     assert not {wire for wire in vcd.wires if wire.startswith(("left", "right", "d"))}
 
 
+def test_more_edges_than_a_line_keeps_are_all_there():
+    cpu = Cpu(Bus())
+    cpu.load(assemble("loop:\nCPL P3.1\nSJMP loop"))
+    cpu.txd.unread = True
+    out = io.StringIO()
+    waveform = Waveform(out).attach(cpu)
+    cpu.run(15_000)
+    waveform.close()
+    assert len(read(out.getvalue().encode()).wires["txd"]) == 1 + 5_000
+
+
 TWO_PRIORITIES = """
 LJMP main
 ORG 0Bh
