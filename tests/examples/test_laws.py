@@ -1,18 +1,22 @@
-"""Laws in a distribution of their own: installed by pip, driven, saved in mid-run, and what is said of a wrong one."""
+"""Laws in a distribution of their own: installed by pip, driven, saved in mid-run, and what is said of wrong keys."""
 
 import json
 import math
 import os
 import shutil
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from miro_exact import engine as engines
+from miro_host.pilot import Pilot
+from miro_host.posture import Posture
+from miro_host.references.line import StraightLine
+from miro_sim.scenario.file import ScenarioError, parse
 from mirotwin.recording.reader import read
 from tests import children
-from tests.host.distribution import install
 
 pytestmark = pytest.mark.slow
 
@@ -54,19 +58,20 @@ def site(tmp_path_factory):
     return folder / "installed"
 
 
-@pytest.fixture
-def scenario(tmp_path):
-    path = tmp_path / "my.toml"
-    path.write_text(SHORT)
+def short_of(name, folder):
+    """A short scenario with this law."""
+    path = folder / "either.toml"
+    path.write_text(SHORTENED[name])
     return path
 
 
-@pytest.fixture(params=SHORTENED)
-def either(request, tmp_path):
-    """A short scenario with each of the laws, and the law's name in file names."""
-    path = tmp_path / "either.toml"
-    path.write_text(SHORTENED[request.param])
-    return request.param, path
+@pytest.fixture
+def here(site, monkeypatch):
+    """The laws in this process, which forgets them afterwards."""
+    monkeypatch.syspath_prepend(str(site))
+    yield
+    for name in ("samson_law", "pursuit_law"):
+        sys.modules.pop(name, None)
 
 
 def environment(site):
@@ -96,16 +101,9 @@ def mirotwin(site, *arguments):
     )
 
 
-def refusal(done, before=()):
-    """The one line on stderr; `before` says what other lines go before it."""
-    assert done.returncode == 2, done.stderr
-    *lines, line = done.stderr.splitlines()
-    assert lines == list(before)
-    return line
-
-
-def test_saved_in_mid_run_and_loaded_in_another_process_it_goes_on_with_the_same_bits(site, either, tmp_path):
-    name, scenario = either
+@pytest.mark.parametrize("name", SHORTENED)
+def test_saved_in_mid_run_and_loaded_in_another_process_it_goes_on_with_the_same_bits(site, name, tmp_path):
+    scenario = short_of(name, tmp_path)
     saved = tmp_path / "saved"
     whole = python(site, WORLD + FINISH, scenario, saved)
     python(site, WORLD + SAVE, scenario, saved)
@@ -114,9 +112,11 @@ def test_saved_in_mid_run_and_loaded_in_another_process_it_goes_on_with_the_same
         assert python(site, WORLD + LOAD + FORGET + FINISH, scenario, saved) != whole
 
 
-@pytest.mark.parametrize("engine", ["compiled", "python"])
-def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, either, tmp_path, engine):
-    name, scenario = either
+@pytest.mark.parametrize(
+    ("name", "engine"), [("samson", "compiled"), ("samson", "python"), ("pursuit", "compiled")]
+)
+def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, name, tmp_path, engine):
+    scenario = short_of(name, tmp_path)
     if engine == "compiled" and engines.active() != "compiled":
         pytest.skip("no compiled modules here")
     out = tmp_path / "out"
@@ -128,10 +128,11 @@ def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, 
     assert list(last.inner) == INNER[name]
     assert all(abs(value) > 0.0 for value in last.inner.values())
     assert mirotwin(site, "replay", out / "run.mcap", "--quiet").returncode == 0
-    line = refusal(mirotwin("", "replay", out / "run.mcap", "--quiet"))  # where it is not installed
-    place = "run.mcap: scenario.toml: network[0].robot[0].controller.law: '"
-    assert place in line
-    assert "' is not one of the choices" in line
+    gone = mirotwin("", "replay", out / "run.mcap", "--quiet")  # where it is not installed
+    assert gone.returncode == 2
+    (line,) = gone.stderr.splitlines()
+    assert "run.mcap: scenario.toml: network[0].robot[0].controller.law: '" in line
+    assert "' is not one of the choices; use yang_kim" in line
 
 
 @pytest.mark.parametrize("name", SHORTENED)
@@ -141,24 +142,15 @@ def test_it_tracks_its_path(site, tmp_path, name):
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["tracking"]["rms_position_cm"] < 2.5
 
 
-DRIVEN = """
-from miro_host.pilot import Pilot
-from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
-from pursuit_law import Parameters
-
-pilot = Pilot(StraightLine(), Parameters(lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3).law())
-for x_m, y_m, theta_rad in ((0.5, -0.1, 0.0), (1.1, 0.0, 0.0), (0.65, 0.0, 0.0)):
-    command = pilot.update(Posture(x_m, y_m, theta_rad), 3.0)
-    print(command.v_m_s, command.w_rad_s)
-"""
-
-
-def test_pure_pursuit_drives_on_the_arc_to_the_goal_and_turns_round_for_one_behind(site):
+def test_pure_pursuit_drives_on_the_arc_to_the_goal_and_turns_round_for_one_behind(here):
     """At 3 s the reference is at 0.55 m and will be at 0.65 m after the 0.5 s of the look-ahead."""
-    aside, behind, there = (
-        [float(number) for number in line.split()] for line in python(site, DRIVEN).splitlines()
+    parameters = import_module("pursuit_law").Parameters(
+        lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3
     )
+    pilot = Pilot(StraightLine(), parameters.law())
+    places = ((0.5, -0.1, 0.0), (1.1, 0.0, 0.0), (0.65, 0.0, 0.0))
+    commands = [pilot.update(Posture(*place), 3.0) for place in places]
+    aside, behind, there = ([command.v_m_s, command.w_rad_s] for command in commands)
     far_m = math.hypot(0.15, 0.1)
     assert aside == pytest.approx([far_m / 0.5, far_m / 0.5 * 2 * 0.1 / far_m**2])
     assert behind == pytest.approx([0.9, 3.7])  # 2 / l of curvature, v / l = 2/s, cut to the limit of w
@@ -181,92 +173,8 @@ def test_pure_pursuit_drives_on_the_arc_to_the_goal_and_turns_round_for_one_behi
         ),
     ],
 )
-def test_a_bad_key_of_its_table_is_refused_like_one_of_our_own(site, scenario, old, new, expected):
-    scenario.write_text(SHORT.replace(old, new))
-    line = refusal(mirotwin(site, "run", scenario, "--out", scenario.parent / "out"))
-    assert line.startswith(f"mirotwin: error: {scenario}: network[0].robot[0].controller")
-    assert expected in line
-    assert not (scenario.parent / "out").exists()
-
-
-def test_without_the_distribution_the_law_is_unknown(scenario):
-    line = refusal(mirotwin("", "run", scenario))
-    assert "controller.law: 'samson' is not one of the choices; use yang_kim" in line
-
-
-BROKEN = """
-from miro_host.laws.interface import Law, LawParameters, Velocities
-
-class Parameters(LawParameters, frozen=True, tag="broken"):
-    how: str = "nan"
-
-    def __post_init__(self):
-        super().__post_init__()
-        if self.how == "check":
-            raise KeyError("how")
-        if self.how == "refuse":
-            raise ValueError("how: refuse is refused")
-
-    def law(self):
-        return Broken(self)
-
-class Broken(Law[Parameters]):
-    def __init__(self, parameters):
-        super().__init__(parameters)
-        if parameters.how == "construct":
-            raise RuntimeError("no model file")
-
-    def step(self, given):
-        return Velocities(float("nan") if given.t_s > 0.1 else 0.1, 0.0)
-"""
-
-
-@pytest.mark.parametrize(
-    ("how", "expected"),
-    [
-        ("check", "controller: law 'broken' cannot check its parameters: KeyError: 'how'"),
-        ("refuse", "controller.how: refuse is refused"),
-        (
-            "construct",
-            "net0/robot0: tick 0 (0.000000 s): law 'broken' cannot be made: RuntimeError: no model file (",
-        ),
-        (
-            "nan",
-            "net0/robot0: tick 2402400 (0.100100 s): law 'broken' failed: `step` returned v_m_s = nan, which is",
-        ),
-    ],
-)
-def test_a_law_that_fails_ends_the_run_with_one_line(tmp_path, how, expected):
-    install(tmp_path, "broken-law", "1", {"broken": "plug_broken:Parameters"}, plug_broken=BROKEN)
-    scenario = tmp_path / "my.toml"
-    scenario.write_text(SHORT[: SHORT.index("law =")] + f'law = "broken"\nhow = "{how}"\n')
-    out = tmp_path / "out"
-    kept = f"the run broke off after 3 control periods; they are in {out / 'run.part.mcap'}"
-    done = mirotwin(tmp_path, "run", scenario, "--out", out, "--quiet")
-    line = refusal(done, [f"mirotwin: {kept}"] if how == "nan" else [])
-    assert expected in line
-    assert line.startswith(f"mirotwin: error: {scenario}: ")
-    if how == "nan":
-        recording = read(out / "run.part.mcap")
-        assert len(recording.periods) == 3
-        assert expected in recording.broken_off
-        assert expected in json.loads((out / "summary.part.json").read_text())["reason"]
-    message = python(
-        tmp_path,
-        f"try:\n{WORLD.replace(chr(10), chr(10) + '    ')}\n    world.run_to(24_000_000)\n"
-        "except ValueError as error:\n    print(error)",
-        scenario,
-        "",
-    )
-    assert expected in message
-
-
-def test_a_law_that_cannot_be_imported_names_its_distribution_and_the_reason(tmp_path):
-    install(
-        tmp_path, "broken-law", "1", {"broken": "plug_broken:Parameters"}, plug_broken="import no_such_module"
-    )
-    scenario = tmp_path / "my.toml"
-    scenario.write_text(SHORT[: SHORT.index("law =")] + 'law = "broken"\n')
-    line = refusal(mirotwin(tmp_path, "run", scenario, "--out", tmp_path / "out"))
-    assert "law 'broken' (plug_broken:Parameters, from broken-law 1) cannot be imported" in line
-    assert "ModuleNotFoundError: No module named 'no_such_module'" in line
+def test_a_bad_key_of_its_table_is_refused_like_one_of_our_own(here, old, new, expected):
+    with pytest.raises(ScenarioError) as caught:
+        parse(SHORT.replace(old, new), "my.toml")
+    assert f"{caught.value}".startswith("my.toml: network[0].robot[0].controller")
+    assert expected in f"{caught.value}"

@@ -144,6 +144,16 @@ class NoNumberLaw(Law):
         return Velocities(float("nan"), 0.0)
 
 
+class Breaks(LawParameters, frozen=True, tag="law_breaks"):
+    def law(self):
+        raise RuntimeError("no model file")
+
+
+class Says(LawParameters, frozen=True, tag="law_says"):
+    def __post_init__(self):
+        raise ValueError("how: is refused")
+
+
 class Refuses(LawParameters, frozen=True, tag="law_refuses"):
     def __post_init__(self):
         raise KeyError("x")
@@ -185,7 +195,10 @@ _CHECKS = {
     "no_super": "NoSuper", "no_kind": "NoKind", "objects": "Objects", "leaves": "Leaves",
     "float_tick": "FloatTick", "stands_still": "Still", "absent": "Absent",
 }  # fmt: skip
-_LAWS = {"law_raises": "Raises", "law_none": "Nothing", "law_nan": "NoNumber", "law_refuses": "Refuses"}
+_LAWS = {
+    "law_raises": "Raises", "law_none": "Nothing", "law_nan": "NoNumber", "law_refuses": "Refuses",
+    "law_breaks": "Breaks", "law_says": "Says",
+}  # fmt: skip
 _REFERENCES = {"reference_raises": "Raises", "reference_none": "Nothing"}
 
 

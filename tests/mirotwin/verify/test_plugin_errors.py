@@ -37,7 +37,11 @@ PLUGINS_TOLD = {
         f"`law` returned None (site/plugged_laws.py:{line_of(LAWS, 'law_none') + 1} in Nothing.law); return an object"
     ),
     "controller={law='law_nan'}": "= nan, which is not a finite float (site/plugged_laws.py:",
-    "controller={law='law_refuses'}": f"KeyError: 'x' (site/plugged_laws.py:{line_of(LAWS, 'KeyError')} in ",
+    "controller={law='law_refuses'}": (
+        f"cannot check its parameters: KeyError: 'x' (site/plugged_laws.py:{line_of(LAWS, 'KeyError')} in "
+    ),
+    "controller={law='law_breaks'}": "law 'law_breaks' cannot be made: RuntimeError: no model file (site/",
+    "controller={law='law_says'}": "controller.how: is refused",
     "reference={kind='reference_raises'}": (
         f"division by zero (site/plugged_references.py:{line_of(REFERENCES, '1 / 0')} in RaisesPath.at)"
     ),
