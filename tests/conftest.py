@@ -1,7 +1,7 @@
 """What all tests share: property tests without a time limit, and a garbage collector that passes over what stays.
 
 On a busy machine any example may be slow. Each process holds some 800,000 objects once it has collected the tests, all
-of which stay until its end. Each full collection would walk through them; a session of pytest in this process makes ten.
+of which stay until its end. Each full collection would walk through them; a pytest session in this process makes ten.
 """
 
 import gc

@@ -131,9 +131,7 @@ def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, ch
     assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
 
 
-def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
-    monkeypatch,
-):
+def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4e9)
     monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
     assert recorded() == RECORDED

@@ -32,9 +32,7 @@ def test_the_oracle_fails_the_sessions_that_the_checks_fail(name):
 
 
 @needs_sdcc
-def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(
-    monkeypatch,
-):
+def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(monkeypatch):
     class Blind:
         """A target whose oracle finds nothing."""
 

@@ -182,11 +182,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
     ],
 )
 def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
-    mirotwin,
-    tmp_path,
-    monkeypatch,
-    options,
-    expected,
+    mirotwin, tmp_path, monkeypatch, options, expected
 ):
     monkeypatch.chdir(tmp_path)
     Path("p.csv").write_text(csv(GRID))

@@ -104,12 +104,7 @@ def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short):
     ],
 )
 def test_what_cannot_be_looked_at_is_refused_with_the_remedy(
-    mirotwin,
-    short,
-    tmp_path,
-    monkeypatch,
-    options,
-    expected,
+    mirotwin, short, tmp_path, monkeypatch, options, expected
 ):
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin("camera", "look", short, *options)

@@ -210,13 +210,7 @@ def same_colour(text):
         (lambda text: text.replace("spread", "sprawl", 1), ": colours[...].sprawl: unknown key"),
     ],
 )
-def test_colours_that_cannot_be_used_are_named_with_file_and_key(
-    mirotwin,
-    seen,
-    tmp_path,
-    change,
-    expected,
-):
+def test_colours_that_cannot_be_used_are_named_with_file_and_key(mirotwin, seen, tmp_path, change, expected):
     colours = tmp_path / "colours.toml"
     colours.write_text(change((seen / "colours.toml").read_text()))
     given = ("--calibration", seen / "camera.toml", "--colours", colours)

@@ -49,11 +49,7 @@ def with_a_map_of_the_robot(tmp_path, suffix=".map", code=LOOP):
     ],
 )
 def test_a_command_that_needs_symbols_refuses_those_of_another_image(
-    mirotwin,
-    tmp_path,
-    suffix,
-    command,
-    monkeypatch,
+    mirotwin, tmp_path, suffix, command, monkeypatch
 ):
     image, beside = with_a_map_of_the_robot(tmp_path, suffix)
     monkeypatch.chdir(tmp_path)

@@ -60,9 +60,7 @@ def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to():
 
 
 @pytest.mark.slow
-def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(
-    monkeypatch,
-):
+def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(monkeypatch):
     monkeypatch.setattr(hypothesis_search, "ROUND_EXAMPLES", 60)
     one, two, other = (kept_after(200, seed)[0] for seed in (1, 1, 2))
     assert one == two

@@ -117,9 +117,7 @@ def test_a_port_that_is_taken_is_bad_input(rig):
         Rfc2217Endpoint(rig.context, "203.0.113.9", 0)
 
 
-def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_their_way_or_not(
-    rig,
-):
+def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_their_way_or_not(rig):
     port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     with connected(port):
         assert port._socket is not None

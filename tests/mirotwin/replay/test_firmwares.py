@@ -37,9 +37,7 @@ def images(tmp_path_factory):
 
 
 @needs_sdcc
-def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(
-    images,
-):
+def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(images):
     image, folder = images["late"]
     found = apart(image, folder)
     assert found.changed is not None
@@ -57,9 +55,7 @@ def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(
 
 
 @needs_sdcc
-def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
-    images,
-):
+def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(images):
     image, folder = images["late"]
     found = apart(image, folder).effect
     assert found is not None
@@ -73,9 +69,7 @@ def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
 
 
 @needs_sdcc
-def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
-    images,
-):
+def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(images):
     image, folder = images["late and moved"]
     assert not same_layout(own_image(), image)
     first = differences(periods(world()), periods(world(image)), CompareRule(kind="commands"))[0]
@@ -94,9 +88,7 @@ def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
 
 
 @needs_sdcc
-def test_builds_that_differ_in_speed_alone_send_the_same_commands(
-    images,
-):
+def test_builds_that_differ_in_speed_alone_send_the_same_commands(images):
     image, _ = images["slower"]
     assert not same_layout(own_image(), image)
     recorded, replayed = periods(world()), periods(world(image))
@@ -179,9 +171,7 @@ def test_where_the_last_variable_ends_is_not_guessed():
 
 
 @needs_sdcc
-def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instruction_is_named(
-    images,
-):
+def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instruction_is_named(images):
     image, folder = images["late and moved"]
     found = apart(image, folder)
     assert found.mapped is not None

@@ -205,11 +205,7 @@ def test_firmware_without_symbols_says_what_is_missing(mirotwin, finished, tmp_p
 
 @pytest.mark.parametrize("format", ["2", "5", "next"])
 def test_a_recording_of_another_format_is_refused_with_the_reason(
-    mirotwin,
-    finished,
-    tmp_path,
-    monkeypatch,
-    format,
+    mirotwin, finished, tmp_path, monkeypatch, format
 ):
     with monkeypatch.context() as patched:
         patched.setattr(recording_recorder, "FORMAT", format)

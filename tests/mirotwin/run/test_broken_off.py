@@ -82,14 +82,7 @@ CASES = [
     ("act", "code", "said"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
 )
 def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
-    mirotwin,
-    finished,
-    short,
-    tmp_path,
-    monkeypatch,
-    act,
-    code,
-    said,
+    mirotwin, finished, short, tmp_path, monkeypatch, act, code, said
 ):
     before = {path.name: path.read_bytes() for path in finished.iterdir()}
     for name, data in before.items():

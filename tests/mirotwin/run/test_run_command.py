@@ -158,14 +158,7 @@ def test_an_interrupted_run_leaves_nothing_behind(mirotwin, short, tmp_path, mon
 
 
 @pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
-def test_a_terminated_run_leaves_nothing_behind(
-    mirotwin,
-    short,
-    tmp_path,
-    monkeypatch,
-    number,
-    expected,
-):
+def test_a_terminated_run_leaves_nothing_behind(mirotwin, short, tmp_path, monkeypatch, number, expected):
     monkeypatch.setattr(runner, "run", lambda *arguments: signal.raise_signal(number))
     before = signal.signal(number, signal.SIG_DFL)  # a run leaves a signal alone that it finds ignored
     try:

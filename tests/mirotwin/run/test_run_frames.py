@@ -81,12 +81,7 @@ def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(mirotwi
     ],
 )
 def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
-    mirotwin,
-    short,
-    tmp_path,
-    monkeypatch,
-    options,
-    expected,
+    mirotwin, short, tmp_path, monkeypatch, options, expected
 ):
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin("run", short, *(option.format(short=short) for option in options))
@@ -96,13 +91,7 @@ def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
 
 
 @pytest.mark.parametrize("raised", [KeyboardInterrupt(), OSError(28, "No space left on device")])
-def test_a_run_that_breaks_off_leaves_whole_frames_only(
-    mirotwin,
-    short,
-    tmp_path,
-    monkeypatch,
-    raised,
-):
+def test_a_run_that_breaks_off_leaves_whole_frames_only(mirotwin, short, tmp_path, monkeypatch, raised):
     write = Path.write_bytes
 
     def breaking(path, data):

@@ -99,13 +99,7 @@ def test_the_commands_that_look_into_a_run_take_settings(mirotwin, short, run):
         (["scenarios", "show", "fig6", "--set", "title=a\nb\x1b[2J", "--set", "x=1"], "--set x=1: unknown key"),
     ],
 )  # fmt: skip
-def test_a_setting_that_cannot_be_is_one_line_and_exit_code_2(
-    mirotwin,
-    tmp_path,
-    monkeypatch,
-    command,
-    said,
-):
+def test_a_setting_that_cannot_be_is_one_line_and_exit_code_2(mirotwin, tmp_path, monkeypatch, command, said):
     image = hex_file(tmp_path / "a.ihx", b"\x80\xfe")
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin(*(image if word == "IMAGE" else word for word in command))

@@ -139,16 +139,7 @@ WIDE = st.integers(-(2**30), 2**30 - 1)
     forward=st.integers(0, 1),
     samples=st.integers(1, 60),
 )
-def test_any_state_steps_like_the_slow_twin(
-    a,
-    limit,
-    target,
-    position,
-    velocity,
-    activity,
-    forward,
-    samples,
-):
+def test_any_state_steps_like_the_slow_twin(a, limit, target, position, velocity, activity, forward, samples):
     ours = generator(a, limit, target, velocity_mode=int(activity == "velocity"), forward=forward)
     ours.position, ours.velocity = position, velocity
     if activity == "stop":

@@ -294,13 +294,7 @@ def test_the_command_writes_the_file_and_replaces_one_only_when_told(mirotwin, r
         (b"", ("--network", "0"), "--network does not go with --as foxglove, which writes all networks."),
     ],
 )
-def test_what_is_no_recording_is_refused_in_one_line(
-    mirotwin,
-    tmp_path,
-    content,
-    options,
-    expected,
-):
+def test_what_is_no_recording_is_refused_in_one_line(mirotwin, tmp_path, content, options, expected):
     given, out = tmp_path / "given", tmp_path / "fox.mcap"
     given.write_bytes(content.replace(b"AA 55", b"\xff\xfe"))
     code, said, err = mirotwin("export", given, "--out", out, *options)

@@ -51,9 +51,7 @@ def test_rules_that_may_be_a_cause_say_what_firmware_does_that_breaks_them():
     assert {rule.id for rule in RULES if rule.broken} == causes
 
 
-def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(
-    monkeypatch,
-):
+def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(monkeypatch):
     tried = []
     whole = run.try_rule
 
@@ -193,9 +191,7 @@ def test_a_timeline_of_a_rule_that_is_not_there_is_refused(mirotwin):
 
 @needs_sdcc
 @pytest.mark.parametrize("instead", ["", "    halt_both(TRJ_MOTOR_OFF);\n"])
-def test_wheels_that_are_never_told_to_turn_break_the_rule_without_a_guess_at_the_reason(
-    instead,
-):
+def test_wheels_that_are_never_told_to_turn_break_the_rule_without_a_guess_at_the_reason(instead):
     image = built("motion.c", "    start_both();\n    state = STATE_DRIVING;\n", instead)
     (outcome,) = try_all([find("P28")], image)
     assert outcome.verdict == "failed"

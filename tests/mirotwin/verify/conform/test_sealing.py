@@ -36,9 +36,7 @@ def test_a_sealing_opens_what_it_sealed(data):
 
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
-def test_no_two_mistakes_make_the_same_frame_and_only_the_right_layout_byte_makes_the_right_one(
-    form,
-):
+def test_no_two_mistakes_make_the_same_frame_and_only_the_right_layout_byte_makes_the_right_one(form):
     body = bytes(range(1, form.body_size + 1))
     made = {what: sealing.seal(form, body) for what, sealing in MISTAKES.items()}
     assert len(set(made.values())) == len(made)
