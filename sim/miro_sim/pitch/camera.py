@@ -10,10 +10,9 @@ the floor; in a robot's axes that is a straight line from `top` on by `fall`:
 Of several sides the highest is seen; where robots stand in
 each other, the first one is. All in um and integers. `fall` is taken at the middle of the pixel.
 
-A pixel whose samples are sure to see one paint is not sampled: if its middle sees that paint, and would still do so if
-all edges were nearer by what a pixel is wide along the robot's axes (`spread_um`). So any pixel gives the same bits in
-any window. One test does for all instants of the exposure if its edges are nearer by as much more as the robot moves
-between them (`margin_um`).
+The samples of a pixel lie around its middle, no further from it than `spread_um` along the robot's axes. So where that
+is far enough from all edges, no sample is looked at; and any pixel gives the same bits in any window. Where it is so by
+more than a robot moves while the shutter is open (`drift_um`), one look does for all instants.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
 from miro_sim.pitch.paints import NUMBERS
 from miro_sim.pitch.picture_settings import PictureSettings
-from miro_sim.pitch.rays import Rays, between, rays_of
+from miro_sim.pitch.rays import Rays, rays_of
 from miro_sim.pitch.scene import Scene, scene_of
 from miro_sim.pitch.sensor import Sensor
 
@@ -36,12 +35,11 @@ _SETS = 6  # at most: two fields of three instants
 _HALF_UM = 37_500
 _TOP_UM = 75_000
 _CORNER_UM = 53_034  # from the middle of a robot's top to its corner, rounded up
-_NEAR_UM = (
-    75_000  # no place within the square of a robot, widened by the largest margin, is further along an axis
-)
-_MOST_MARGIN_UM = 12_500
+_ROUNDED_UM = 8  # what rounding adds
+_TOP, _TEAM, _IDENTITY, _RAYS = 0, 1, 2, 3
 _OUT = -1
-_UNSURE = -2
+_UNSURE = -1
+_FAR_UM = 1 << 29
 _MIXED = 255
 _WIDTH = 320
 _HEIGHT = 240
@@ -57,21 +55,11 @@ class Camera:
 
     NOT_STATE = (
         *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
-        *("field_sets", "side", "black", "team_u", "team_v", "identity_u", "identity_v", "patch_um"),
-        *(
-            "robots",
-            "team_paint",
-            "identity_paint",
-            "x",
-            "y",
-            "cos",
-            "sin",
-            "spread_um",
-            "near",
-            "near_count",
-        ),
-        *("moving", "code", "seen", "height_um", "least_x", "most_x", "least_y", "most_y", "margin_um"),
-        *("still", "count", "corner_u", "corner_v", "top_x", "top_y", "cornered", "fall_u", "fall_v", "seer"),
+        *("field_sets", "side", "black", "robots", "team_paint", "identity_paint", "x", "y", "cos", "sin"),
+        *("spread_um", "drift_um", "near", "near_count", "span_first", "span_end", "seers", "seer_count"),
+        *("first", "samples", "cornered", "top_x", "top_y", "low_u", "high_u", "low_v", "high_v"),
+        *("more_um", "middle_u", "middle_v", "fall_u", "fall_v", "sure", "sampled", "u", "v"),
+        *("seen", "height_um"),
     )
 
     def __init__(
@@ -89,9 +77,11 @@ class Camera:
         self.sets = settings.sub_exposures * settings.fields
         self.side = NUMBERS["side"]
         self.black = NUMBERS["top"]
-        self.team_u, self.team_v = (1000 * part for part in pattern.team_mm)
-        self.identity_u, self.identity_v = (1000 * part for part in pattern.identity_mm)
-        self.patch_um = 500 * PATCH_MM
+        boxes = [(0, 0, _HALF_UM), *((1000 * u, 1000 * v, 500 * PATCH_MM) for u, v in pattern)]
+        self.low_u = [u - half_um for u, _, half_um in boxes] + [0]
+        self.high_u = [u + half_um for u, _, half_um in boxes] + [0]
+        self.low_v = [v - half_um for _, v, half_um in boxes] + [0]
+        self.high_v = [v + half_um for _, v, half_um in boxes] + [0]
         self.robots = 0
         self.team_paint = [0] * 10
         self.identity_paint = [0] * 10
@@ -100,27 +90,29 @@ class Camera:
         self.cos = [0] * 60
         self.sin = [0] * 60
         self.spread_um = [0] * 60
+        self.drift_um = [0] * 10
         self.near = [0] * 10
         self.near_count = 0
-        self.code = [0] * 60
-        self.least_x = [0] * 10
-        self.most_x = [0] * 10
-        self.least_y = [0] * 10
-        self.most_y = [0] * 10
-        self.margin_um = [0] * 10
-        self.still = [0] * 10
-        self.moving = False
-        self.seen = [0] * 16
-        self.height_um = [0] * 16
-        self.corner_u = [0] * 40
-        self.corner_v = [0] * 40
+        self.span_first = [0] * 10
+        self.span_end = [0] * 10
+        self.seers = [0] * 10
+        self.seer_count = 0
+        self.first = 0
+        self.samples = 16
+        self.cornered = -1
         self.top_x = [0] * 4
         self.top_y = [0] * 4
-        self.cornered = -1
-        self.fall_u = [0] * 10
-        self.fall_v = [0] * 10
-        self.seer = [0] * 10
-        self.count = 0
+        self.more_um = 0
+        self.middle_u = 0
+        self.middle_v = 0
+        self.fall_u = 0
+        self.fall_v = 0
+        self.sure = True
+        self.sampled = False
+        self.u = [0] * 16
+        self.v = [0] * 16
+        self.seen = [0] * 16
+        self.height_um = [0] * 16
 
     def __repr__(self) -> str:
         return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
@@ -177,25 +169,15 @@ class Camera:
         self.robots = body + 1
 
     def _bound(self, body: int) -> None:
-        """Between which places a pixel's middle may see a robot at any instant, and what margin does for all of them.
-
-        A place within the square lies elsewhere in it at another instant, but by no more than the robot's way, plus
-        its turn times the distance from the middle, plus 4 um for what is rounded. No margin (0) if that is too much.
-        """
+        """How far, at most, a place of the robot is at any instant from where it is at the middle one."""
         first = body * _SETS
         middle = first + self.sets // 2
-        drift = way_x = way_y = 0
+        drift = 0
         for place in range(first, first + self.sets):
-            x, y = abs(self.x[place] - self.x[middle]), abs(self.y[place] - self.y[middle])
+            way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
             turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
-            drift = max(drift, x + y + (_NEAR_UM * turn >> 15))
-            way_x, way_y = max(way_x, x), max(way_y, y)
-        far = _CORNER_UM + self.rays.spread_um
-        self.least_x[body], self.most_x[body] = self.x[middle] - way_x - far, self.x[middle] + way_x + far
-        self.least_y[body], self.most_y[body] = self.y[middle] - way_y - far, self.y[middle] + way_y + far
-        margin = self.spread_um[middle] + drift + 4
-        self.margin_um[body] = margin if margin <= _MOST_MARGIN_UM else 0
-        self.still[body] = drift == 0
+            drift = max(drift, way + (_CORNER_UM * turn >> 15))
+        self.drift_um[body] = drift + _ROUNDED_UM if drift else 0
 
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
@@ -226,142 +208,224 @@ class Camera:
         pixel = (top + height // 2) * _WIDTH + left + width // 2
         reach = (width // 2 + height // 2 + 3) * 2 * self.rays.spread_um + self.rays.longest_fall_um
         self.near_count = 0
-        self.moving = False
-        x = self.rays.middle_x[pixel]
-        y = self.rays.middle_y[pixel]
         for body in range(self.robots):
-            if self.least_x[body] - reach <= x <= self.most_x[body] + reach:
-                if self.least_y[body] - reach <= y <= self.most_y[body] + reach:
-                    self.near[self.near_count] = body
-                    self.near_count += 1
-                    self.moving = self.moving or not self.still[body]
+            if self._beyond(body, pixel) <= reach:
+                self.near[self.near_count] = body
+                self.near_count += 1
 
-    def _draw_robots(self, row: int, first: int, end: int) -> None:
-        """Those pixels of a line in which a robot is seen."""
-        middle_x, middle_y = self.rays.middle_x, self.rays.middle_y
-        fall_x, fall_y = self.rays.fall_x, self.rays.fall_y
-        for column in range(first, end):
-            pixel = row * _WIDTH + column
-            x, y = middle_x[pixel], middle_y[pixel]
-            end_x, end_y = x + fall_x[pixel], y + fall_y[pixel]
-            for index in range(self.near_count):
-                if self._passes(self.near[index], x, y, end_x, end_y):
-                    total = self._total(pixel, x, y, end_x, end_y)
-                    if total >= 0:
-                        self.sensor.put(column, total, self.scene.light(pixel))
-                    break
-
-    def _total(self, pixel: int, x: int, y: int, end_x: int, end_y: int) -> int:
-        """The paints of all samples of a pixel, added; -1 if none is a robot's."""
-        seen = False
-        for index in range(self.near_count):
-            body = self.near[index]
-            common = _OUT
-            if self._passes(body, x, y, end_x, end_y):
-                margin = self.margin_um[body]
-                common = self._code(body, self.sets // 2, pixel, margin) if margin else _UNSURE
-            for at in range(self.sets):
-                code = common
-                if common == _UNSURE and not self.still[body]:
-                    code = self._code(body, at, pixel, self.spread_um[body * _SETS + at])
-                self.code[index * _SETS + at] = code
-                if code != _OUT:
-                    seen = True
-        if not seen:
-            return -1
-        total = part = 0
-        for at in range(self.sets):
-            if self.moving or at % self.field_sets == 0:
-                part = self._instant(pixel, at)
-            total += part
-        return total
-
-    def _instant(self, pixel: int, at: int) -> int:
-        """The samples of one instant: all 16, or the 8 of its field."""
-        samples = 16 if self.sets == self.field_sets else 8
-        paint = _OUT
-        for index in range(self.near_count):
-            code = self.code[index * _SETS + at]
-            if code >= 0 and code != self.side and paint == _OUT:  # a top: nothing hides it
-                return self.scene.packed[code] * samples
-            if code != _OUT:
-                paint = code if paint == _OUT else _UNSURE
-        if paint >= 0 and not self.scene.shows_ball(pixel):
-            return self.scene.packed[paint] * samples
-        if paint == _OUT and samples == 16:
-            return self.scene.total[pixel]
-        return self._samples(pixel, at)
-
-    def _passes(self, body: int, x: int, y: int, end_x: int, end_y: int) -> bool:
-        """Whether lines from (x, y) to the end may meet a robot at any instant, looked at along each axis alone."""
-        least, most = self.least_x[body], self.most_x[body]
-        if (x < least and end_x < least) or (x > most and end_x > most):
-            return False
-        least, most = self.least_y[body], self.most_y[body]
-        return not ((y < least and end_y < least) or (y > most and end_y > most))
-
-    def _code(self, body: int, at: int, pixel: int, spread: int) -> int:
-        """The one paint of a robot seen from a pixel's middle and `spread` around it, or _OUT, or _UNSURE."""
-        place = body * _SETS + at
+    def _beyond(self, body: int, pixel: int) -> int:
+        """How far the ray of a pixel's middle stays beside a robot, at least; below 0 where its samples may meet it."""
+        place = body * _SETS + self.sets // 2
+        cosine, sine = self.cos[place], self.sin[place]
         x = self.rays.middle_x[pixel] - self.x[place]
         y = self.rays.middle_y[pixel] - self.y[place]
-        u = (x * self.cos[place] + y * self.sin[place]) >> 15
-        v = (y * self.cos[place] - x * self.sin[place]) >> 15
-        away = max(abs(u), abs(v))
-        if away <= _HALF_UM - spread:
-            return self._sure_top(body, u, v, spread)
+        u = (x * cosine + y * sine) >> 15
+        v = (y * cosine - x * sine) >> 15
         x = self.rays.fall_x[pixel]
         y = self.rays.fall_y[pixel]
-        fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
-        fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
-        if not _enters(u, v, fall_u, fall_v, _HALF_UM + spread):
-            return _OUT
-        if away > _HALF_UM + spread and _enters(u, v, fall_u, fall_v, _HALF_UM - spread):
-            return self.side
-        return _UNSURE
+        end_u = u + ((x * cosine + y * sine) >> 15)
+        end_v = v + ((y * cosine - x * sine) >> 15)
+        aside = max(min(u, end_u), -max(u, end_u), min(v, end_v), -max(v, end_v))
+        return aside - _HALF_UM - self.drift_um[body] - self.rays.spread_um - _ROUNDED_UM
 
-    def _sure_top(self, body: int, u: int, v: int, spread: int) -> int:
-        """The one paint around a place on the top, or _UNSURE."""
-        away = max(abs(u - self.team_u), abs(v - self.team_v)) - self.patch_um
-        if away <= 0 - spread:
-            return self.team_paint[body]
-        other = max(abs(u - self.identity_u), abs(v - self.identity_v)) - self.patch_um
-        if other <= 0 - spread:
-            return self.identity_paint[body]
-        return self.black if away > spread and other > spread else _UNSURE
+    def _find_span(self, index: int, row: int, first: int, end: int) -> None:
+        """Between which columns of a line a robot may be seen: where it is far, as many pixels are left out."""
+        step = 2 * self.rays.spread_um + _ROUNDED_UM
+        body = self.near[index]
+        while first < end:
+            beyond = self._beyond(body, row * _WIDTH + first)
+            if beyond <= 0:
+                break
+            first += 1 + (beyond - 1) // step
+        while first < end:
+            beyond = self._beyond(body, row * _WIDTH + end - 1)
+            if beyond <= 0:
+                break
+            end -= 1 + (beyond - 1) // step
+        self.span_first[index], self.span_end[index] = first, end
 
-    def _top(self, body: int, u: int, v: int) -> int:
-        """The paint of a place on the top."""
-        if max(abs(u - self.team_u), abs(v - self.team_v)) <= self.patch_um:
-            return self.team_paint[body]
-        if max(abs(u - self.identity_u), abs(v - self.identity_v)) <= self.patch_um:
-            return self.identity_paint[body]
-        return self.black
+    def _draw_robots(self, row: int, first: int, end: int) -> None:
+        """Those pixels of a line in which a robot may be seen."""
+        left, right = end, first
+        for index in range(self.near_count):
+            self._find_span(index, row, first, end)
+            if self.span_first[index] < self.span_end[index]:
+                left = min(left, self.span_first[index])
+                right = max(right, self.span_end[index])
+        for column in range(left, right):
+            passing = 0
+            last = 0
+            for index in range(self.near_count):
+                if self.span_first[index] <= column < self.span_end[index]:
+                    passing += 1
+                    last = self.near[index]
+            if passing:
+                pixel = row * _WIDTH + column
+                total = self._steady(last, pixel) if passing == 1 else _UNSURE
+                if total == _UNSURE:
+                    total = 0
+                    for at in range(self.sets):
+                        total += self._instant(pixel, column, at)
+                self.sensor.put(column, total, self.scene.light(pixel))
 
-    def _samples(self, pixel: int, at: int) -> int:
-        """The samples of a pixel at one instant, one by one."""
-        first, end = 0, 16
+    def _steady(self, body: int, pixel: int) -> int:
+        """The paints of all samples of a pixel, added, if they are the same at all instants of the exposure."""
+        self.first, self.samples = 0, 16
+        self.more_um = self.drift_um[body]
+        total = self._alone(body * _SETS + self.sets // 2, pixel)
+        return total * self.field_sets if total != _UNSURE else _UNSURE
+
+    def _instant(self, pixel: int, column: int, at: int) -> int:
+        """The samples of one instant: all 16, or the 8 of its field."""
         if self.sets != self.field_sets:
-            first = 8 * (at // self.field_sets)
-            end = first + 8
+            self.first, self.samples = 8 * (at // self.field_sets), 8
+        self.more_um = 0
+        self.seer_count = 0
+        for index in range(self.near_count):
+            if self.span_first[index] <= column < self.span_end[index]:
+                self.seers[self.seer_count] = self.near[index] * _SETS + at
+                self.seer_count += 1
+        total = self._alone(self.seers[0], pixel) if self.seer_count == 1 else _UNSURE
+        return total if total != _UNSURE else self._samples(pixel)
+
+    def _turn(self, place: int, pixel: int) -> None:
+        """Where the pixel's middle is in the axes of a robot at an instant, and how far from it its samples are."""
+        self.sampled = False
+        x = self.rays.middle_x[pixel] - self.x[place]
+        y = self.rays.middle_y[pixel] - self.y[place]
+        self.middle_u = (x * self.cos[place] + y * self.sin[place]) >> 15
+        self.middle_v = (y * self.cos[place] - x * self.sin[place]) >> 15
+
+    def _fall(self, place: int, pixel: int) -> None:
+        """How far rays fall in a robot's axes, and between which places they begin that may meet it."""
+        x = self.rays.fall_x[pixel]
+        y = self.rays.fall_y[pixel]
+        self.fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
+        self.fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
+        self.low_u[_RAYS] = self.low_u[_TOP] - max(self.fall_u, 0)
+        self.high_u[_RAYS] = self.high_u[_TOP] - min(self.fall_u, 0)
+        self.low_v[_RAYS] = self.low_v[_TOP] - max(self.fall_v, 0)
+        self.high_v[_RAYS] = self.high_v[_TOP] - min(self.fall_v, 0)
+
+    def _alone(self, place: int, pixel: int) -> int:
+        """The samples where only one robot may be seen, by how many see what; or _UNSURE."""
+        scene = self.scene
+        self._turn(place, pixel)
+        self.sure = True
+        on_top = entered = self._within(place, pixel, _TOP)
+        total = 0
+        if on_top < self.samples:
+            self._fall(place, pixel)
+            entered = self._within(place, pixel, _RAYS)
+            if entered:
+                entered = self._across(place, pixel, entered)
+            if entered == 0 and self.samples == 16 and self.sure:
+                return scene.total[pixel]
+            behind = scene.paint[pixel]
+            if not self.sure or (entered < self.samples and behind == _MIXED) or scene.shows_ball(pixel):
+                return _UNSURE
+            if entered < self.samples:
+                total = (self.samples - entered) * scene.packed[behind]
+            total += (entered - on_top) * scene.packed[self.side]
+        if on_top:
+            team = self._within(place, pixel, _TEAM)
+            identity = self._within(place, pixel, _IDENTITY) if team < on_top else 0
+            body = place // _SETS
+            total += team * scene.packed[self.team_paint[body]]
+            total += identity * scene.packed[self.identity_paint[body]]
+            total += (on_top - team - identity) * scene.packed[self.black]
+        return total if self.sure else _UNSURE
+
+    def _within(self, place: int, pixel: int, box: int) -> int:
+        """How many samples lie in a rectangle."""
+        low_u, high_u = self.low_u[box] - self.middle_u, self.high_u[box] - self.middle_u
+        low_v, high_v = self.low_v[box] - self.middle_v, self.high_v[box] - self.middle_v
+        around = self.spread_um[place] + self.more_um
+        if low_u > around or high_u < -around or low_v > around or high_v < -around:
+            return 0
+        if low_u <= -around and high_u >= around and low_v <= -around and high_v >= around:
+            return self.samples
+        if not self.sampled:
+            self._sample(place, pixel)
+        within = 0
+        for sample in range(16):
+            inside_u = (self.u[sample] >= low_u) & (self.u[sample] <= high_u)
+            within += inside_u & (self.v[sample] >= low_v) & (self.v[sample] <= high_v)
+        return within
+
+    def _across(self, place: int, pixel: int, within: int) -> int:
+        """How many of the samples between the right places see any of a robot: as `_enters`."""
+        fall_u, fall_v = self.fall_u, self.fall_v
+        reach = abs(fall_u) + abs(fall_v)
+        middle = self.middle_u * fall_v - self.middle_v * fall_u
+        low, high = -_HALF_UM * reach - middle, _HALF_UM * reach - middle
+        around = (self.spread_um[place] + self.more_um) * reach
+        if low > around or high < -around:
+            return 0
+        if low <= -around and high >= around:
+            return within
+        if not self.sampled:
+            self._sample(place, pixel)
+        low_u, high_u = self.low_u[_RAYS] - self.middle_u, self.high_u[_RAYS] - self.middle_u
+        low_v, high_v = self.low_v[_RAYS] - self.middle_v, self.high_v[_RAYS] - self.middle_v
+        entered = 0
+        for sample in range(16):
+            u, v = self.u[sample], self.v[sample]
+            if low_u <= u <= high_u and low_v <= v <= high_v and low <= u * fall_v - v * fall_u <= high:
+                entered += 1
+        return entered
+
+    def _sample(self, place: int, pixel: int) -> None:
+        """How far samples lie from the middle in a robot's axes; those of the other field lie far away."""
+        self.sampled = True
+        if self.more_um:
+            self.sure = False
+            return
+        if self.cornered != pixel:
+            self._find_corners(pixel)
+        u, v = self.u, self.v
+        for corner in range(4):
+            x = self.top_x[corner] - self.x[place]
+            y = self.top_y[corner] - self.y[place]
+            u[corner] = (x * self.cos[place] + y * self.sin[place]) >> 15
+            v[corner] = (y * self.cos[place] - x * self.sin[place]) >> 15
+        step_u, step_v = 16 * (u[1] - u[0]), 16 * (v[1] - v[0])
+        turn_u, turn_v = 2 * (u[0] - u[1] - u[2] + u[3]), 2 * (v[0] - v[1] - v[2] + v[3])
+        by_u, by_v = 8 * (u[2] - u[0]) + (turn_u >> 1), 8 * (v[2] - v[0]) + (turn_v >> 1)
+        at_u = 64 * (u[0] - self.middle_u) + (step_u >> 1) + by_u
+        at_v = 64 * (v[0] - self.middle_v) + (step_v >> 1) + by_v
+        for column in range(4):
+            u[column], v[column] = at_u >> 6, at_v >> 6
+            u[4 + column], v[4 + column] = (at_u + 2 * by_u) >> 6, (at_v + 2 * by_v) >> 6
+            u[8 + column], v[8 + column] = (at_u + 4 * by_u) >> 6, (at_v + 4 * by_v) >> 6
+            u[12 + column], v[12 + column] = (at_u + 6 * by_u) >> 6, (at_v + 6 * by_v) >> 6
+            at_u, at_v = at_u + step_u + turn_u, at_v + step_v + turn_v
+            by_u, by_v = by_u + turn_u, by_v + turn_v
+        if self.samples < 16:
+            for column in range(8):
+                u[8 - self.first + column] = _FAR_UM
+
+    def _find_corners(self, pixel: int) -> None:
+        """Where the pixel's corners are at the height of the tops; corners in rows: two above, two below."""
+        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        for corner in range(4):
+            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
+            self.top_x[corner] = self.rays.top_x(ray)
+            self.top_y[corner] = self.rays.top_y(ray)
+        self.cornered = pixel
+
+    def _samples(self, pixel: int) -> int:
+        """The samples of a pixel at one instant, one by one."""
         scene = self.scene
         behind = scene.paint[pixel]
         ball_seen = scene.shows_ball(pixel)
-        if self.cornered != pixel:
-            self._find_corners(pixel)
-        self.count = 0
-        for index in range(self.near_count):
-            if self.code[index * _SETS + at] != _OUT:
-                self._turn(self.near[index], at, pixel)
-        if self.count == 1 and behind != _MIXED and not ball_seen:
-            return self._alone(scene.packed[behind], first, end)
-        for sample in range(first, end):
+        for sample in range(self.first, self.first + self.samples):
             self.seen[sample] = _OUT
             self.height_um[sample] = -1
-        for slot in range(self.count):
-            self._see(slot, first, end)
+        for index in range(self.seer_count):
+            self._see(self.seers[index], pixel)
         total = 0
-        for sample in range(first, end):
+        for sample in range(self.first, self.first + self.samples):
             paint = self.seen[sample]
             if paint == _OUT:
                 paint = behind if behind != _MIXED else scene.sample(pixel, sample)
@@ -371,109 +435,47 @@ class Camera:
             total += scene.packed[paint]
         return total
 
-    def _turn(self, body: int, at: int, pixel: int) -> None:
-        """The pixel's corners and its fall in the axes of one more robot; corners in rows: a b above, c d below."""
-        place = body * _SETS + at
-        cosine, sine = self.cos[place], self.sin[place]
-        slot = self.count
-        for corner in range(4):
-            x = self.top_x[corner] - self.x[place]
-            y = self.top_y[corner] - self.y[place]
-            self.corner_u[4 * slot + corner] = (x * cosine + y * sine) >> 15
-            self.corner_v[4 * slot + corner] = (y * cosine - x * sine) >> 15
-        x = self.rays.fall_x[pixel]
-        y = self.rays.fall_y[pixel]
-        self.fall_u[slot] = (x * cosine + y * sine) >> 15
-        self.fall_v[slot] = (y * cosine - x * sine) >> 15
-        self.seer[slot] = body
-        self.count = slot + 1
-
-    def _find_corners(self, pixel: int) -> None:
-        """Where the pixel's corners are at the height of the tops."""
-        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
-        for corner in range(4):
-            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
-            self.top_x[corner] = self.rays.top_x(ray)
-            self.top_y[corner] = self.rays.top_y(ray)
-        self.cornered = pixel
-
-    def _alone(self, behind: int, first: int, end: int) -> int:
-        """The samples where only one robot may be seen, before one paint: as `_see`, but nothing is compared."""
-        body = self.seer[0]
-        fall_u, fall_v = self.fall_u[0], self.fall_v[0]
-        top, side = self.scene.packed[self.black], self.scene.packed[self.side]
-        team = self.scene.packed[self.team_paint[body]]
-        identity = self.scene.packed[self.identity_paint[body]]
-        # `_enters`, with what is the same for all samples worked out before
-        least_u, most_u = -_HALF_UM - max(fall_u, 0), _HALF_UM - min(fall_u, 0)
-        least_v, most_v = -_HALF_UM - max(fall_v, 0), _HALF_UM - min(fall_v, 0)
-        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
-        team_u, team_v, identity_u, identity_v = self.team_u, self.team_v, self.identity_u, self.identity_v
-        patch = self.patch_um
-        total = 0
-        for row in range(first >> 2, end >> 2):
-            q = 2 * row + 1
-            u = self.corner_u[0] * (8 - q) + self.corner_u[2] * q
-            v = self.corner_v[0] * (8 - q) + self.corner_v[2] * q
-            step_u = self.corner_u[1] * (8 - q) + self.corner_u[3] * q - u
-            step_v = self.corner_v[1] * (8 - q) + self.corner_v[3] * q - v
-            u = 8 * u + step_u
-            v = 8 * v + step_v
-            for _ in range(4):
-                at_u = u >> 6
-                at_v = v >> 6
-                u += 2 * step_u
-                v += 2 * step_v
-                if -_HALF_UM <= at_u <= _HALF_UM and -_HALF_UM <= at_v <= _HALF_UM:
-                    if -patch <= at_u - team_u <= patch and -patch <= at_v - team_v <= patch:
-                        total += team
-                    elif -patch <= at_u - identity_u <= patch and -patch <= at_v - identity_v <= patch:
-                        total += identity
-                    else:
-                        total += top
-                elif at_u < least_u or at_u > most_u or at_v < least_v or at_v > most_v:
-                    total += behind
-                elif -most <= at_u * fall_v - at_v * fall_u <= most:
-                    total += side
-                else:
-                    total += behind
-        return total
-
-    def _see(self, slot: int, first: int, end: int) -> None:
+    def _see(self, place: int, pixel: int) -> None:
         """What samples see of one robot, where it is higher than what they have seen."""
-        body = self.seer[slot]
-        fall_u, fall_v = self.fall_u[slot], self.fall_v[slot]
-        for sample in range(first, end):
+        self._turn(place, pixel)
+        self._fall(place, pixel)
+        if self._within(place, pixel, _RAYS) == 0:
+            return
+        self._sample(place, pixel)
+        for sample in range(self.first, self.first + self.samples):
             if self.height_um[sample] == _TOP_UM:
                 continue
-            a = 4 * slot
-            u = between(
-                self.corner_u[a], self.corner_u[a + 1], self.corner_u[a + 2], self.corner_u[a + 3], sample
-            )
-            v = between(
-                self.corner_v[a], self.corner_v[a + 1], self.corner_v[a + 2], self.corner_v[a + 3], sample
-            )
+            u, v = self.middle_u + self.u[sample], self.middle_v + self.v[sample]
             if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
-                self.seen[sample] = self._top(body, u, v)
+                self.seen[sample] = self._top(place // _SETS, u, v)
                 self.height_um[sample] = _TOP_UM
-            elif _enters(u, v, fall_u, fall_v, _HALF_UM):
-                height = _entry(u, v, fall_u, fall_v)
+            elif _enters(u, v, self.fall_u, self.fall_v):
+                height = _entry(u, v, self.fall_u, self.fall_v)
                 if height > self.height_um[sample]:
                     self.seen[sample] = self.side
                     self.height_um[sample] = height
+
+    def _top(self, body: int, u: int, v: int) -> int:
+        """The paint of a place on the top."""
+        if self.low_u[_TEAM] <= u <= self.high_u[_TEAM] and self.low_v[_TEAM] <= v <= self.high_v[_TEAM]:
+            return self.team_paint[body]
+        if self.low_u[_IDENTITY] <= u <= self.high_u[_IDENTITY]:
+            if self.low_v[_IDENTITY] <= v <= self.high_v[_IDENTITY]:
+                return self.identity_paint[body]
+        return self.black
 
 
 def _um(metres: float) -> int:
     return math.floor(metres * 1e6 + 0.5)
 
 
-def _enters(u: int, v: int, fall_u: int, fall_v: int, half: int) -> bool:
-    """Whether the line from (u, v) on by the fall meets the square of `half` around the origin (separating axes)."""
-    if (u < -half and u + fall_u < -half) or (u > half and u + fall_u > half):
+def _enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
+    """Whether the line from (u, v) on by the fall meets the square of a robot (separating axes)."""
+    if (u < -_HALF_UM and u + fall_u < -_HALF_UM) or (u > _HALF_UM and u + fall_u > _HALF_UM):
         return False  # both ends are beyond one side
-    if (v < -half and v + fall_v < -half) or (v > half and v + fall_v > half):
+    if (v < -_HALF_UM and v + fall_v < -_HALF_UM) or (v > _HALF_UM and v + fall_v > _HALF_UM):
         return False
-    most = half * (abs(fall_u) + abs(fall_v))
+    most = _HALF_UM * (abs(fall_u) + abs(fall_v))
     return -most <= u * fall_v - v * fall_u <= most
 
 
