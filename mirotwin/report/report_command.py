@@ -7,8 +7,7 @@ from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from mirotwin.report.page.document import check_size, place_of_page, write_page
-from mirotwin.report.page.run_page import run_page
-from mirotwin.report.report_subject import PageSubject, is_campaign, material_of, page_of_port
+from mirotwin.report.report_subject import PageSubject, is_campaign, page_of
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
@@ -65,6 +64,6 @@ def report(options: ReportOptions) -> int:
         engine=options.engine,
         quiet=options.quiet,
     )
-    made = page_of_port(wanted) or run_page(material_of(wanted))
+    made = page_of(wanted)
     check_size(made, subject, SMALLER)
     return write_page(place, made, options.quiet)

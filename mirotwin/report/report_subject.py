@@ -60,8 +60,8 @@ def is_campaign(subject: str) -> bool:
         return file.read(len(PARQUET)) == PARQUET
 
 
-def material_of(wanted: PageSubject) -> Material:
-    """All that the page is made from. Raises BadInput, and OSError as `open` does."""
+def page_of(wanted: PageSubject) -> bytes:
+    """The page; of robots at a port, it shows them beside their twin. Raises BadInput, and OSError as `open` does."""
     if wanted.to_tick is not None and wanted.to_tick <= wanted.from_tick:
         place = f"--from {wanted.from_tick}t --to {wanted.to_tick}t"
         raise BadInput("", place, "the window is empty", "--to must be later")
@@ -70,23 +70,15 @@ def material_of(wanted: PageSubject) -> Material:
         what = "is a case of a bare processor, which has no robot to show"
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
     job = load_job(file, wanted.firmware, wanted.engine)
-    return _of_recording(wanted, job) if job.recorded else _of_case(wanted, job)
-
-
-def page_of_port(wanted: PageSubject) -> bytes | None:
-    """The page of robots at a port beside their twin; None for a subject that was not recorded at one."""
-    file = _file_of(wanted.subject)
-    if is_bare_case(file):
-        return None
-    job = load_job(file, wanted.firmware, wanted.engine)
-    return port_page(job, wanted.quiet) if job.origin else None
+    if job.origin:
+        return port_page(job, wanted.quiet)
+    return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job))
 
 
 def page_of_failure(folder: str) -> bytes:
     """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
     require_bokeh()
-    wanted = PageSubject(folder, 0, None, True, None, (), None, True)
-    return page_of_port(wanted) or run_page(material_of(wanted))
+    return page_of(PageSubject(folder, 0, None, True, None, (), None, True))
 
 
 def _file_of(subject: str) -> str:

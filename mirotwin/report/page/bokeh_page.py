@@ -46,8 +46,9 @@ def document_json(figures: Mapping[str, Any]) -> bytes:
     from bokeh.document import Document
 
     document = Document()
-    for figure in figures.values():
-        document.add_root(figure)
+    with document.models.freeze():  # else it walks through all that it has at each
+        for figure in figures.values():
+            document.add_root(figure)
     roots = {figure.id: name for name, figure in figures.items()}
     text = serialize_json(
         {
