@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import base64
 import bisect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,6 @@ _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC
 _REASONS = {"begin": "entry", "case": "exception", "interrupted": "pause", "goto": "goto", "step": "step"}
 _UNUSABLE = (AttributeError, LookupError, TypeError, ValueError)  # what comes of arguments of another form
 Shown = Callable[[], Value]
-Made = tuple[Breakpoint, Message]
 
 
 class Adapter:
@@ -54,7 +53,8 @@ class Adapter:
     def __init__(self, wire: Wire) -> None:
         self.wire = wire
         self.its: Debugger
-        self.console: Console | None = None
+        self.console: Console
+        self.began = False
         self.lines: list[str] = []
         self.kinds: dict[str, list[int]] = {}  # numbers of breakpoints; those of lines by file
         self.children: list[list[tuple[str, Shown]]] = []
@@ -78,7 +78,7 @@ class Adapter:
         try:
             if handler is None:
                 raise BadInput("", command, "is not answered by this debugger")
-            if self.console is None and command not in _WITHOUT_A_RUN:
+            if not self.began and command not in _WITHOUT_A_RUN:
                 raise BadInput("", command, "there is no run yet", "send launch first")
             body = handler(request["arguments"])
         except BadInput as error:
@@ -128,6 +128,7 @@ class Adapter:
         self.its = debugger
         self.its.timeline.interrupted = self._interrupted
         self.console = Console(debugger, self.lines.append)
+        self.began = True
 
     def on_configurationDone(self, given: Message) -> None:
         self.run_after = self.begin
@@ -142,61 +143,63 @@ class Adapter:
 
     def on_setBreakpoints(self, given: Message) -> Message:
         path = given["source"].get("path") or given["source"].get("name") or ""
-
-        def make(one: Message) -> Made:
-            addresses, line = self.its.symbols.at_line(path, one["line"])
-            moved = None if line.line == one["line"] else "the line has no code: the next one that has some"
-            return self._add(one, addresses), {"line": line.line, "source": given["source"], "message": moved}
-
-        return self._set(f"breakpoint in {path}", given.get("breakpoints") or (), make)
+        places = self.its.symbols.at_line
+        return self._set(f"breakpoint in {path}", given, lambda one: places(path, one["line"])[0])
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
-        def make(one: Message) -> Made:
-            return self._add(one, self.its.symbols.at(one["name"])[0]), {}
-
-        return self._set("function breakpoint", given["breakpoints"], make)
+        return self._set("function breakpoint", given, lambda one: self.its.symbols.at(one["name"])[0])
 
     def on_setInstructionBreakpoints(self, given: Message) -> Message:
-        def make(one: Message) -> Made:
-            return self._add(one, [int(one["instructionReference"], 16) + one.get("offset", 0)]), {}
+        def address(one: Message) -> list[int]:
+            return [int(one["instructionReference"], 16) + one.get("offset", 0)]
 
-        return self._set("instruction breakpoint", given["breakpoints"], make)
+        return self._set("instruction breakpoint", given, address)
 
     def on_setDataBreakpoints(self, given: Message) -> Message:
-        def make(one: Message) -> Made:
+        def value(one: Message) -> Value:
             space, address, count = one["dataId"].split(":")
-            value = Value(CType("int", int(count)), space, int(address))
-            condition, hits = one.get("condition", ""), one.get("hitCondition", "")
-            return self.its.watch(one["dataId"], condition, hits, value), {}
+            return Value(CType("int", int(count)), space, int(address))
 
-        return self._set("data breakpoint", given["breakpoints"], make)
+        return self._set("data breakpoint", given, value)
 
     def on_setExceptionBreakpoints(self, given: Message) -> Message:
         return {"breakpoints": []}
 
-    def _add(self, one: Message, addresses: Sequence[int]) -> Breakpoint:
-        log = _logged(one["logMessage"]) if one.get("logMessage") else None
-        made = self.its.add("", addresses, one.get("condition", ""), one.get("hitCondition", ""))
-        made.log = log
-        return made
-
-    def _set(self, kind: str, asked: Sequence[Message], make: Callable[[Message], Made]) -> Message:
-        """All breakpoints of a kind, which replace those before."""
+    def _set(self, kind: str, given: Message, place: Callable[[Message], Collection[int] | Value]) -> Message:
+        """All breakpoints of a kind, which replace those before. `place`: where one is, or what it watches."""
         there, before = self.its.breakpoints, self.kinds.get(kind, ())
         there[:] = [one for one in there if one.number not in before]
         self.kinds[kind] = []
         self.changed = True
         found = []
-        for one in asked:
+        for one in given.get("breakpoints") or ():
             try:
-                made, body = make(one)
+                made = self._made(one, place(one))
             except _UNUSABLE as error:
                 found.append({"verified": False, "message": str(error)})
                 continue
             self.kinds[kind].append(made.number)
-            at = None if made.written is not None else f"{min(made.addresses):#06x}"
-            found.append({"verified": True, "id": made.number, "instructionReference": at, **body})
+            found.append({"verified": True, "id": made.number, **self._where(made, one.get("line"))})
         return {"breakpoints": found}
+
+    def _made(self, one: Message, place: Collection[int] | Value) -> Breakpoint:
+        asked = one.get("condition") or "", one.get("hitCondition") or ""
+        log = _logged(one["logMessage"]) if one.get("logMessage") else None
+        if isinstance(place, Value):
+            return self.its.watch(one["dataId"], *asked, place)
+        made = self.its.add("", place, *asked)
+        made.log = log
+        return made
+
+    def _where(self, made: Breakpoint, asked: int | None) -> Message:
+        """Where a breakpoint stands that was asked for in a line, and whether it was moved."""
+        if made.written is not None:
+            return {}
+        address = min(made.addresses)
+        line = self.its.symbols.line(address)
+        at = {"instructionReference": f"{address:#06x}", "line": None if line is None else line.line}
+        moved = asked is not None and asked != at["line"]
+        return {**at, "message": "the line has no code: the next one that has some"} if moved else at
 
     def on_dataBreakpointInfo(self, given: Message) -> Message:
         name = given["name"]
@@ -246,16 +249,12 @@ class Adapter:
                 self._event("output", category="stderr", output=f"{error}\n")
                 why = "step"
             for cycle, core, text, address in self.its.told:
-                begin = self._time(cycle * CYCLE_TICKS, core)
+                begin = self.console.time(cycle * CYCLE_TICKS, core)
                 self._event(
                     "output", category="console", output=f"{begin}{text}\n", **self._place(address, "source")
                 )
             self.its.told.clear()
         self._stopped(why)
-
-    def _time(self, tick: int, core: int) -> str:
-        assert self.console is not None
-        return self.console.time(tick, core)
 
     def _interrupted(self) -> bool:
         """Answers what comes during a run; true where that ends it."""
@@ -338,10 +337,10 @@ class Adapter:
         scopes.append(("Registers", "registers", _named(moment, _REGISTERS)))
         scopes.append(("Special function registers", "registers", _named(moment, SFRS)))
         if moment.core.board is not None:
-            for side in ("left", "right"):
-                scopes.append((f"LM629 {side}", "", _members(moment, f"lm629.{side}")))
+            for side, chip in children(moment.find("lm629", "")):
+                scopes.append((f"LM629 {side}", "", children(chip())))
             scopes.append(("Radio", "", self._radio()))
-        scopes.append(("Pins", "", _members(moment, "pins")))
+        scopes.append(("Pins", "", children(moment.find("pins", ""))))
         found = []
         for name, hint, values in scopes:
             self.children.append(list(values))
@@ -353,7 +352,7 @@ class Adapter:
         """The last frames on the air of this robot's network, the latest first."""
         for event in self.its.timeline.radio_events()[:-9:-1]:
             text = str(event).partition(": ")[2]
-            yield self._time(event.tick, 0).split()[0], partial(Value, number=text)
+            yield self.console.time(event.tick, 0).split()[0], partial(Value, number=text)
 
     def on_variables(self, given: Message) -> Message:
         reference = given["variablesReference"]
@@ -386,7 +385,6 @@ class Adapter:
         if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, "result")
-        assert self.console is not None
         self.lines.clear()
         before, self.paused, self.changed = self.its.timeline.tick, False, False
         self.console.do(text)
@@ -446,10 +444,6 @@ def _placed(moment: Moment, scope: str) -> list[tuple[str, Shown]]:
 
 def _named(moment: Moment, names: Sequence[str] | dict[str, int]) -> list[tuple[str, Shown]]:
     return [(name, partial(moment.find, name, "")) for name in names]
-
-
-def _members(moment: Moment, text: str) -> list[tuple[str, Shown]]:
-    return _inner(expression(text)(moment))
 
 
 def _logged(text: str) -> Callable[[Moment], str]:

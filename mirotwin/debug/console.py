@@ -146,14 +146,15 @@ class Console:
             what = "is a condition of a robot's world"
             raise BadInput("", name, what, "stop the bare processor by breakpoints")
         given: dict[str, Any] = {}
-        if "slot" in CONDITIONS[name].__struct_fields__:
+        fields = CONDITIONS[name].__struct_fields__
+        if "slot" in fields:
             robot = self.timeline.robots[self.timeline.focus]
             given = {"network": robot.network, "slot": robot.slot}
         given |= {key: _plain(value) for key, _, value in (word.partition("=") for word in keys)}
         try:
             event = self.timeline.until(msgspec.convert(given, CONDITIONS[name], strict=False))
         except (msgspec.ValidationError, ValueError) as error:
-            raise BadInput("", rest, str(error)) from None
+            raise BadInput("", rest, str(error), f"its keys are {', '.join(fields)}") from None
         self.say("no such event before the end" if event is None else str(event))
 
     # Breakpoints

@@ -175,6 +175,7 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
         ("until edge 'pin", "No closing quotation"),
+        ("until edge pins=txd", "unknown field `pins`; its keys are network, slot, pin, level"),
         ("next 3", "is more than next takes"),
         ("watch lm629.left.status", "lies in no memory that can be watched"),
         ("finish", "nothing called this function"),
