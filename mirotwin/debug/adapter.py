@@ -55,7 +55,6 @@ class Adapter:
         self.its: Debugger
         self.console: Console
         self.began = False
-        self.lines: list[str] = []
         self.kinds: dict[str, list[int]] = {}  # numbers of breakpoints; those of lines by file
         self.children: list[list[tuple[str, Shown]]] = []
         self.paused = self.changed = self.ended = False
@@ -127,7 +126,7 @@ class Adapter:
         """From now on it answers for this one."""
         self.its = debugger
         self.its.timeline.interrupted = self._interrupted
-        self.console = Console(debugger, self.lines.append)
+        self.console = Console(debugger)
         self.began = True
 
     def on_configurationDone(self, given: Message) -> None:
@@ -385,12 +384,11 @@ class Adapter:
         if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, "result")
-        self.lines.clear()
         before, self.paused, self.changed = self.its.timeline.tick, False, False
         self.console.do(text)
         if self.its.timeline.tick != before:
             self.run_after = partial(self._stopped, "goto")
-        return {"result": "\n".join(self.lines), "variablesReference": 0}
+        return {"result": "\n".join(self.console.lines), "variablesReference": 0}
 
     def on_completions(self, given: Message) -> Message:
         begun = given["text"][: given["column"] - 1].split(" ")[-1]

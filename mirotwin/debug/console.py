@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shlex
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -58,13 +58,14 @@ VERBS = {
 
 
 class Console:
-    """Does commands, and gives `tell` the lines that come of them."""
+    """Does commands. `lines`: what came of the last one."""
 
-    def __init__(self, debugger: Debugger, tell: Callable[[str], object] = show_line) -> None:
+    def __init__(self, debugger: Debugger) -> None:
         self.debugger = debugger
         self.symbols = debugger.symbols
         self.timeline = debugger.timeline
-        self.tell = tell
+        self.lines: list[str] = []
+        self.tell = self.lines.append
         self.frame = 0
         self.ended = False
         self.last = ""
@@ -75,20 +76,23 @@ class Console:
         Ctrl-C ends a search, where it is.
         """
         stopped: list[int] = []
-        self.timeline.interrupted = lambda: bool(stopped)
         before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))
+        words = line.strip() or self.last
         try:
-            words = line.strip() or self.last
-            self.last = words if self.do(words) in MOVES else ""
+            with self.timeline.shown(words, lambda: bool(stopped)):
+                self.last = words if self.do(words) in MOVES else ""
         except BadInput as error:
             complain(f"error: {error}")
             return False
         finally:
             signal.signal(signal.SIGINT, before)
+            for told in self.lines:
+                show_line(told)
         return True
 
     def do(self, line: str) -> str:
-        """The same without a word about errors; returns the verb. Raises BadInput."""
+        """The same, which shows nothing; returns the verb. Raises BadInput."""
+        self.lines.clear()
         word, _, rest = line.strip().partition(" ")
         if word == "r" and rest:
             word, _, rest = f"r{rest.strip()}".partition(" ")

@@ -57,9 +57,9 @@ def debug(options: DebugOptions) -> int:
         raise click.UsageError("Missing argument 'SUBJECT'.")
     session = open_subject(options)
     console = Console(session.debugger)
-    for line in session.said:
-        show_line(line)
     console.say(session.why)
+    for line in (*session.said, *console.lines):
+        show_line(line)
     if not options.commands:
         return _interact(console)
     for line in options.commands:

@@ -106,14 +106,15 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
         session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
     elif not symbols.has_sources():
         session.said.append("no C files: --sources names their folder")
-    if judge is not None:
-        session.why = "case"
-        verdict, failure = judge(timeline)
-        session.said.append(verdict)
-        if failure is not None:
-            _stand_at(timeline, failure, options.slot)
-    if options.at is not None:
-        session.why = session.debugger.go_to(options.at.ticks(run.tick_hz))
+    with timeline.shown(f"opening {subject}"):
+        if judge is not None:
+            session.why = "case"
+            verdict, failure = judge(timeline)
+            session.said.append(verdict)
+            if failure is not None:
+                _stand_at(timeline, failure, options.slot)
+        if options.at is not None:
+            session.why = session.debugger.go_to(options.at.ticks(run.tick_hz))
     return session
 
 

@@ -27,6 +27,7 @@ from miro_sim.world.events import Event, HostLog
 from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
+from mirotwin.shell.progress import ProgressBar
 
 BUDGET_BYTES = 16 << 20
 CLOSE_TICKS = 48_000  # 2 ms
@@ -238,6 +239,22 @@ class Timeline:
         return True
 
     # Searching
+
+    @contextmanager
+    def shown(self, what: str, interrupted: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """Within it, what takes more than a second shows a bar, and `interrupted` may end a search."""
+        before = self.interrupted
+        with ProgressBar(what, self.run.end_tick) as bar:
+
+            def asked() -> bool:
+                bar.to(self.tick)
+                return interrupted()
+
+            self.interrupted = asked
+            try:
+                yield
+            finally:
+                self.interrupted = before
 
     def find(self, traps: Mapping[int, Trap], until_tick: int = NEVER_TICK) -> Hit | None:
         """Goes on to the first moment after this one at which a trap, by processor, finds something.

@@ -1,13 +1,16 @@
 """Steps, stacks and writers are those that a list of all moments of the run tells."""
 
 import random
+import sys
 from itertools import pairwise
 
 import pytest
 
 from miro_exact.clock import CYCLE_TICKS
 from mirotwin.debug.console import Console
+from mirotwin.shell import progress
 from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
+from tests.mirotwin.shell.test_progress import Screen
 from tests.naive.debugger import history, last_change, next_line
 
 END = SECOND // 16
@@ -159,3 +162,12 @@ def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
     assert len(lines) > 3
     assert all(line.endswith("tick") for line in lines[:-1])
     assert "breakpoint 2" in lines[-1]
+
+
+def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(sys, "stderr", screen := Screen())
+    assert Console(debugger).run("continue")
+    assert "continue" in screen.getvalue()
+    assert "the run ends here" in capsys.readouterr().out
