@@ -19,6 +19,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from mirotwin.fuzz.afl import AflRun
 from mirotwin.fuzz.afl.inputs import write_seeds
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import TargetSpec
 
 WARM = 500
@@ -45,7 +46,7 @@ def measured(folder: Path, spec: TargetSpec, inputs: list[bytes], wall_s: float)
     """A row of the table."""
     write_seeds(folder / "seeds", {str(number): data for number, data in enumerate(inputs)})
     lengths = min(map(len, inputs)), max(map(len, inputs))
-    run = AflRun([spec.text()], folder / "seeds", folder / "out", watch=spec.make(), lengths=lengths)
+    run = AflRun(EngineInput(spec.text(), folder / "seeds", folder / "out"), spec.make(), lengths)
     with run:
         while run.progress().executions < WARM:
             time.sleep(0.1)

@@ -18,6 +18,28 @@ _TOKENS, _TOKEN = 32, 64
 """How many inputs are words of a foreign format, and how much of them."""
 
 
+class EngineInput(msgspec.Struct, frozen=True):
+    """What an engine begins with. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs.
+
+    `out`: the folder of the campaign, made if it is not there. `dictionary`: a file of words for AFL++. `jobs`: how many
+    processes, each with a target of its own. `seed`: of the random numbers; the system's where none is given.
+    """
+
+    target: str
+    seeds: Path
+    out: Path
+    dictionary: Path | None = None
+    jobs: int = 1
+    seed: int | None = None
+
+    def check(self, program: str, absent: str | None) -> None:
+        """Raises BadInput for no job, and for a program of which `absent` says what is missing and how to get it."""
+        if self.jobs < 1:
+            raise BadInput("--jobs", "", f"{self.jobs}: there is nothing to do", "give 1 or more")
+        if absent:
+            raise BadInput(program, "", *absent.split("; ", 1))
+
+
 class EngineProgress(msgspec.Struct, frozen=True):
     """A campaign so far: the rate is that of all its jobs together; `edges` is None as long as nothing is known."""
 
@@ -80,14 +102,6 @@ class Engine:
         self.stop()
 
 
-def check_jobs(jobs: int, program: str, absent: str | None) -> None:
-    """Raises BadInput for no job, and for a program of which `absent` says what is missing and how to get it."""
-    if jobs < 1:
-        raise BadInput("--jobs", "", f"{jobs}: there is nothing to do", "give 1 or more")
-    if absent:
-        raise BadInput(program, "", *absent.split("; ", 1))
-
-
 def engine_for(
     spec: TargetSpec,
     inputs: Sequence[bytes],
@@ -108,12 +122,12 @@ def engine_for(
     else:
         tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
     write_dictionary(dictionary, tokens)
-    place = (seeds, folder.folder("engine"), dictionary, jobs, seed)
+    given = EngineInput(spec.text(), seeds, folder.folder("engine"), dictionary, jobs, seed)
     lacking = missing()
     if lacking is None:
-        afl = AflRun([spec.text()], *place, watch=target)
+        afl = AflRun(given, target)
         return afl, afl.notes()
     from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 
     note = f"{lacking}; until then Hypothesis makes up the inputs, which is slower and not guided by edges"
-    return HypothesisRun([spec.text()], *place), [note]
+    return HypothesisRun(given), [note]

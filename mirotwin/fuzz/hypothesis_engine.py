@@ -11,12 +11,11 @@ from __future__ import annotations
 import os
 import subprocess
 import time
-from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.engine import Engine, EngineProgress, check_jobs
+from mirotwin.fuzz.engine import Engine, EngineInput, EngineProgress
 from mirotwin.fuzz.hypothesis_process import KINDS, told
 from mirotwin.shell.program import python_module
 
@@ -32,27 +31,17 @@ def missing() -> str | None:
 
 
 class HypothesisRun(Engine):
-    """A campaign: `jobs` processes, each with a target of its own and a seed of its own.
+    """A campaign: each of the jobs is a process with a seed of its own. A dictionary is not used.
 
-    Arguments as `AflRun` has them; a dictionary is not used, since inputs are made of whole operations. `seed`: of what
-    Hypothesis draws; the system's where none is given. Raises BadInput for Hypothesis that is missing.
+    Inputs are made of whole operations. Raises BadInput for Hypothesis that is missing.
     """
 
-    def __init__(
-        self,
-        target_args: Sequence[str],
-        seeds: Path,
-        out: Path,
-        dictionary: Path | None = None,
-        jobs: int = 1,
-        seed: int | None = None,
-    ) -> None:
-        check_jobs(jobs, "Hypothesis", missing())
+    def __init__(self, given: EngineInput) -> None:
+        given.check("Hypothesis", missing())
         super().__init__()
-        self._target_args = list(target_args)
-        self._seeds = seeds
-        self._folders = [out / f"job{job}" for job in range(jobs)]
-        self._seed = int.from_bytes(os.urandom(4), "little") if seed is None else seed
+        self._given = given
+        self._folders = [given.out / f"job{job}" for job in range(given.jobs)]
+        self._seed = int.from_bytes(os.urandom(4), "little") if given.seed is None else given.seed
         self._stopped = False
         self._processes: list[subprocess.Popen[bytes]] = []
         self._began_s = 0.0
@@ -62,7 +51,7 @@ class HypothesisRun(Engine):
         for number, folder in enumerate(self._folders):
             for kind in KINDS:
                 (folder / kind).mkdir(parents=True, exist_ok=True)
-            what = [*self._target_args[:1], str(self._seeds), str(folder), str(self._seed + number)]
+            what = [self._given.target, str(self._given.seeds), str(folder), str(self._seed + number)]
             with (folder / _LOG).open("wb") as log:
                 self._processes.append(
                     subprocess.Popen(

@@ -9,14 +9,13 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.job import AflJob
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
-from mirotwin.fuzz.engine import Engine, EngineProgress, check_jobs
+from mirotwin.fuzz.engine import Engine, EngineInput, EngineProgress
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
@@ -92,35 +91,24 @@ def bound(proc: Path) -> Counter[int]:
 
 
 class AflRun(Engine):
-    """A campaign: `jobs` times afl-fuzz, each with a target process of its own.
+    """A campaign: each of the jobs is an afl-fuzz.
 
-    `target_args`: the arguments of the target process, which are the JSON of a `TargetSpec`. `seeds`: a folder of
-    inputs. `out`: the folder of the campaign, made if it is not there. `seed`: of its random numbers. `watch`: a target
-    by which new edges are counted at once: afl-fuzz says them after a minute. `lengths`: the shortest and the longest
-    input in bytes that it makes.
+    `watch`: a target by which new edges are counted at once: afl-fuzz says them after a minute. `lengths`: the shortest
+    and the longest input in bytes that it makes.
 
     Raises BadInput for AFL++ that is missing and a folder without seeds; `start` for a program that cannot be started.
     """
 
     def __init__(
-        self,
-        target_args: Sequence[str],
-        seeds: Path,
-        out: Path,
-        dictionary: Path | None = None,
-        jobs: int = 1,
-        seed: int | None = None,
-        *,
-        watch: Target,
-        lengths: tuple[int, int] = (1, LONGEST_BYTES),
+        self, given: EngineInput, watch: Target, lengths: tuple[int, int] = (1, LONGEST_BYTES)
     ) -> None:
-        check_jobs(jobs, "AFL++", missing())
+        given.check("AFL++", missing())
         super().__init__()
-        _require_seeds(seeds)
-        self._call = Call(tuple(target_args), seeds, out, dictionary, seed, lengths)
+        _require_seeds(given.seeds)
+        self._call = Call(given, lengths)
         self._environment = environment(os.environ, MAP_BYTES)
-        self._out = out
-        self.jobs = [AflJob(out, job_name(job, jobs)) for job in range(jobs)]
+        self._out = given.out
+        self.jobs = [AflJob(given.out, job_name(job, given.jobs)) for job in range(given.jobs)]
         self._union = EdgeUnion(watch)
         self._counted: dict[Path, None] = {}
         self._rate_s = 0.0
@@ -139,7 +127,7 @@ class AflRun(Engine):
         self._rate_executions = self._executions()
         cores: list[int | None] = [*cores_for(len(self.jobs))] or [None] * len(self.jobs)
         for number, (job, core) in enumerate(zip(self.jobs, cores, strict=True)):
-            job.start(self._call.line(number, len(self.jobs)), self._environment, core)
+            job.start(self._call.line(number), self._environment, core)
 
     def stop(self) -> None:
         for job in self.jobs:

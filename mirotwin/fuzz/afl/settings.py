@@ -6,11 +6,11 @@ import ctypes
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.shell.program import python_module
 
 PROGRAM = "afl-fuzz"
@@ -47,35 +47,32 @@ def environment(inherited: Mapping[str, str], map_size: int) -> dict[str, str]:
 class Call(msgspec.Struct, frozen=True):
     """One call of afl-fuzz, without what differs from job to job.
 
-    `lengths`: the shortest and the longest input in bytes that it makes. `seed`: of its random numbers; afl-fuzz then
-    takes all inputs for equally fast, so that its choices do not depend on time. None takes one from the system.
+    `lengths`: the shortest and the longest input in bytes that it makes. Where a seed is given, afl-fuzz takes all
+    inputs for equally fast, so that its choices do not depend on time.
     """
 
-    target: tuple[str, ...]
-    seeds: Path
-    out: Path
-    dictionary: Path | None = None
-    seed: int | None = None
+    given: EngineInput
     lengths: tuple[int, int] = (1, LONGEST_BYTES)
 
-    def line(self, job: int, jobs: int) -> list[str]:
+    def line(self, job: int) -> list[str]:
         """The command of one of the jobs: the first is the main one, the others take its crashes over.
 
         Raises BadInput for a folder whose name means something to afl-fuzz.
         """
-        name = job_name(job, jobs)
-        options = ["-i", str(self.seeds), "-o", str(self.out), "-t", str(ANSWER_MS)]
+        given = self.given
+        name = job_name(job, given.jobs)
+        options = ["-i", str(given.seeds), "-o", str(given.out), "-t", str(ANSWER_MS)]
         options += ["-g", str(self.lengths[0]), "-G", str(self.lengths[1])]
-        if jobs > 1:
+        if given.jobs > 1:
             options += ["-M" if job == 0 else "-S", name]
-        if self.dictionary is not None:
-            options += ["-x", str(self.dictionary)]
-        if self.seed is not None:
-            options += ["-s", str(self.seed + job)]
-        beside = str(self.out / name)
+        if given.dictionary is not None:
+            options += ["-x", str(given.dictionary)]
+        if given.seed is not None:
+            options += ["-s", str(given.seed + job)]
+        beside = str(given.out / name)
         if "@@" in beside:
-            raise BadInput(self.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
-        server = python_module("mirotwin.fuzz.afl.serve", *self.target, beside)
+            raise BadInput(given.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
+        server = python_module("mirotwin.fuzz.afl.serve", given.target, beside)
         return [shutil.which(PROGRAM) or PROGRAM, *options, "--", *server]
 
 

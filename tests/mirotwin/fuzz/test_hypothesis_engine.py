@@ -12,6 +12,7 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.program import INPUTS, OPERATIONS
 from miro_robot.image import load_hex
 from mirotwin.fuzz import hypothesis_search
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.hypothesis_search import Explorer, explore
@@ -121,7 +122,7 @@ def waited(run, limit_s=60.0):
 def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(tmp_path, seeds):
     crashes = []
     queue = []
-    with HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=2, seed=5) as run:
+    with HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", jobs=2, seed=5)) as run:
         for _ in waited(run):
             crashes += run.new_crashes()
             queue += run.new_queue()
@@ -139,7 +140,7 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
 
 
 def test_a_process_that_somebody_kills_is_told(tmp_path, seeds):
-    with HypothesisRun([TOY.text()], seeds, tmp_path / "out", seed=5) as run:
+    with HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", seed=5)) as run:
         for _ in waited(run):
             if run.progress().executions:
                 break
@@ -152,7 +153,7 @@ def test_a_process_that_somebody_kills_is_told(tmp_path, seeds):
 def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(tmp_path, seeds):
     spec = TargetSpec(image=str(tmp_path / "none.ihx"))
     with (
-        HypothesisRun([spec.text()], seeds, tmp_path / "out") as run,
+        HypothesisRun(EngineInput(spec.text(), seeds, tmp_path / "out")) as run,
         pytest.raises(BadInput, match=r"none\.ihx"),
     ):
         _wait_for_ever(run)
@@ -165,4 +166,4 @@ def _wait_for_ever(run):
 
 def test_no_job_is_refused(tmp_path, seeds):
     with pytest.raises(BadInput, match=r"^--jobs: 0: there is nothing to do; give 1 or more$"):
-        HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=0)
+        HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", jobs=0))

@@ -14,6 +14,7 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import FrameType
 from mirotwin.fuzz.afl import AflRun
 from mirotwin.fuzz.afl.inputs import write_seeds
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 from tests.mirotwin.fuzz.afl.double import WORD, Double, spec
@@ -35,7 +36,9 @@ def campaign(folder, inputs=None, **named):
     """A campaign in `folder`; what is named for the double goes to it."""
     write_seeds(folder / "seeds", inputs or {"hello": b"hello"})
     own = {key: named.pop(key) for key in ("kind", "raises", "sleeps", "always") if key in named}
-    return AflRun([spec(**own).text()], folder / "seeds", folder / "out", seed=1, watch=Double(), **named)
+    return AflRun(
+        EngineInput(spec(**own).text(), folder / "seeds", folder / "out", seed=1, **named), Double()
+    )
 
 
 def until(true, what):
@@ -118,9 +121,8 @@ def test_a_robot_is_fuzzed_from_one_frame(tmp_path):
     specification = TargetSpec(input="bytes")
     frame = encode(TeamFrame(FrameType.TEAM, 1, ((200, 200),) * 3), 3)
     write_seeds(tmp_path / "seeds", {"frame": frame})
-    with AflRun(
-        [specification.text()], tmp_path / "seeds", tmp_path / "out", watch=specification.make()
-    ) as run:
+    given = EngineInput(specification.text(), tmp_path / "seeds", tmp_path / "out")
+    with AflRun(given, specification.make()) as run:
         first = until(lambda: run.progress().edges, "the frame's edges")
         until(lambda: (run.progress().edges or 0) > first, "an edge more")
         assert run.new_crashes() == []
@@ -151,7 +153,7 @@ def test_a_target_that_raises_is_quoted(tmp_path):
 
 def test_a_target_that_cannot_be_made_is_quoted(tmp_path):
     write_seeds(tmp_path / "seeds", {"a": b"a"})
-    said = error_of(AflRun(['{"board":"x"}'], tmp_path / "seeds", tmp_path / "out", watch=Double()))
+    said = error_of(AflRun(EngineInput('{"board":"x"}', tmp_path / "seeds", tmp_path / "out"), Double()))
     assert "target: Invalid enum value 'x' - at `$.board`" in said
 
 
@@ -175,12 +177,12 @@ def test_a_folder_without_seeds_is_refused(tmp_path, content):
     if content is not None:
         (tmp_path / "seeds" / "empty").write_bytes(content)
     with pytest.raises(BadInput, match="seeds: holds no file that is not empty; put at least one"):
-        AflRun([spec().text()], tmp_path / "seeds", tmp_path / "out", watch=Double())
+        AflRun(EngineInput(spec().text(), tmp_path / "seeds", tmp_path / "out"), Double())
 
 
 def test_a_folder_of_seeds_that_is_none_is_refused(tmp_path):
     with pytest.raises(BadInput, match="seeds: is no folder; give"):
-        AflRun([spec().text()], tmp_path / "seeds", tmp_path / "out", watch=Double())
+        AflRun(EngineInput(spec().text(), tmp_path / "seeds", tmp_path / "out"), Double())
 
 
 # ---- other programs of AFL++ -------------------------------------------------------------------------------

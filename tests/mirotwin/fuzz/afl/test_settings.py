@@ -13,13 +13,16 @@ from mirotwin.fuzz.afl import missing, run
 from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import TargetSpec, spec_of
 from tests.mirotwin.fuzz.afl.double import Double, spec
 
 
 def test_one_job_is_not_distributed_and_several_are():
-    call = Call(("{}",), Path("seeds"), Path("out"), Path("words"), seed=7)
-    alone, main, other = call.line(0, 1), call.line(0, 2), call.line(1, 2)
+    alone, main, other = (
+        Call(EngineInput("{}", Path("seeds"), Path("out"), Path("words"), jobs, seed=7)).line(job)
+        for job, jobs in ((0, 1), (0, 2), (1, 2))
+    )
     assert not {"-M", "-S"} & set(alone)
     assert main[main.index("-M") + 1] == "main"
     assert other[other.index("-S") + 1] == "job1"
@@ -30,7 +33,7 @@ def test_one_job_is_not_distributed_and_several_are():
 
 
 def test_what_is_not_asked_for_is_not_on_the_command_line():
-    line = Call(("{}",), Path("seeds"), Path("out")).line(0, 1)
+    line = Call(EngineInput("{}", Path("seeds"), Path("out"))).line(0)
     assert not {"-x", "-s"} & set(line)
 
 
@@ -43,7 +46,7 @@ def test_no_specification_holds_what_afl_replaces_by_the_name_of_a_file(image):
 
 def test_a_folder_whose_name_afl_would_replace_is_refused():
     with pytest.raises(BadInput, match="out@@: afl-fuzz puts the name of a file for @@; choose another"):
-        Call(("{}",), Path("seeds"), Path("out@@")).line(0, 1)
+        Call(EngineInput("{}", Path("seeds"), Path("out@@"))).line(0)
 
 
 def test_our_settings_win_and_others_are_passed_on():
@@ -73,7 +76,7 @@ def test_what_is_missing_says_how_to_get_it():
 def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(BadInput, match=r"^AFL\+\+: afl-fuzz is not on the PATH; install AFL\+\+"):
-        AflRun([spec().text()], tmp_path, tmp_path / "out", watch=Double())
+        AflRun(EngineInput(spec().text(), tmp_path, tmp_path / "out"), Double())
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,7 @@ def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
 )
 def test_a_campaign_of_no_job_is_refused(tmp_path, jobs, said):
     with pytest.raises(BadInput, match=said):
-        AflRun([spec().text()], tmp_path, tmp_path / "out", jobs=jobs, watch=Double())
+        AflRun(EngineInput(spec().text(), tmp_path, tmp_path / "out", jobs=jobs), Double())
 
 
 # ---- cores -------------------------------------------------------------------------------------------------
