@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.counts import Counts
+from mirotwin.fuzz.afl.job import Counts
 from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.spec import spec_of
 

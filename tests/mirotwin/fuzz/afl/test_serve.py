@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mirotwin.fuzz.afl.counts import read_executions
+from mirotwin.fuzz.afl.job import read_executions
 from mirotwin.fuzz.afl.serve import (
     CASES_VARIABLE,
     FIRST_SIGNAL,

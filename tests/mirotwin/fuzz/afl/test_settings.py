@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl import missing, run
-from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
+from mirotwin.fuzz.afl.job import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
 from mirotwin.fuzz.engine import EngineInput
