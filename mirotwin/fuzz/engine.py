@@ -21,8 +21,8 @@ _TOKENS, _TOKEN = 32, 64
 class EngineInput(msgspec.Struct, frozen=True):
     """What an engine begins with. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs.
 
-    `out`: the folder of the campaign, made if it is not there. `dictionary`: a file of words for AFL++. `jobs`: processes,
-    each with a target of its own. `seed`: of the random numbers; the system's where none is given.
+    `out`: the folder of the campaign, made if it is not there. `dictionary`: a file of words for AFL++. `jobs`: so many
+    processes, each with a target of its own. `seed`: of the random numbers; the system's where none is given.
     """
 
     target: str
