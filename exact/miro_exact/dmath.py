@@ -89,6 +89,11 @@ def sincos(x: float) -> tuple[float, float]:
     """(sin x, cos x) of x rad for the price of one reduction. ValueError unless |x| < ANGLE_LIMIT."""
     if not (-_LIMIT < x < _LIMIT):
         raise DomainError(f"angle must be within +-{ANGLE_LIMIT} rad, got {x!r}")
+    return sincos_within(x)
+
+
+def sincos_within(x: float) -> tuple[float, float]:
+    """`sincos` for whoever has seen that |x| < ANGLE_LIMIT."""
     if x < 0.0:
         scaled = x * _INV_PIO2 - 0.5
     else:
@@ -241,6 +246,11 @@ def exp(x: float) -> float:
         raise DomainError("exp of NaN")
     if x > _EXP_MAX:
         raise DomainError(f"exp({x!r}) is beyond float64")
+    return exp_within(x)
+
+
+def exp_within(x: float) -> float:
+    """`exp` for whoever has seen that x is a number up to 709."""
     if x < _EXP_MIN:
         return 0.0
     if -0.34657359027997264 < x < 0.34657359027997264:  # ln 2 / 2
@@ -288,6 +298,11 @@ def log(x: float) -> float:
     """Natural logarithm. ValueError unless x is finite and positive."""
     if not (0.0 < x <= _LARGEST):
         raise DomainError(f"log needs a finite positive number, got {x!r}")
+    return log_within(x)
+
+
+def log_within(x: float) -> float:
+    """`log` for whoever has seen that x is finite and positive."""
     k = 0
     while x < 2.3283064365386963e-10:  # 2**-32
         x = x * 4294967296.0

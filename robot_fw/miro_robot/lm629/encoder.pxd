@@ -25,8 +25,9 @@ cdef class Encoder:
     cdef public long long counts, caught_counts
 
     cpdef void clear(self, int disarm=*) noexcept
-    @cython.locals(clock=cython.longlong, place=cython.int)
     cpdef void set_phases(self, long long tick, int a, int b) noexcept
+    @cython.locals(clock=cython.longlong)
+    cdef void set_place(self, long long tick, int place) noexcept
     cpdef void set_index(self, long long tick, int level) noexcept
     cpdef void arm(self, long long tick) noexcept
     @cython.locals(now=cython.longlong)

@@ -109,7 +109,10 @@ class Encoder:
 
     def set_phases(self, tick: int, a: int, b: int) -> None:
         """Levels of A and B from `tick` on. The first call tells where the wheel stands, nothing counts."""
-        place = (b + b) | (a ^ b)
+        self.set_place(tick, (b + b) | (a ^ b))
+
+    def set_place(self, tick: int, place: int) -> None:
+        """The same; `place` is that of A and B in the forward order."""
         if not self.seen:
             self.seen = 1
             self.quadrature.take(place)

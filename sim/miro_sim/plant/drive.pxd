@@ -7,15 +7,16 @@ from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.rough cimport RoughBody
 
 cdef long long LONGEST_STEP
-cdef double TICK_S
+cdef double TICK_S, _LARGEST, _ANGLES
 
 @cython.final
 cdef class Winding:
     cdef public double current_a
     cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
-    cdef readonly double drive_v, diode_v, drive_ohm, diode_ohm, drive_tau, diode_tau, up_v, down_v
-    cdef double drive_decay[2049]
-    cdef double diode_decay[2049]
+    cdef readonly double drive_v, diode_v, up_v, down_v
+    cdef double ohm[2]
+    cdef double tau[2]
+    cdef double decay[4098]
 
     @cython.locals(longest=int)
     cpdef int after_load(self) except -1
@@ -24,12 +25,12 @@ cdef class Winding:
     cdef inline void _switch(self, int drive) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
     @cython.locals(wait=int, charge=double)
-    cdef double _pass(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(start=double, positive=cython.bint, voltage=double, ohm=double, tau=double, decay=double,
-                   final=double, end=double, crossing=double)
-    cdef double _flow(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(voltage=double, driven=cython.bint, ohm=double, tau=double, final=double)
-    cdef inline double _onward(self, double ticks, double emf_v) except? -7.5
+    cdef double _pass(self, int ticks, double emf_v) noexcept
+    @cython.locals(start=double, positive=cython.bint, driven=cython.bint, voltage=double, tau=double, final=double,
+                   end=double, ratio=double, crossing=double)
+    cdef double _flow(self, int ticks, double emf_v) noexcept
+    @cython.locals(voltage=double, driven=cython.bint, tau=double, final=double)
+    cdef inline double _onward(self, double ticks, double emf_v) noexcept
 
 @cython.final
 cdef class Quadrature:
@@ -75,7 +76,7 @@ cdef class DifferentialDrive(Plant):
         begin=cython.longlong, now=cython.longlong, next_tick=cython.longlong, ticks=cython.int,
         left_nms=double, right_nms=double, half_s=double, most=double, free_left=double, free_right=double,
         left_rub=double, right_rub=double, new_left=double, new_right=double, turned_left=double,
-        turned_right=double, left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
+        turned_right=double, left_m=double, right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
     cdef int _roll(self, long long until, Lm629 left, Lm629 right) except -1
     @cython.final
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)

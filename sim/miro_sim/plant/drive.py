@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# No divisor below is ever zero: `Winding` and `Body` divide by all resistances and lengths when they are made.
 """The drive of one robot: two bridges, two motors, gears, wheels, chassis and encoders behind `Plant`.
 
     battery --> L298 half --U--> winding --i--> shaft impulse --+
@@ -25,6 +27,8 @@ from miro_sim.plant.rough import RoughBody
 
 LONGEST_STEP = 2048  # one PWM period
 TICK_S = 1.0 / 24e6
+_LARGEST = 1.7976931348623157e308
+_ANGLES = 1.6e6  # `dmath.ANGLE_LIMIT`
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
 
@@ -60,12 +64,9 @@ class Winding:
         "off_ticks",
         "drive_v",
         "diode_v",
-        "drive_ohm",
-        "diode_ohm",
-        "drive_tau",
-        "diode_tau",
-        "drive_decay",
-        "diode_decay",
+        "ohm",
+        "tau",
+        "decay",
         "up_v",
         "down_v",
     )
@@ -74,12 +75,10 @@ class Winding:
         motor = params.motor
         self.drive_v = params.battery.voltage_v - params.bridge.drop_v
         self.diode_v = params.battery.voltage_v + 2.0 * params.bridge.diode_v
-        self.diode_ohm = motor.resistance_ohm + params.battery.resistance_ohm
-        self.drive_ohm = self.diode_ohm + params.bridge.drop_ohm
-        self.drive_tau = motor.inductance_h / (self.drive_ohm * TICK_S)  # in ticks
-        self.diode_tau = motor.inductance_h / (self.diode_ohm * TICK_S)
-        self.drive_decay = [dmath.exp(-ticks / self.drive_tau) for ticks in range(LONGEST_STEP + 1)]
-        self.diode_decay = [dmath.exp(-ticks / self.diode_tau) for ticks in range(LONGEST_STEP + 1)]
+        diode_ohm = motor.resistance_ohm + params.battery.resistance_ohm
+        self.ohm = [diode_ohm, diode_ohm + params.bridge.drop_ohm]  # through diodes, through transistors
+        self.tau = [motor.inductance_h / (ohm * TICK_S) for ohm in self.ohm]  # in ticks
+        self.decay = [dmath.exp(-ticks / tau) for tau in self.tau for ticks in range(LONGEST_STEP + 1)]
         self.on_ticks = int(params.bridge.on_delay_s / TICK_S + 0.5)
         self.off_ticks = int(params.bridge.off_delay_s / TICK_S + 0.5)
         self.current_a = 0.0
@@ -114,6 +113,7 @@ class Winding:
         return self._pass(ticks, emf_v)
 
     def _pass(self, ticks: int, emf_v: float) -> float:
+        """The same unchecked; numbers with which nothing can be computed come to NaN."""
         wait = self.wait_ticks
         if wait == 0:
             return self._flow(ticks, emf_v)
@@ -128,24 +128,26 @@ class Winding:
     def _flow(self, ticks: int, emf_v: float) -> float:
         """The charge of an interval in which the bridge does not switch."""
         start = self.current_a
-        if start == 0.0 and self.up_v <= emf_v <= self.down_v:
-            return 0.0  # blocked
-        positive = start > 0.0 or (start == 0.0 and emf_v < self.up_v)
-        voltage = self.up_v if positive else self.down_v
-        if (positive and self.drive > 0) or (not positive and self.drive < 0):
-            ohm = self.drive_ohm
-            tau = self.drive_tau
-            decay = self.drive_decay[ticks]
+        if start > 0.0 or (start == 0.0 and emf_v < self.up_v):
+            positive = True
+            voltage = self.up_v
+            driven = self.drive > 0
+        elif start < 0.0 or emf_v > self.down_v:
+            positive = False
+            voltage = self.down_v
+            driven = self.drive < 0
         else:
-            ohm = self.diode_ohm
-            tau = self.diode_tau
-            decay = self.diode_decay[ticks]
-        final = (voltage - emf_v) / ohm
-        end = final + (start - final) * decay
+            return 0.0  # blocked
+        tau = self.tau[driven]
+        final = (voltage - emf_v) / self.ohm[driven]
+        end = final + (start - final) * self.decay[driven * (LONGEST_STEP + 1) + ticks]
         if (end >= 0.0) == positive or end == 0.0:
             self.current_a = end
             return final * ticks + tau * (start - end)
-        crossing = tau * dmath.log(1.0 - start / final)
+        ratio = 1.0 - start / final
+        if not ratio <= _LARGEST:
+            return ratio - ratio
+        crossing = tau * dmath.log_within(ratio)
         self.current_a = 0.0
         return final * crossing + tau * start + self._onward(ticks - crossing, emf_v)
 
@@ -161,10 +163,9 @@ class Winding:
             driven = self.drive < 0
         else:
             return 0.0
-        ohm = self.drive_ohm if driven else self.diode_ohm
-        tau = self.drive_tau if driven else self.diode_tau
-        final = (voltage - emf_v) / ohm
-        self.current_a = final * (1.0 - dmath.exp(-ticks / tau))
+        tau = self.tau[driven]
+        final = (voltage - emf_v) / self.ohm[driven]
+        self.current_a = final * (1.0 - dmath.exp_within(-ticks / tau))
         return final * ticks - tau * self.current_a
 
     def after_load(self) -> None:
@@ -228,9 +229,9 @@ class Quadrature:
             if chip is None:
                 continue
             if chip.encoder_edges is None:
-                chip.encoder.set_phases(start_tick + after, ((count + 1) >> 1) & 1, (count >> 1) & 1)
+                chip.encoder.set_place(start_tick + after, count & 3)
             else:
-                chip.set_encoder(start_tick + after, ((count + 1) >> 1) & 1, (count >> 1) & 1)
+                chip.set_encoder(start_tick + after, self.a(), self.b())
             if self.counts_per_turn:
                 chip.set_index(start_tick + after, self.index())
 
@@ -333,7 +334,7 @@ class DifferentialDrive(Plant):
             return 0
         begin = self.next_tick
         until = min(tick, _other_tick(left) - 1, _other_tick(right) - 1)
-        if self.rough is None:
+        if self.rough is None and min(begin, left.next_tick, right.next_tick) <= until:
             self._roll(until, left, right)
         while True:
             now = min(self.next_tick, left.next_tick, right.next_tick)
@@ -384,7 +385,10 @@ class DifferentialDrive(Plant):
                         right_m = body.right_m_rad * turned_right
                         half = 0.5 * (right_m - left_m) / body.track_m
                         chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
-                        sine, cosine = dmath.sincos(theta_rad + half)
+                        angle = theta_rad + half
+                        if not -_ANGLES < angle < _ANGLES:
+                            dmath.sincos(angle)  # raises DomainError
+                        sine, cosine = dmath.sincos_within(angle)
                         x_m = x_m + chord_m * cosine
                         y_m = y_m + chord_m * sine
                         theta_rad = theta_rad + 2.0 * half
