@@ -54,8 +54,9 @@ class Guard:
         self.last_seq = 0
         self._decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
 
-    def check(self, data: bytes, place: str = "") -> None:
-        """Reads what is about to be sent. Raises BadInput for what is not allowed."""
+    def check(self, data: bytes, place: str = "") -> list[int]:
+        """Reads what is about to be sent; the numbers of its frames. Raises BadInput for what is not allowed."""
+        numbers = []
         for count, decoder in self._decoders.items():
             for event in decoder.feed(data):
                 if isinstance(event, Received):
@@ -66,6 +67,8 @@ class Guard:
                     if not isinstance(message, TelemetryFrame):
                         self._check(message, place)
                         self.layout, self.last_seq = count, message.seq
+                        numbers.append(message.seq)
+        return numbers
 
     def _check(self, message: TeamFrame | ServiceFrame, place: str) -> None:
         moves, fastest = "", 0.0

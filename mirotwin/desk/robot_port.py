@@ -14,8 +14,6 @@ from __future__ import annotations
 import errno
 import os
 import select
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -40,6 +38,7 @@ from miro_sim.world.events import Cursor, Event, HostLog
 from miro_sim.world.waits import Waits
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.recording.recorder import TOGETHER, Recorder
+from mirotwin.shell.held_signals import held_signals
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -103,7 +102,7 @@ class RobotPort:
 
     `wire`: what went out, and whole answers and the characters between them, as they came; its ticks count from the
     opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
-    answers; `delay_ticks`: from a question to its whole answer, the shortest and the longest of the greeting.
+    answers; `delays`: from each question since the greeting began to its whole answer, in ticks.
     `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: with real-time priority.
     """
 
@@ -124,7 +123,8 @@ class RobotPort:
         self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []
         self.slots: tuple[int, ...] = ()
-        self.delay_ticks = (0, 0)
+        self.delays: list[int] = []
+        self._asked: dict[int, int] = {}
         self.began_tick = self.free_tick = 0
         self.in_period = self.stopped = self.told_to_stop = self.prompt = False
         self._counted: dict[int, tuple[int, int]] = {}
@@ -148,7 +148,7 @@ class RobotPort:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with _undisturbed():
+        with held_signals():
             self.stop()
             if self.prompt:
                 realtime_priority(False)
@@ -222,7 +222,7 @@ class RobotPort:
             raise NotObservable("a character with a bad stop bit")
         if at_tick is not None:
             self.run_to(at_tick)
-        self.guard.check(data)
+        numbers = self.guard.check(data)
         now = self._now
         with self._told():
             self._serial.write(data)
@@ -231,6 +231,7 @@ class RobotPort:
         sent = Transmission(max(now, self.free_tick), DOWN, data)
         self.free_tick = sent.end_tick
         self.wire.append(sent)
+        self._asked |= dict.fromkeys(numbers, sent.tick)
         tick = sent.tick - self.began_tick
         self.log.note(Event(tick=tick, what="sent", data=data))
         return tick
@@ -265,40 +266,35 @@ class RobotPort:
 
     # ---- who is there ------------------------------------------------------------------------------------
 
-    def greet(self, robots: int | None = None, next_seq: int = 0) -> None:
-        """Asks each robot of the network some times, standing; then silence, after which `next_seq` is fresh.
+    def greet(self, robots: int | None = None, sent: Iterable[Transmission] = ()) -> None:
+        """Asks each robot of the network some times, standing; then silence, after which what is `sent` is fresh.
 
         Raises BadInput where no robot answers.
         """
         robots = robots or self.networks[0].spec.robots
-        self._counted, first, cursor = {}, len(self.wire), Cursor(self.log)
-        seq = (next_seq - APART - ROUNDS * robots) % SEQ_MODULUS
-        asked: dict[int, int] = {}
+        self._counted, self.delays, first, cursor = {}, [], len(self.wire), Cursor(self.log)
+        decoder = Decoder(robots)
+        told = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
+        seq = (next(told, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
         self.run_to(BOOT_TICKS)
         for _ in range(ROUNDS * robots):
-            asked[seq] = self.inject(encode(TeamFrame(FrameType.TEAM_ASK, seq, ((0, 0),) * robots), robots))
-            self.run_to(asked[seq] + CONTROL_PERIOD_TICKS)
+            asked = self.inject(encode(TeamFrame(FrameType.TEAM_ASK, seq, ((0, 0),) * robots), robots))
+            self.run_to(asked + CONTROL_PERIOD_TICKS)
             seq = (seq + 1) % SEQ_MODULUS
         self.run_to(self.tick + PAUSE_TICKS)
-        heard = [(event.tick, answer_of(event.frame)) for _, event in cursor.read() if event.frame]
-        delays, counted = [], {}
-        for tick, said in heard:
-            if said is not None and said.seq in asked and said.slot == said.seq % robots:
-                delays.append(tick - asked[said.seq])
+        counted = {}
+        for said in [answer_of(event.frame) for _, event in cursor.read() if event.frame]:
+            if said is not None and said.slot == said.seq % robots:
                 since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
                 counted[said.slot] = (said.accepted + since, said.rejected)
-        if not delays:
+        if not counted:
             self._keep(self._decoder.flush(), self._heard_tick)
-            raise BadInput(self.url, "", *self._why_nobody(robots, first, bool(heard)))
-        self.slots, self.delay_ticks, self._counted = (
-            tuple(sorted(counted)),
-            (min(delays), max(delays)),
-            counted,
-        )
+            raise BadInput(self.url, "", *self._why_nobody(robots, first))
+        self.slots, self._counted = tuple(sorted(counted)), counted
         self.began_tick = self._now
         self.waits = Waits(cast("World", self))
 
-    def _why_nobody(self, robots: int, first: int, answered: bool) -> tuple[str, str]:
+    def _why_nobody(self, robots: int, first: int) -> tuple[str, str]:
         """What came instead of answers, and what to do."""
         came = b"".join(one.data for one in self.wire[first:] if one.direction == UP)
         asked = f"no robot of a network of {robots} answers {ROUNDS * robots} questions"
@@ -306,7 +302,7 @@ class RobotPort:
             return f"{asked}: nothing comes", "is it switched on, and is this its radio's port?"
         if any(isinstance(event, Received) for event in Decoder(robots).feed(came)):
             return f"{asked}: the port echoes what is sent", "turn the echo of the adapter off"
-        if answered:
+        if self.delays:
             return f"{asked}, but others answer", "is it a network of another size?"
         what = f"{asked}: {len(came)} characters come that are no answer, {came[:6].hex(' ')} .."
         return what, "is this the radio's port, and is its rate 9600 baud?"
@@ -348,6 +344,8 @@ class RobotPort:
             if isinstance(one, Received):
                 said = answer_of(one)
                 slot = -1 if said is None else said.slot
+                if said is not None and said.seq in self._asked:
+                    self.delays.append(now - self._asked[said.seq])
                 frame = self._from_zero(one, slot)
                 self.log.note(Event(tick=now - self.began_tick, what="answer", value=slot, frame=frame))
 
@@ -420,15 +418,3 @@ def realtime_priority(wanted: bool = True) -> bool:
         os.sched_setscheduler(0, getattr(os, policy), os.sched_param(int(wanted)))
         return wanted
     return False
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Within it no second Ctrl-C interrupts the stop frames."""
-    numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

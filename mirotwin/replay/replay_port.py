@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import BinaryIO
 
 import msgspec
 import tomli_w
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_protocol.decoder import Decoder
-from miro_protocol.events import Received
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
@@ -22,7 +17,7 @@ from miro_sim.scenario.file import changed
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.live import live_settings
 from mirotwin.desk.guard import DeskOptions, Guard
-from mirotwin.desk.robot_port import PORT, RobotPort, realtime_priority
+from mirotwin.desk.robot_port import PORT, RobotPort
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json
@@ -53,17 +48,14 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
         job.scenario, job.seed, job.runs_on, job.firmware if job.runs_on is job.image else b""
     )
     robots = job.scenario.networks[0].robots
-    decoder = Decoder(robots)
-    numbers = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
     with ExitStack() as files:
         files.enter_context(folder)
-        stream = _WrittenApart(files.enter_context(folder.part(RECORDING).open("wb")))
-        files.callback(stream.close)
+        stream = files.enter_context(folder.part(RECORDING).open("wb"))
         recorder = files.enter_context(Recorder(stream, source))
         with RobotPort(desk, job.scenario, job.file, recorder) as port:
-            port.greet(next_seq=next(numbers, 0))
+            port.greet(sent=sent)
             folder.keep = (RECORDING,)  # of a talk that was broken off
-            shortest, longest = (ticks / TICKS_PER_MS for ticks in port.delay_ticks)
+            shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS
             slots = f"{', '.join(map(str, port.slots))} of {robots}"
             complain(
                 f"{port.url}: robot {slots} answers, {shortest:.1f} to {longest:.1f} ms after a question"
@@ -81,38 +73,6 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     told = f"99 % less than {of_99:.2f} ms late, all less than {late[-1]:.2f} ms"
     complain(f"{len(sent)} transmissions sent, {told}{hint}")
     return folder.path / RECORDING
-
-
-class _WrittenApart:
-    """A file that a thread of its own writes: a disk that is busy makes no transmission late."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._thread = ThreadPoolExecutor(
-            1, initializer=realtime_priority
-        )  # else who holds the GIL waits for others
-        self._under_way: list[Future[int | None]] = []
-
-    def _do(self, what: Callable[..., int | None], *given: object) -> None:
-        while self._under_way and self._under_way[0].done():
-            self._under_way.pop(0).result()
-        self._under_way.append(self._thread.submit(what, *given))
-
-    def write(self, data: bytes | memoryview) -> int:
-        self._do(self._file.write, bytes(data))
-        return len(data)
-
-    def seek(self, place: int) -> int:
-        self._do(self._file.seek, place)
-        return place
-
-    def flush(self) -> None:
-        self._do(self._file.flush)
-
-    def close(self) -> None:
-        self._thread.shutdown()
-        for one in self._under_way:
-            one.result()
 
 
 def _sendable(job: Job, desk: DeskOptions) -> list[Transmission]:

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from mirotwin.desk.robot_port import RobotPort
 from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
 from mirotwin.verify.conform.table import ALL, RULES
 from tests.mirotwin.desk.rig import ROBOT
@@ -34,6 +35,20 @@ def test_what_is_not_observable_are_rules():
 def test_the_shipped_firmware_passes_each_rule_that_answers_show(mirotwin, rule):
     found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])
     assert (found[rule]["verdict"], found[rule]["why"]) == ("passed", None)
+
+
+@pytest.mark.parametrize("rule", ["P41", "P43", "P44", "P45"])
+def test_an_adapter_that_keeps_characters_for_16_ms_lets_no_rule_fail(mirotwin, monkeypatch, rule):
+    read, kept = RobotPort._read, []
+
+    def late(port, wait_ticks):
+        kept.append((port._now + 16 * 24_000, read(port, min(wait_ticks, 24_000))))
+        come = [data for due_tick, data in kept if due_tick <= port._now]
+        del kept[: len(come)]
+        return b"".join(come)
+
+    monkeypatch.setattr(RobotPort, "_read", late)
+    assert verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])[rule]["verdict"] == "passed"
 
 
 def test_what_answers_do_not_show_is_never_passed(mirotwin):
