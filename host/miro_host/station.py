@@ -4,10 +4,16 @@ from collections import deque
 from collections.abc import Sequence
 
 from miro_exact.state import Rows
+from miro_protocol import crc
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
-from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, FrameType
+from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, VELOCITY, FrameType, downlink
+from miro_protocol.whitening import STRING
 
 _WIDE = 8  # bytes of a value in a saved service frame
+_FASTEST = VELOCITY[0].high
+_SEQ_MODULUS = SEQ_MODULUS
+_XOR_OUT = crc.XOR_OUT
+assert all((field.size, field.low, field.high) == (2, -_FASTEST, _FASTEST) for field in VELOCITY)
 
 
 def _split_service(frame: ServiceFrame) -> tuple[int, int, bytes]:
@@ -40,7 +46,7 @@ class Station:
         "team_frames_since_service": ("q", 0, SERVICE_EVERY - 1),
         "services": Rows(1 << 16, "B", "B", "s", split=_split_service, make=_make_service),
     }
-    NOT_STATE = ("n", "telemetry")
+    NOT_STATE = ("n", "telemetry", "_kind", "_frame", "_size", "_body", "_table", "_start", "_white")
 
     def __init__(self, n: int, telemetry: bool = True) -> None:
         if n not in ROBOT_COUNTS:
@@ -50,6 +56,16 @@ class Station:
         self.seq = 0
         self.team_frames_since_service = SERVICE_EVERY - 1
         self.services: deque[ServiceFrame] = deque()
+        form = downlink(n)
+        self._kind = int(FrameType.TEAM_ASK if telemetry else FrameType.TEAM)
+        self._frame = bytearray(64)  # lead and sync, and what was sent last
+        self._body = len(form.lead) + len(form.sync)  # where HDR is
+        self._size = form.wire_size
+        for place, byte in enumerate(form.lead + form.sync):
+            self._frame[place] = byte
+        self._table = crc.byte_table()
+        self._start = crc.register(bytes([form.layout]))
+        self._white = STRING
 
     def __repr__(self) -> str:
         return f"Station(n={self.n}, telemetry={self.telemetry}, seq={self.seq}, queued={len(self.services)})"
@@ -66,16 +82,44 @@ class Station:
         In a period whose frame is a service frame the commands are checked and dropped; robots keep their velocities.
         ValueError naming slot, value and limits when a command may not be sent; nothing is used up then.
         """
-        kind = FrameType.TEAM_ASK if self.telemetry else FrameType.TEAM
-        data = encode(TeamFrame(kind, self.seq, tuple(commands)), self.n)
+        if self._fill(commands):
+            data = bytes(self._frame[: self._size])
+        else:
+            data = encode(TeamFrame(self._kind, self.seq, tuple(commands)), self.n)
         if self.services and self.team_frames_since_service >= SERVICE_EVERY - 1:
             service = self.services.popleft()
             data = encode(ServiceFrame(self.seq, service.slot, service.opcode, service.values), self.n)
             self.team_frames_since_service = 0
         else:
             self.team_frames_since_service = min(self.team_frames_since_service + 1, SERVICE_EVERY - 1)
-        self.seq = (self.seq + 1) % SEQ_MODULUS
+        self.seq = (self.seq + 1) % _SEQ_MODULUS
         return data
+
+    def _fill(self, commands: Sequence[tuple[int, int]]) -> bool:
+        """Puts a team frame into `_frame`, as `encode` makes it; False for what `encode` has to judge."""
+        if len(commands) != self.n:
+            return False
+        self._frame[self._body] = self._kind * _SEQ_MODULUS + self.seq
+        end = self._body + 1
+        for pair in commands:
+            if type(pair) is not tuple or len(pair) != 2:
+                return False
+            for value in pair:
+                if type(value) is not int or not -_FASTEST <= value <= _FASTEST:
+                    return False
+                word = value
+                self._frame[end] = word & 0xFF
+                self._frame[end + 1] = word >> 8 & 0xFF
+                end += 2
+        register = self._start
+        for place in range(self._body, end):
+            register = register >> 8 ^ self._table[(register ^ self._frame[place]) & 0xFF]
+        register ^= _XOR_OUT
+        self._frame[end] = register & 0xFF
+        self._frame[end + 1] = register >> 8
+        for place in range(self._body, self._size):
+            self._frame[place] ^= self._white[place - self._body]
+        return True
 
     def after_load(self) -> None:
         """Raises ValueError for a service frame that may not be sent."""

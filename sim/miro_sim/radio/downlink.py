@@ -20,6 +20,8 @@ from miro_sim.radio.listener import Listener
 from miro_sim.radio.params import Radio
 from miro_sim.radio.sender import Sender
 
+_BIT = HOST_BIT_TICKS
+_CHARACTER_TICKS = HOST_CHARACTER_TICKS
 MEMORY_TICKS = 2 * HOST_BIT_TICKS
 """How long another network's transmission is kept after its end: a bit that it spoilt may still be going on."""
 
@@ -46,7 +48,7 @@ class Downlink:
         "overheard": [Sender],
     }
     NOT_STATE = (
-        *("audience", "jitter", "jitter_ticks", "lost", "lost_threshold"),
+        *("audience", "everyone", "jitter", "jitter_ticks", "lost", "lost_threshold"),
         *("name", "params", "punctual", "seed"),
     )
 
@@ -60,6 +62,7 @@ class Downlink:
         self.lost_threshold = params.lost_frame_threshold
         self.punctual = self.jitter_ticks == 0 and params.bit_ticks == HOST_BIT_TICKS
         self.listeners: dict[int, Listener] = {}
+        self.everyone: list[Listener] = []  # of them, in the order in which they were connected
         self.sender = Sender(params, params.crystal_offset_ppm)
         self.overheard: list[Sender] = []
         self.audience: list[tuple[Downlink, Sender]] = []
@@ -78,6 +81,7 @@ class Downlink:
             raise ValueError(f"{self.name}: robot {robot} is connected twice, or after tick 0")
         listener = Listener(line, self.params, self.seed, f"{self.name}/robot{robot}")
         self.listeners[robot] = listener
+        self.everyone.append(listener)
         line.settled_tick = 0  # an open wire stays at mark
         return listener
 
@@ -107,39 +111,39 @@ class Downlink:
             )
         lead = 0 if self.sender.always_on else self.sender.keyup
         key_tick = max(start_tick - lead, 0) + self.sender.latency
-        links, senders = [self], [self.sender]
-        for listening, sender in self.audience:
-            links.append(listening)
-            senders.append(sender)
-        for link in links:
-            if key_tick < link.settled_tick:
-                raise TransmissionError(
-                    f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
-                    f" but they are settled up to {link.settled_tick}"
-                )
-        check_bad_stop(bad_stop, len(data))
-        stops = bytearray(len(data) if bad_stop else 0)
-        for place in bad_stop:
-            stops[place] = 1
-        on_air = bytes(data), bytes(stops)
-        late = self.jitter.u32(start_tick // HOST_BIT_TICKS) * (self.jitter_ticks + 1) >> 32
+        self._check_settled(start_tick, key_tick, self.settled_tick)
+        for link, _ in self.audience:
+            self._check_settled(start_tick, key_tick, link.settled_tick)
+        stops = b""
+        if bad_stop:
+            check_bad_stop(bad_stop, len(data))
+            stops = bytes([place in bad_stop for place in range(len(data))])
+        slot = start_tick // _BIT
+        late = self.jitter.u32(slot) * (self.jitter_ticks + 1) >> 32 if self.jitter_ticks else 0
         arrival = max(start_tick + self.sender.latency + late, self.busy_tick)
-        for sender in senders:
-            sender.transmissions.append((arrival, *on_air))
-        air_ticks = len(data) * HOST_CHARACTER_TICKS
+        on_air = arrival, bytes(data), stops
+        air_ticks = len(data) * _CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
-        self.busy_tick = max(arrival + air_ticks, self.sender.end(len(self.sender.transmissions) - 1))
-        if self.lost.below(start_tick // HOST_BIT_TICKS, self.lost_threshold):
-            for sender in senders:
-                sender.transmissions.pop()
+        self.busy_tick = max(arrival + air_ticks, self.sender.end_of(arrival, len(data)))
+        if not self.lost_threshold or not self.lost.below(slot, self.lost_threshold):
+            self.sender.transmissions.append(on_air)
+            for _, sender in self.audience:
+                sender.transmissions.append(on_air)
         return self.free_tick
+
+    def _check_settled(self, start_tick: int, key_tick: int, settled_tick: int) -> None:
+        if key_tick < settled_tick:
+            raise TransmissionError(
+                f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
+                f" but they are settled up to {settled_tick}"
+            )
 
     def settle(self, until_tick: int) -> None:
         """Makes every listener's line final for ticks below `until_tick`; no effect if it is already."""
         if until_tick <= self.settled_tick:
             return
         senders = [self.sender, *self.overheard]
-        for listener in self.listeners.values():
+        for listener in self.everyone:
             listener.fill(self.settled_tick, until_tick, senders, 0)
             listener.line.settled_tick = until_tick
         self.settled_tick = until_tick

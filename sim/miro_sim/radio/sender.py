@@ -60,7 +60,11 @@ class Sender:
     def end(self, index: int) -> int:
         """Tick at which the last stop bit of a waiting transmission is over."""
         start, data, _ = self.transmissions[index]
-        return self.begin(start, _CHARACTER * len(data))
+        return self.end_of(start, len(data))
+
+    def end_of(self, start: int, count: int) -> int:
+        """The same of `count` characters from `start` on."""
+        return self.begin(start, _CHARACTER * count)
 
     def bit(self, data: bytes, stops: bytes, number: int) -> int:
         """The level at the beginning of bit `number` of these characters."""

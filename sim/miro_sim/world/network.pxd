@@ -1,5 +1,7 @@
 # C layout of miro_sim.world.network.
 cimport cython
+from miro_host.station cimport Station
+from miro_sim.radio.downlink cimport Downlink
 from miro_sim.radio.uplink cimport Uplink
 from miro_sim.world.robot cimport Robot
 
@@ -7,8 +9,10 @@ cdef long long SETTLE_TICKS
 
 
 cdef class Network:
-    cdef readonly object spec, index, station, downlink, telemetry, actions, outbox, log
+    cdef readonly object spec, index, telemetry, actions, outbox, log
     cdef public object sight
+    cdef readonly Station station
+    cdef readonly Downlink downlink
     cdef readonly Uplink uplink
     cdef readonly list robots, noisy_commands
     cdef readonly str host

@@ -111,7 +111,8 @@ class Outbox:
 
     def _add(self, one: Waiting) -> None:
         self.waiting.append(one)
-        self.waiting.sort(key=lambda one: one.sent.tick)
+        if len(self.waiting) > 1:
+            self.waiting.sort(key=lambda one: one.sent.tick)
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
@@ -119,6 +120,8 @@ class Outbox:
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
+        if not self.waiting:
+            return []
         count = 0
         while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
             count += 1

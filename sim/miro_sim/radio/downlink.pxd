@@ -1,0 +1,27 @@
+# C layout of miro_sim.radio.downlink.
+cimport cython
+from miro_exact.rng cimport Stream
+from miro_sim.radio.listener cimport Listener
+from miro_sim.radio.sender cimport Sender
+
+cdef long long _BIT, _CHARACTER_TICKS
+
+
+cdef class Downlink:
+    cdef readonly object params, seed, name
+    cdef readonly Stream jitter, lost
+    cdef readonly long long jitter_ticks, lost_threshold
+    cdef readonly bint punctual
+    cdef readonly dict listeners
+    cdef readonly Sender sender
+    cdef readonly list everyone, overheard, audience
+    cdef readonly long long settled_tick, free_tick, busy_tick
+
+    @cython.locals(
+        lead='long long', key_tick='long long', slot='long long', late='long long', arrival='long long', air_ticks='long long',
+        link=Downlink, sender=Sender, stops=bytes
+    )
+    cpdef long long send(self, long long start_tick, data, tuple bad_stop=*) except? -1
+    cdef int _check_settled(self, long long start_tick, long long key_tick, long long settled_tick) except -1
+    @cython.locals(listener=Listener, sender=Sender, senders=list)
+    cpdef settle(self, long long until_tick)
