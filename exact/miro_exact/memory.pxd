@@ -26,6 +26,7 @@ cdef class Memory:
     cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1
     cpdef put(self)
     cdef Py_ssize_t size(self) except -1
+    cdef int write(self, char *to) except -1
     cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1
 
 

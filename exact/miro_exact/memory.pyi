@@ -7,6 +7,7 @@ class Memory:
     def put(self) -> None: ...
 
 NUMBER: int
+MEMORY: int
 ITEMS: int
 OCTETS: int
 ROW: int

@@ -106,7 +106,11 @@ cdef class Memory:
     cpdef bytes pack(self):
         """The fields as flat bytes. Raises DomainError for NaN, with the name of the field."""
         cdef bytes data = PyBytes_FromStringAndSize(NULL, self.size())
-        cdef char *to = PyBytes_AS_STRING(data)
+        self.write(PyBytes_AS_STRING(data))
+        return data
+
+    cdef int write(self, char *to) except -1:
+        """Puts the fields there; `size` says how many bytes they are."""
         cdef Py_ssize_t index, item
         cdef long long count
         cdef unsigned int written
@@ -129,7 +133,7 @@ cdef class Memory:
             to += 4
             copy(to, place.at, place.size, count)
             to += place.size * count
-        return data
+        return 0
 
     cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1:
         """Where what `pack` gave ends in `data`. Raises ValueError for bytes that cannot be put, and puts nothing."""
@@ -208,15 +212,16 @@ cdef class Memory:
             source += place.size * count
 
 
-NUMBER, ITEMS, OCTETS, ROW, ROWS = range(5)
-cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW
+NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY = range(6)
+cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW, _MEMORY = MEMORY
 
 
 cdef class Attributes:
-    """Fields that are Python objects, packed in one go.
+    """Fields that are Python objects, and a Memory wherever some are not, packed in one go.
 
     Each is (part, name, shape, codes, number of items, split): the shape is NUMBER or one of its neighbours, the codes
-    are those of the cells, a number that is no array has 0 items. `slow` packs the same fields, and says what is wrong
+    are those of the cells, a number that is no array has 0 items. A Memory is the part of a field that is all of it.
+    `slow` packs the same fields, and says what is wrong
     with one: where a value is odd, it is asked.
     """
 
@@ -232,10 +237,14 @@ cdef class Attributes:
     cpdef bytes pack(self):
         """The fields as flat bytes. Raises what `slow` raises."""
         cdef tuple field
+        cdef Memory memory
         self.used = 0
         try:
             for field in self.fields:
-                if self.add(getattr(field[0], field[1]), field[2], field[3], field[4], field[5]):
+                if field[2] == _MEMORY:
+                    memory = field[0]
+                    memory.write(self.room(memory.size()))
+                elif self.add(getattr(field[0], field[1]), field[2], field[3], field[4], field[5]):
                     return self.slow()
         except Exception:
             return self.slow()

@@ -358,15 +358,15 @@ class Flat:
 
 
 def _together(blocks: list[Block]) -> list[Block]:
-    """The same blocks for packing alone: neighbours that are Python objects become one."""
+    """The same blocks for packing alone: neighbours become one, but for those that only `fields` can pack."""
     from miro_exact.memory import Attributes
 
     found: list[Block] = []
     for simple, group in groupby(blocks, _is_simple):
         together: list[Any] = list(group)
         if simple:
-            fields = [field for block in together for field in block.fields]
-            packed = Attributes([_attribute(field) for field in fields], partial(_pack_each, together))
+            parts = [part for block in together for part in _attributes(block)]
+            packed = Attributes(parts, partial(_pack_each, together))
             together = [packed]
         found += together
     return found
@@ -374,10 +374,20 @@ def _together(blocks: list[Block]) -> list[Block]:
 
 def _is_simple(block: Block) -> bool:
     """Whether `Attributes` can pack it."""
-    kinds = [field.kind for field in block.fields] if isinstance(block, One | Some) else []
-    return bool(kinds) and all(
-        not isinstance(kind, Queue) and set(kind.form) <= _PACKED_CODES for kind in kinds
+    if not isinstance(block, One | Some):
+        return True
+    return all(
+        not isinstance(field.kind, Queue) and set(field.kind.form) <= _PACKED_CODES for field in block.fields
     )
+
+
+def _attributes(block: Any) -> list[tuple[Any, ...]]:
+    """What `memory.pyx` has to know of the fields of a block."""
+    from miro_exact import memory
+
+    if isinstance(block, memory.Memory):
+        return [(block, "", memory.MEMORY, "", 0, None)]
+    return [_attribute(field) for field in block.fields]
 
 
 def _attribute(field: StateField) -> tuple[Any, ...]:

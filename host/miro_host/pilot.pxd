@@ -1,13 +1,19 @@
 # C layout of miro_host.pilot.
 cimport cython
+from miro_host.integrator cimport Integrator
 
 
 cdef class Pilot:
-    cdef readonly object reference, law, estimator, wheels, integrator
+    cdef readonly object reference, law, estimator, wheels
+    cdef readonly Integrator integrator
+    cdef object _asked
+    cdef double _asked_s
     cdef public object command
     cdef readonly double reference_lead_s, dead_s, units_per_m_s
 
+    @cython.locals(z=Integrator, units=double, v_m_s=double, w_rad_s=double, at_s=double)
     cpdef update(self, measured, double t_s, telemetry=*)
+    cpdef reference_at(self, double t_s)
     cdef _estimate(self, given)
     cdef _ask(self, given)
 

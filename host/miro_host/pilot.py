@@ -5,7 +5,6 @@ says why). Before the first measurement the command is zero. Without an estimate
 left alone and the last command is repeated.
 """
 
-import math
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +20,7 @@ from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInp
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at
-from miro_host.references.interface import Trajectory
+from miro_host.references.interface import Reference, Trajectory
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels
 
@@ -49,6 +48,8 @@ _LARGEST = sys.float_info.max
 _FASTEST = 0x8000  # what a frame holds
 LARGEST_FACTOR = 2.0
 """A wheel's radius over the nominal one stays between this and its inverse."""
+_INFINITY = float("inf")
+_LEAST_FACTOR = 1.0 / LARGEST_FACTOR
 STANDSTILL = WheelCommand(0, 0, 0.0, 0.0)
 
 
@@ -68,7 +69,10 @@ class Pilot:
         "estimator": Estimator,
         "numbers": Items("d", 0xFFFF, -_LARGEST, _LARGEST),
     }
-    NOT_STATE = ("reference", "reference_lead_s", "dead_s", "wheels", "units_per_m_s", "command")
+    NOT_STATE = (
+        *("reference", "reference_lead_s", "dead_s", "wheels", "units_per_m_s", "command"),
+        *("_asked", "_asked_s"),
+    )
 
     def __init__(
         self,
@@ -83,6 +87,8 @@ class Pilot:
         dead_s: float = DEAD_S,
     ) -> None:
         self.reference = reference
+        self._asked: Reference | None = None  # the reference at `_asked_s`
+        self._asked_s = 0.0
         self.law = law
         self.estimator: Estimator[Any] = NoEstimator().estimator() if estimator is None else estimator
         self.wheels = Wheels() if wheels is None else wheels
@@ -106,36 +112,35 @@ class Pilot:
         Raises PluginError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
         z, units = self.integrator, self.units_per_m_s
-        sent = self.command.left / units, self.command.right / units
+        v_m_s, w_rad_s = z.v_m_s, z.w_rad_s
+        left_m_s, right_m_s = self.command.left / units, self.command.right / units
         estimate = self._estimate(
-            EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, telemetry, self.dead_s)
+            EstimatorInput(
+                t_s, z.period_s, measured, v_m_s, w_rad_s, left_m_s, right_m_s, telemetry, self.dead_s
+            )
         )
         if estimate is None:
             return self.command
         at_s = estimate.t_s + self.reference_lead_s
-        reference = self.reference.at(at_s)
-        answer = self._ask(
-            LawInput(
-                t_s=at_s,
-                period_s=z.period_s,
-                reference=reference,
-                path=self.reference,
-                posture=estimate.posture,
-                v_m_s=z.v_m_s,
-                w_rad_s=z.w_rad_s,
-                telemetry=telemetry,
-            )
-        )
+        path, reference, posture = self.reference, self.reference_at(at_s), estimate.posture
+        answer = self._ask(LawInput(at_s, z.period_s, reference, path, posture, v_m_s, w_rad_s, telemetry))
         inner = {name: answer.inner[name] for name in self.law.INNER}
         if isinstance(answer, Accelerations):
             z.step(answer.v_dot_m_s2, answer.w_dot_rad_s2)  # equation (15)
         else:
             z.go_to(answer.v_m_s, answer.w_rad_s)
-        factors = estimate.left_factor, estimate.right_factor
-        left, right = self.wheels.command(z.v_m_s, z.w_rad_s, *factors)
+        left_factor, right_factor = estimate.left_factor, estimate.right_factor
+        left, right = self.wheels.command(z.v_m_s, z.w_rad_s, left_factor, right_factor)
         named = {name: estimate.inner[name] for name in self.estimator.INNER}
-        self.command = WheelCommand(left, right, z.v_m_s, z.w_rad_s, inner, *factors, named)
+        self.command = WheelCommand(left, right, z.v_m_s, z.w_rad_s, inner, left_factor, right_factor, named)
         return self.command
+
+    def reference_at(self, t_s: float) -> Reference:
+        """The reference at `t_s`: a function of time, which the law and the recording both ask for one instant."""
+        if self._asked is None or self._asked_s != t_s:
+            self._asked = self.reference.at(t_s)
+            self._asked_s = t_s
+        return self._asked
 
     def _estimate(self, given: EstimatorInput) -> Estimate | None:
         """The estimator's answer, checked like a law's."""
@@ -227,7 +232,7 @@ def check_estimate(estimate: object, inner: tuple[str, ...]) -> None:
 
 
 def _check_factors(left: float, right: float) -> None:
-    if not all(1.0 / LARGEST_FACTOR <= factor <= LARGEST_FACTOR for factor in (left, right)):
+    if not (_LEAST_FACTOR <= left <= LARGEST_FACTOR and _LEAST_FACTOR <= right <= LARGEST_FACTOR):
         raise ValueError(f"the wheel factors ({left}, {right}) are those of no robot")
 
 
@@ -239,5 +244,6 @@ def _check_inner(values: Mapping[str, float], declared: tuple[str, ...]) -> None
 
 
 def _check(name: str, value: object) -> None:
-    if type(value) is not float or not math.isfinite(value):
+    real = value if type(value) is float else _INFINITY
+    if real - real != 0.0:
         raise ValueError(f"`step` returned {name} = {str(value)[:40]}, which is not a finite float")

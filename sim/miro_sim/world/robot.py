@@ -144,7 +144,7 @@ class Robot:
         x_m, y_m, theta_rad = self.drive.pose_at(tick)
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
         try:
-            reference = self.reference.at(seconds(tick)).posture
+            reference = self.pilot.reference_at(seconds(tick)).posture
         except PluginError as error:
             raise self._named(error, tick) from error
         return RobotPeriod(
