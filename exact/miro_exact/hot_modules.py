@@ -23,14 +23,16 @@ def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
     """Dotted name -> source file of every hot module below the given package folders."""
     found = {}
     for package, folder in package_dirs.items():
-        for inner, _, files in os.walk(
+        root = len(os.fspath(folder))
+        for inner, folders, files in os.walk(
             folder
-        ):  # quicker than `rglob`, and every start of a program waits for it
+        ):  # quicker than `rglob`: every start of a program waits for it
+            folders[:] = [name for name in folders if name != "__pycache__"]
+            within = f"{package}{inner[root:]}".replace(os.sep, ".")
             for stem in (name[:-4] for name in files if name.endswith(".pxd")):
                 for source in (f"{stem}.py", f"{stem}.pyx"):
                     if source in files:
-                        parts = os.path.relpath(os.path.join(inner, stem), folder).split(os.sep)
-                        found[".".join((package, *parts))] = Path(inner, source)
+                        found[f"{within}.{stem}"] = Path(inner, source)
     return dict(sorted(found.items()))
 
 
@@ -77,7 +79,8 @@ def _layout(name: str, cimported: dict[str, list[str]]) -> set[str]:
 
 
 def _text(path: Path) -> bytes:
-    return path.read_bytes().replace(b"\r\n", b"\n")
+    text = path.read_bytes()
+    return text.replace(b"\r\n", b"\n") if b"\r" in text else text  # to look for one byte is quicker
 
 
 def compiled_file(source: Path) -> Path | None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import errno
 import os
 import stat
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -238,6 +237,8 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     """
     check_file(path, option)
     target = path.resolve()
+    import tempfile  # slow to load
+
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
     try:
         handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)

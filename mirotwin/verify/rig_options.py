@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +131,7 @@ def _near(path: str | Path, folder: Path) -> Path:
 @lru_cache(64)
 def silent_scenario(settings: tuple[str, ...]) -> Scenario:
     """The scenario of a test that names none, with these settings: read once for all that want the same."""
-    text = (resources.files("mirotwin.testing") / "silent.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "testing" / "silent.toml").read_text(encoding="utf-8")
     return parse(text, "silent", settings)
 
 

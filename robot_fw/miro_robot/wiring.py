@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import tomllib
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
@@ -136,7 +135,7 @@ def load_wiring(path: Path | None = None) -> Wiring:
 @cache
 def _miro() -> Wiring:
     """The MIRO board, read once: every robot of a world has one."""
-    return _wiring(resources.files("miro_robot.boards").joinpath("miro.toml").read_text("utf-8"), "miro.toml")
+    return _wiring((Path(__file__).parent / "boards" / "miro.toml").read_text("utf-8"), "miro.toml")
 
 
 def _wiring(text: str, origin: str) -> Wiring:

@@ -7,8 +7,8 @@ Foxglove's form. So what reads recordings reads it too. The same recording gives
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
 from io import BytesIO
+from pathlib import Path
 
 import msgspec
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
@@ -42,7 +42,7 @@ def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
 
 @cache
 def _published(name: str) -> bytes:
-    return (resources.files("mirotwin.report.foxglove") / "schemas" / f"{name}.json").read_bytes()
+    return (Path(__file__).parent / "schemas" / f"{name}.json").read_bytes()
 
 
 FAULT = "fault"

@@ -95,7 +95,7 @@ def parse_map(text: str) -> MapFile:
     area = space = ""
     first = end = 0
     for number, line in enumerate(text.splitlines(), start=1):
-        if head := _map_area(line):
+        if " = " in line and (head := _map_area(line)):
             area, first, size, attributes = head
             space = _map_space(area, attributes)
             end = first + size if "CODE" in attributes and "REL" in attributes else 0

@@ -6,7 +6,7 @@ Nothing but `ScenarioError` leaves these functions, whatever the text.
 import re
 import tomllib
 from collections.abc import Callable, Sequence
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -24,6 +24,7 @@ from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.text import check_integers, check_size, written
 from miro_sim.scenario.variants import VariantError, with_variant
 
+_BUILTIN = Path(__file__).parent / "builtin"
 Also = Callable[[Scenario, str], object]
 """Another check of a scenario, whose origin is the second argument: raises ScenarioError."""
 
@@ -47,9 +48,7 @@ class ScenarioText(msgspec.Struct, frozen=True):
 
 def builtin_names() -> list[str]:
     """Names of the scenarios that come with the package, sorted, numbers in them by their value."""
-    folder = resources.files("miro_sim.scenario") / "builtin"
-    names = [entry.name[: -len(".toml")] for entry in folder.iterdir() if entry.name.endswith(".toml")]
-    return sorted(names, key=_by_number)
+    return sorted((entry.stem for entry in _BUILTIN.glob("*.toml")), key=_by_number)
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:
@@ -63,7 +62,7 @@ def builtin_text(name: str) -> str:
     if name not in names:
         remedy = f"built-in scenarios: {', '.join(names)}; a file needs a path that ends in .toml"
         raise ScenarioError(name, "", "no such scenario", did_you_mean(name, names, remedy))
-    return (resources.files("miro_sim.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
+    return (_BUILTIN / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:

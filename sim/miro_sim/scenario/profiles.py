@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from miro_exact.bad_input import BadInput, did_you_mean
@@ -24,7 +24,7 @@ class ProfileError(BadInput):
 @cache
 def profiles() -> Mapping[str, Mapping[str, Any]]:
     """Name -> `about` and keys of the profiles that come with the package, in the order of their file."""
-    text = (resources.files("miro_sim.scenario") / "profiles.toml").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("profiles.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 

@@ -8,7 +8,7 @@ it. In a file (`variant = "ideal"`) it is a default: keys that the file gives wi
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from miro_exact.bad_input import BadInput, did_you_mean
@@ -39,7 +39,7 @@ class VariantError(BadInput):
 @cache
 def variants() -> Mapping[str, Mapping[str, Any]]:
     """Name -> `about` and keys of the variants, in the order of their file."""
-    text = (resources.files("miro_sim.scenario") / "variants.toml").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("variants.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 
