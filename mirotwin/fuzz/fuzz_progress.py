@@ -5,56 +5,49 @@ This is one of the few places that know the wall clock.
 
 from __future__ import annotations
 
-import sys
 import time
-from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from mirotwin.fuzz.campaign import Status
 from mirotwin.shell.program import complain
+from mirotwin.shell.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import ProgressColumn
 
 LINE_S = 10.0
 """Wall time between two plain lines, where stderr is no terminal."""
 
 
-class FuzzProgress:
+class FuzzProgress(ProgressBar):
     """A context manager; `show(status)` may be called as often as one likes. `time_s` None: no end is known."""
 
+    PATIENCE_S = 0.0
+
     def __init__(self, what: str, time_s: float | None, quiet: bool = False) -> None:
-        stream = vars(sys)["stderr"]
-        self.time_s = time_s
+        super().__init__(f"fuzzing {what}", time_s, quiet)
         self._quiet = quiet
-        self._live = not quiet and stream is not None and stream.isatty()
-        self._what = what
         self._line_s = time.monotonic()
-        self._progress: Progress | None = None
-        self._task: TaskID | None = None
 
-    def __enter__(self) -> FuzzProgress:
-        if self._live:
-            self._progress = _bar()
-            self._task = self._progress.add_task(f"fuzzing {self._what}", total=self.time_s, said="starting")
-            self._progress.start()
+    def __enter__(self) -> Self:
+        self.to(0.0, said="starting")
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._progress is not None:
-            self._progress.stop()
 
     def show(self, status: Status) -> None:
         """Draws the line again, or writes one if the last is some time ago."""
-        if self._progress is not None and self._task is not None:
-            done = status.run_s if self.time_s is None else min(status.run_s, self.time_s)
-            self._progress.update(self._task, completed=done, said=said(status))
+        if self._shown:
+            done = status.run_s if self.total is None else min(status.run_s, self.total)
+            self.to(done, said=said(status))
         elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
             self._line_s = time.monotonic()
-            left = "" if self.time_s is None else f", {clock(max(0.0, self.time_s - status.run_s))} left"
-            complain(f"fuzzing {self._what}: {clock(status.run_s)}: {said(status)}{left}")
+            left = "" if self.total is None else f", {clock(max(0.0, self.total - status.run_s))} left"
+            complain(f"{self.what}: {clock(status.run_s)}: {said(status)}{left}")
+
+    def _columns(self) -> list[ProgressColumn]:
+        from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
+        words = [TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]")]
+        return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
 
 
 def said(status: Status) -> str:
@@ -78,17 +71,3 @@ def clock(time_s: float) -> str:
     minutes, seconds = divmod(int(time_s), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
-
-
-def _bar() -> Progress:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        TextColumn("{task.fields[said]}", markup=False),
-        BarColumn(bar_width=16),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import one_line
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
-PATIENCE_S = 1.0
+    from rich.progress import Progress, ProgressColumn, Task, TaskID
+    from rich.text import Text
 
 
 class ProgressBar:
@@ -24,6 +22,8 @@ class ProgressBar:
 
     `unit`: what is counted ("runs"), where the rate is shown, too; the rate and the time left are those from `begun`.
     """
+
+    PATIENCE_S = 1.0
 
     def __init__(
         self, what: str, total: float | None, quiet: bool = False, unit: str = "", begun: int = 0
@@ -47,18 +47,41 @@ class ProgressBar:
         if self._progress is not None:
             self._progress.stop()
 
-    def to(self, done: float) -> None:
-        """Moves the bar. Cheap enough to call once a control period."""
+    def to(self, done: float, said: str = "") -> None:
+        """Moves the bar. Cheap enough to call once a control period. `said`: of a column that shows it."""
         if not self._shown:
             return
         if self._progress is None:
-            if time.monotonic() - self._began_s < PATIENCE_S:
+            if time.monotonic() - self._began_s < self.PATIENCE_S:
                 return
-            self._progress = _bar(self._rate if self.unit else None)
-            self._task = self._progress.add_task(self.what, total=self.total, completed=self.begun)
+            self._progress = self._bar()
+            self._task = self._progress.add_task(self.what, total=self.total, completed=self.begun, said=said)
             self._progress.start()
         assert self._task is not None
-        self._progress.update(self._task, completed=done)
+        self._progress.update(self._task, completed=done, said=said)
+
+    def _bar(self) -> Progress:
+        from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
+        from rich.progress import Progress
+
+        return Progress(*self._columns(), console=Console(stderr=True), transient=True)
+
+    def _columns(self) -> list[ProgressColumn]:
+        from rich.progress import (
+            BarColumn,
+            ProgressColumn,
+            TaskProgressColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+        from rich.text import Text as Words
+
+        class Rate(ProgressColumn):
+            def render(_, task: Task) -> Text:
+                return Words(self._rate(task.completed))
+
+        words = TextColumn("{task.description}", markup=False)
+        return [words, BarColumn(), TaskProgressColumn(), Rate() if self.unit else TimeRemainingColumn()]
 
     def _rate(self, done: float) -> str:
         """How fast it goes since `begun`, and how long the rest takes at that rate."""
@@ -69,25 +92,3 @@ class ProgressBar:
         left_s = round((self.total - done) / per_s)
         hours, minutes, left = left_s // 3600, left_s // 60 % 60, left_s % 60
         return f"{per_s:.1f} {self.unit}/s, {hours}:{minutes:02}:{left:02} left"
-
-
-def _bar(rate: Callable[[float], str] | None) -> Progress:
-    from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn
-    from rich.progress import TextColumn as Words
-    from rich.progress import TimeRemainingColumn as TimeLeft
-    from rich.text import Text
-
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            assert rate is not None
-            return Text(rate(task.completed))
-
-    return Progress(
-        Words("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeLeft() if rate is None else Rate(),
-        console=Console(stderr=True),
-        transient=True,
-    )

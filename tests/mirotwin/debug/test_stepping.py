@@ -8,7 +8,7 @@ import pytest
 
 from miro_exact.clock import CYCLE_TICKS
 from mirotwin.debug.console import Console
-from mirotwin.shell import progress
+from mirotwin.shell.progress import ProgressBar
 from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
 from tests.mirotwin.shell.test_progress import Screen
 from tests.naive.debugger import history, last_change, next_line
@@ -166,7 +166,7 @@ def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
 
 def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(ProgressBar, "PATIENCE_S", 0.0)
     monkeypatch.setattr(sys, "stderr", screen := Screen())
     assert Console(debugger).run("continue")
     assert "continue" in screen.getvalue()

@@ -16,7 +16,7 @@ class Screen(io.StringIO):
 
 def drawn(monkeypatch, screen, patience_s, quiet=False):
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(progress, "PATIENCE_S", patience_s)
+    monkeypatch.setattr(ProgressBar, "PATIENCE_S", patience_s)
     with ProgressBar("simulating", 10, quiet) as bar:
         for done in range(10):
             bar.to(done)
@@ -41,7 +41,7 @@ def test_what_is_counted_is_shown_with_its_rate_and_the_time_left(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(sys, "stderr", screen := Screen())
-    monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(ProgressBar, "PATIENCE_S", 0.0)
     now_s = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now_s[0])
     with ProgressBar("noise.toml", 1000, unit="runs", begun=200) as bar:
