@@ -163,7 +163,6 @@ def make_machine(
     image: Image, options: BareOptions, output: Callable[[bytes], object] | None = None, live: bool = False
 ) -> BareMachine:
     """The machine that was asked for. Raises BadInput, and errors of the files read."""
-
     pieces = _pieces(options)
     pins = _pins(options)
     try:
@@ -201,7 +200,6 @@ def _start(image: Image, options: BareOptions) -> int:
 
 def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     """Says on stderr why a run ended that did not end as planned; returns the exit code."""
-
     code = DONE
     for fault in machine.faults:
         complain(f"firmware fault: {fault}")
@@ -242,7 +240,6 @@ def _ticks(time: Time | None, options: BareOptions) -> int | None:
 
 def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
     """What --stdin and its conditions say, in order."""
-
     texts = [text.encode(errors="surrogateescape") for text in options.stdin_when]
     files = len(options.stdin)
     if not files:
@@ -284,7 +281,6 @@ def _stdin_bytes(path: str) -> bytes:
 
 
 def _pins(options: BareOptions) -> tuple[PinEvent, ...]:
-
     if options.pins is None:
         return ()
     return read_pins(read_input(options.pins).decode("utf-8", errors="replace"), options.pins)

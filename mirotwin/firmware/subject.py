@@ -110,7 +110,6 @@ def look(
     They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
     Raises BadInput when the run was over before there was anything to look at.
     """
-
     first_tick = max(0, options.from_tick - early_ticks)
     last_tick = None if options.to_tick is None else options.to_tick + late_ticks
     end_tick = _earlier(run.end_tick, last_tick)
@@ -191,7 +190,6 @@ def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
 
 def _verdict(run: Run, options: SubjectOptions) -> int:
     """Says on stderr why a run ended that did not end as planned."""
-
     if isinstance(run, RobotRun):
         return report_faults(run.world)
     assert isinstance(run, BareRun)

@@ -46,7 +46,6 @@ def check_terminal(options: BareOptions) -> None:
 
 def run_terminal(machine: BareMachine, target: int | None, options: BareOptions) -> Ended:
     """Runs `machine`, which must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
-
     hertz = options.crystal_hz / 12
     slice_cycles = max(1, int(hertz * SLICE_S))
     keyboard = sys.stdin.fileno()

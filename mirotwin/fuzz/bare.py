@@ -6,11 +6,15 @@ for ever, 10 ms (at 24 MHz) after the last character.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import msgspec
+
 from miro_exact.bad_input import BadInput
-from miro_host.raised import at_place, defined_at, raised_at
+from miro_host.plugins import PluginError, Registry
+from miro_host.raised import at_place, defined_at, raised, raised_at
 from miro_host.raised import described as described_error
 from miro_protocol.actions import ScriptItem
 from miro_protocol.protocol import Damage, Frame, Protocol
@@ -28,13 +32,6 @@ from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_t
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.spec import TargetSpec
-
-import tomllib
-
-import msgspec
-
-from miro_host.plugins import PluginError, Registry
-from miro_host.raised import raised
 
 OPTION = "--protocol"
 PROTOCOLS: Registry[Protocol] = Registry(

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import bisect
 import re
 import struct
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
-
-import bisect
-from itertools import pairwise
-
 from miro_robot.image import Image
 from miro_robot.image.symbol_files import read_text
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
 
 _BANKS = 0x20
 _RAM_BYTES = 0x100

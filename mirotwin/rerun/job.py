@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
-from miro_protocol.actions import ScriptItem
-from miro_protocol.transmission import Transmission
-from miro_robot.image import Image
+from miro_protocol.actions import Power, Reset, ScriptItem
+from miro_protocol.events import Received
+from miro_protocol.stream_header import Header
+from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.image import Image, Symbol, Symbols, parse_hex
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.scenario.file import changed
+from miro_sim.radio.params import Radio
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.file import parse as parse_scenario
-from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 from miro_sim.scenario.settings import in_text
 from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
@@ -37,27 +43,6 @@ from mirotwin.verify.checks.expect import expectations_of
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
-
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from miro_robot.image import Symbol, Symbols, parse_hex
-
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
-
-from collections.abc import Iterable
-
-from miro_exact.clock import TICKS_PER_SECOND, seconds
-from miro_protocol.actions import Power, Reset
-from miro_protocol.events import Received
-from miro_protocol.stream_header import Header
-from miro_protocol.table import ROBOT_COUNTS
-from miro_protocol.transmission import DOWN
-from miro_sim.radio.params import Radio
-from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import builtin_names, load, of_table
-from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec
 
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND

@@ -30,7 +30,6 @@ class FirmwareCoverage:
     """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
 
     def __init__(self, config: pytest.Config) -> None:
-
         self.config = config
         self.out = Path(config.getoption("--firmware-coverage"))
         self.wanted: float = config.getoption("--firmware-coverage-fail-under")
@@ -47,14 +46,12 @@ class FirmwareCoverage:
 
     def watch(self, cpu: Cpu) -> None:
         """Counts what `cpu` does from now on, if it was the image that it got."""
-
         inspector = cpu.inspector
         watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
         if not watched and cpu.code == self.image.code:
             attach(cpu, self.counters)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-
         if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
             counts = counts_of(self.counters)
             session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
@@ -67,7 +64,6 @@ class FirmwareCoverage:
         self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-
         if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
             return
         report = self._report
@@ -87,7 +83,6 @@ class FirmwareCoverage:
     @cached_property
     def _report(self) -> Report:
         """Of the whole session: for when its last test has run."""
-
         own = source_folder()
         folders = [
             *map(Path, self.config.getoption("--firmware-sources")),
@@ -98,7 +93,6 @@ class FirmwareCoverage:
         return firmware_coverage.collect(self.image, counts, Sources(folders), self.out)
 
     def _too_few(self) -> bool:
-
         share = line_share(self._report.tracefile)
         return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
 

@@ -35,7 +35,6 @@ class Playable(Protocol):
 
     @property
     def number(self) -> int: ...
-
     def do(self, player: Player) -> None: ...
 
 
