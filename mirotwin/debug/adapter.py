@@ -230,10 +230,10 @@ class Adapter:
         self.run_after = self.run_after or partial(self._stopped, "interrupted")
 
     def _thread(self, given: Message) -> int:
-        at: int = given["threadId"] - 1
-        if not 0 <= at < len(self.its.timeline.cores):
-            raise BadInput("", f"thread {at + 1}", "there is no such robot")
-        return at
+        threads, asked = range(1, len(self.its.timeline.cores) + 1), given["threadId"]
+        if asked not in threads:
+            raise BadInput("", f"thread {asked}", "there is no such robot")
+        return threads.index(asked)
 
     def _go(self, verb: str, by_instruction: bool) -> None:
         """A move, which begins again where it was broken off by new breakpoints only."""

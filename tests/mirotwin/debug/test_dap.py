@@ -130,6 +130,7 @@ def test_a_breakpoint_that_is_set_during_a_run_stops_it(adapter):
     [
         ("restartFrame", {"frameId": 1}, "restartFrame: is not answered by this debugger"),
         ("continue", {"threadId": 9}, "there is no such robot"),
+        ("continue", {"threadId": 1.5}, "there is no such robot"),
         ("continue", {}, "arguments that cannot be used"),
         ("variables", {"variablesReference": 77}, "is of a moment that is left"),
         ("evaluate", {"expression": "1 +"}, "lacks a name or a number"),
