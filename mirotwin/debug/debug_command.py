@@ -7,7 +7,7 @@ import socket
 import sys
 from contextlib import redirect_stdout, suppress
 from functools import partial
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import click
 
@@ -52,7 +52,7 @@ def debug(options: DebugOptions) -> int:
     if options.dap:
         sink = sys.stdout.buffer
         with redirect_stdout(sys.stderr):  # what anything prints must not get between the messages
-            return _serve(Wire(partial(os.read, sys.stdin.fileno()), sink))
+            return _serve(Wire(partial(os.read, _stdin("connect to --listen").fileno()), sink))
     if not options.subject:
         raise click.UsageError("Missing argument 'SUBJECT'.")
     session = open_subject(options)
@@ -94,9 +94,7 @@ def _serve(wire: Wire) -> int:
 
 def _interact(console: Console) -> int:
     """Commands from standard input, with history and completion where it is a terminal."""
-    if sys.stdin is None:
-        raise BadInput("", "stdin", "is closed", "give commands by -x")
-    terminal = sys.stdin.isatty()
+    terminal = _stdin("give commands by -x").isatty()
     if terminal:
         _complete(console)
     done = True
@@ -110,6 +108,12 @@ def _interact(console: Console) -> int:
             continue
         done = console.run(line) and done
     return DONE if done or terminal else BAD_INPUT
+
+
+def _stdin(remedy: str) -> TextIO:
+    if sys.stdin is None:
+        raise BadInput("", "stdin", "is closed", remedy)
+    return sys.stdin
 
 
 def _complete(console: Console) -> None:

@@ -1,5 +1,6 @@
 """`mirotwin debug`: what it takes, what it prints, and how it refuses."""
 
+import os
 import shutil
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from miro_robot.firmware import image_path
 from tests import children
 from tests.mirotwin.debug.runs import robot_run
+from tests.mirotwin.debug.test_dap import MIROTWIN
 from tests.mirotwin.verify.bare.firmwares import SLEEPS
 from tests.mirotwin.verify.bare.test_case import CHECK
 from tests.mirotwin.verify.bare.test_case import case as bare_case
@@ -242,3 +244,11 @@ def test_until_goes_on_to_an_event(mirotwin):
     )
     assert (code, err) == (0, "")
     assert "net0/robot0: command left STT" in out
+
+
+@pytest.mark.parametrize("what", ["fig6", "--dap"])
+def test_a_closed_standard_input_is_told(what):
+    words = [*MIROTWIN, what]
+    done = children.run(words, preexec_fn=lambda: os.close(0), capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "stdin: is closed; " in done.stderr
