@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, Any
 
@@ -13,7 +13,6 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
-from miro_robot.image import SPACE_BYTES
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
@@ -22,14 +21,14 @@ from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, debugged_image, load_images
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import AT, RESUME, choose_engine
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
-from mirotwin.verify.bare.case import rerun_bare_case
+from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
+from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
@@ -109,17 +108,17 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
     with timeline.shown(f"opening {subject}"):
         if judge is not None:
             session.why = "case"
-            verdict, failure = judge(timeline)
-            session.said.append(verdict)
-            if failure is not None:
-                _stand_at(timeline, failure, options.slot)
+            verdict = judge(timeline)
+            session.said += verdict.lines
+            if verdict.failure is not None:
+                _stand_at(timeline, verdict.failure, options.slot)
         if options.at is not None:
             session.why = session.debugger.go_to(options.at.ticks(run.tick_hz))
     return session
 
 
-Judge = Callable[[Timeline], tuple[str, Failure | None]]
-"""Says what the check of a case says this time, and gives its failure."""
+Judge = Callable[[Timeline], CaseVerdict]
+"""Gives what the check of a case says this time."""
 
 
 def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | None]:
@@ -143,32 +142,20 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | N
 def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
     choose_engine(options.engine)
     path = options.subject
-    if options.firmware is None:
-        what = "is for a bare processor, which has no firmware of its own"
-        raise BadInput(path, "", what, "give --firmware IMAGE.ihx")
-    image = load_firmware(options.firmware, SPACE_BYTES)
-    again, header = rerun_bare_case(path, image, options.check)
-    failures = [] if again.failure is None else [again.failure]
-    end_tick = max([again.end_tick, *(one.tick for one in failures)])
+    image = load_case_firmware(path, options.firmware)
+    again, verdict = rerun_bare_case(path, image, options.check)
+    end_tick = again.end_tick if again.failure is None else max(again.end_tick, again.failure.tick)
     playback = BarePlayback(image, again.line, again.script, end_tick, path)
-    return CaseRun(playback), lambda timeline: _verdict(header.verdict or "", failures)
+    return CaseRun(playback), lambda timeline: verdict
 
 
-def _judge(job: Job, timeline: Timeline) -> tuple[str, Failure | None]:
+def _judge(job: Job, timeline: Timeline) -> CaseVerdict:
     assert isinstance(timeline.run, RobotRun)
     world = timeline.run.world
     checks = Checks(world, expectations_of(job.scenario, job.file))
     timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
     checks.finish()
-    return _verdict(job.case.verdict, checks.failures)
-
-
-def _verdict(recorded: str, failures: Sequence[Failure]) -> tuple[str, Failure | None]:
-    again = [one for one in failures if str(one) == recorded] or failures
-    if not again:
-        return f"does not fail; recorded: {recorded}", None
-    how = "fails as recorded" if str(again[0]) == recorded else "fails, but not as recorded"
-    return f"{how}: {again[0]}", again[0]
+    return verdict_of(job.case.verdict, checks.failures, job.case.changed)
 
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:

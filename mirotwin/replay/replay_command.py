@@ -11,7 +11,6 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_robot.image import SPACE_BYTES
 from miro_sim.periods import Period
 from mirotwin.desk.guard import HEADING, DeskOptions
 from mirotwin.recording.compare import CompareRule, differences
@@ -32,7 +31,6 @@ from mirotwin.rerun.job import Job, load_job, rerun_job
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     ALL,
     FORCE,
@@ -76,12 +74,9 @@ def replay_case(job: Job, quiet: bool) -> int:
 
 def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:
     """The same for a case of a bare processor. `check`: FILE.py:FUNCTION, for a case whose check is in a file."""
-    if firmware is None:
-        remedy = "give --firmware IMAGE.ihx"
-        raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-    from mirotwin.verify.bare.case import replay_bare  # loads the bare processor
+    from mirotwin.verify.bare.case import load_case_firmware, replay_bare  # loads the bare processor
 
-    verdict = replay_bare(path, load_firmware(firmware, SPACE_BYTES), check)
+    verdict = replay_bare(path, load_case_firmware(path, firmware), check)
     _say(verdict)
     if verdict.failure is not None and not quiet:
         show(debug_line(path, firmware, check=check))

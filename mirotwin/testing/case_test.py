@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from miro_exact.bad_input import BadInput
-from miro_robot.image import SPACE_BYTES
 from mirotwin.rerun.job import load_stream, rerun_job
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.registry import ALWAYS_ON
 from mirotwin.verify.steps.running import Outcome
@@ -62,12 +60,9 @@ class CaseTests:
         )
 
     def _run_bare(self, path: str) -> Outcome:
-        from mirotwin.verify.bare.case import replay_bare
+        from mirotwin.verify.bare.case import load_case_firmware, replay_bare
 
-        if self.firmware is None:
-            remedy = "give --firmware IMAGE.ihx"
-            raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-        image, check = load_firmware(self.firmware, SPACE_BYTES), self.check_of(path)
+        image, check = load_case_firmware(path, self.firmware), self.check_of(path)
         self.unused.discard(check or "")
         failure = replay_bare(path, image, check).failure
         return Outcome(

@@ -31,7 +31,8 @@ from miro_exact.bad_input import BadInput, one_line
 from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import Image
+from miro_robot.image import SPACE_BYTES, Image
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.exchange import (
     NEVER_SLEEPS,
     NO_FAULT,
@@ -128,6 +129,14 @@ def case_text(
     return stream.format_stream([stream.Entry(one) for one in script], stream_header.of_text(text))
 
 
+def load_case_firmware(path: str, firmware: str | None) -> Image:
+    """The image that a case is run on. Raises BadInput where none is given."""
+    if firmware is None:
+        what = "is for a bare processor, which has no firmware of its own"
+        raise BadInput(path, "", what, "give --firmware IMAGE.ihx")
+    return load_firmware(firmware, SPACE_BYTES)
+
+
 def check_of_case(path: str | Path) -> str:
     """The name of the check that a case is of."""
     return _name(stream.read(path))
@@ -138,21 +147,22 @@ def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Cas
 
     Raises BadInput for what is no such case.
     """
-    again, header = rerun_bare_case(path, image, check)
-    changed = header.firmware_sha256 not in (None, image.sha256)
-    return verdict_of(header.verdict or "", [] if again.failure is None else [again.failure], changed)
+    return rerun_bare_case(path, image, check)[1]
 
 
 def rerun_bare_case(
     path: str | Path, image: Image, check: str | None = None
-) -> tuple[BareRerun, stream.Header]:
-    """The same as what it did, and what the case says of itself."""
+) -> tuple[BareRerun, CaseVerdict]:
+    """The same, with what it did."""
     case = stream.read(path)
     name, line, header = _name(case), _line(case), case.header
     judge = None if name in (NO_FAULT, NEVER_SLEEPS) else _check(case, name, check)
     script = _heard(case)
     end_tick = header.end_tick or max((one.tick for one in script), default=0)
-    return rerun_bare(image, line, script, end_tick, name, judge, case.source), header
+    again = rerun_bare(image, line, script, end_tick, name, judge, case.source)
+    changed = header.firmware_sha256 not in (None, image.sha256)
+    failures = [] if again.failure is None else [again.failure]
+    return again, verdict_of(header.verdict or "", failures, changed)
 
 
 def _name(case: stream.StreamFile) -> str:
