@@ -16,7 +16,7 @@ from miro_exact.inputs import read_input
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.firmware.subject import IMAGE_SUFFIXES, SubjectOptions, open_run, which_robot
+from mirotwin.firmware.subject import SubjectOptions, open_run, which_robot
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
@@ -27,7 +27,7 @@ from mirotwin.shell.times import Time
 from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
-from mirotwin.verify.cases.case import is_bare_case
+from mirotwin.verify.cases.case import has_header, is_bare_case
 from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
@@ -124,11 +124,8 @@ Judge = Callable[[Timeline], CaseVerdict]
 def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | None]:
     """A case and how it is judged; None for what is not one."""
     path = options.subject
-    if not os.path.isfile(path) or path.lower().endswith((*IMAGE_SUFFIXES, ".toml")):
+    if not has_header(path):
         return None, None
-    with open(path, "rb") as file:
-        if file.read(1) != b"#":
-            return None, None
     if is_bare_case(path):
         return _bare_case(options)
     choose_engine(options.engine)

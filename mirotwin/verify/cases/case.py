@@ -137,7 +137,7 @@ def write_case(path: str | os.PathLike[str], text: str) -> None:
 
 def is_case(path: str | Path) -> bool:
     """Whether a stream file expects something. One that cannot be read may: who runs it says what is wrong."""
-    if not _has_header(path):
+    if not has_header(path):
         return False
     try:
         return stream.read(path).header.expect is not None
@@ -147,10 +147,11 @@ def is_case(path: str | Path) -> bool:
 
 def is_bare_case(path: str | Path) -> bool:
     """Whether a file is a stream for a bare processor. Raises StreamError for a stream file that is wrong."""
-    return _has_header(path) and stream.read(path).header.bare is not None
+    return has_header(path) and stream.read(path).header.bare is not None
 
 
-def _has_header(path: str | Path) -> bool:
+def has_header(path: str | Path) -> bool:
+    """Whether a file is a stream that may say something of itself, as a case does."""
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:
