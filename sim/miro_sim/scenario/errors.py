@@ -1,6 +1,7 @@
 """What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
 
 import re
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -187,9 +188,15 @@ def _value_at(raw: Any, path: str) -> Any:
     return raw
 
 
+@cache
+def _type_of(struct: type) -> msgspec.inspect.Type:
+    """Of all that the struct may hold: 15 ms of work for a scenario, and an error asks for it up to four times."""
+    return msgspec.inspect.type_info(struct)
+
+
 def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
     """What a scenario may have at a key path; below tagged tables, these tables."""
-    found: msgspec.inspect.Type = msgspec.inspect.type_info(Scenario)
+    found = _type_of(Scenario)
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         found = _chosen(found, raw)
         raw = _value_at(raw, key or f"[{index}]")
@@ -216,7 +223,7 @@ def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
     if not isinstance(found, msgspec.inspect.CustomType):
         return found
     try:
-        return msgspec.inspect.type_info(struct_of(REGISTRIES[found.cls], table))
+        return _type_of(struct_of(REGISTRIES[found.cls], table))
     except (ValueError, TypeError, AttributeError):  # no plug-in is named, or none can be used
         return found
 
