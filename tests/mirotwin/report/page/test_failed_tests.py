@@ -1,18 +1,13 @@
 """Pages of failed tests: what the plugin leaves, and `mirotwin report` of a case."""
 
-import sys
-
 import pytest
 
-from tests import children
 from tests.mirotwin.report.page.conftest import called
+from tests.mirotwin.testing.sessions import session
 
 pytestmark = pytest.mark.slow
 
 TESTS = """
-import pytest
-from mirotwin import Telemetry, ms
-
 def test_an_answer_that_does_not_come(link):
     link.radio("down")
     link.poll(slot=0)
@@ -39,19 +34,7 @@ def test_one_that_passes(link):
 def left(tmp_path_factory):
     """The folders that the tests leave, by their names."""
     folder = tmp_path_factory.mktemp("session")
-    (folder / "test_mine.py").write_text(TESTS)
-    (folder / "pytest.ini").write_text("[pytest]\n")
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--mirotwin-artifacts=left",
-        "--mirotwin-pages",
-    ]
-    done = children.run(command, cwd=folder, capture_output=True, text=True)
+    done = session(folder, "-q", "--mirotwin-artifacts=left", "--mirotwin-pages", tests=TESTS)
     assert "4 failed, 1 passed" in done.stdout
     names = ("an_answer_that_does_not_come", "a_check", "a_comparison", "one_that_writes", "one_that_passes")
     return {name: next(iter((folder / "left").glob(f"test_mine.py-test_{name}-*")), None) for name in names}
@@ -112,10 +95,7 @@ def test_a_case_by_itself_has_one_too_and_says_when_it_is_cured(left, tmp_path):
 
 
 def test_without_the_option_no_page_is_made_and_the_report_names_the_line_for_it(tmp_path):
-    (tmp_path / "test_mine.py").write_text(TESTS)
-    (tmp_path / "pytest.ini").write_text("[pytest]\n")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--mirotwin-artifacts=left"]
-    done = children.run(command, cwd=tmp_path, capture_output=True, text=True)
+    done = session(tmp_path, "-q", "--mirotwin-artifacts=left", tests=TESTS)
     assert list((tmp_path / "left").rglob("report.html")) == []
     lines = [line for line in done.stdout.splitlines() if line.startswith("page: mirotwin report left/")]
     assert len(lines) == 3  # not of the test that wrote into memory
