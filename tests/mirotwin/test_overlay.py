@@ -27,8 +27,10 @@ def drawn(robots, numbers=(0, 1, 2), frames=2, known=False):
     for track, robot in zip(one.tracks, robots if known else (), strict=known):
         at = robot.posture
         track.remember(Sighting(at.x_m, at.y_m, at.theta_rad, 0, 1.0))
+    seen = robots if isinstance(robots[0], list) else [robots]
+    pictures = [taken(PaintedFrame(each)) for each in seen]
     for frame in range(frames):
-        picture = taken(PaintedFrame(robots[frame] if isinstance(robots[0], list) else robots))
+        picture = pictures[min(frame, len(pictures) - 1)]
         one.track(picture, frame * FRAME)
     return np.asarray(draw(picture, one, one.notes, "painted")), picture, one
 

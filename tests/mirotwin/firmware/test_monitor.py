@@ -15,7 +15,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from mirotwin.commands import main
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build
@@ -52,9 +54,9 @@ def monitor(tmp_path_factory):
 
 def talk(image, *options):
     """A dialogue by script; stdout as the program sent it."""
-    command = [MIROTWIN, "fw", "run", image, "--stdin", image.with_name("space"), *map(str, options)]
-    done = children.run(command, capture_output=True, timeout=PATIENCE_S)
-    return done.returncode, done.stdout.decode(), done.stderr.decode()
+    command = ["fw", "run", image, "--stdin", image.with_name("space"), *options]
+    done = CliRunner().invoke(main, [*map(str, command)])
+    return done.exit_code, done.stdout_bytes.decode(), done.stderr
 
 
 @pytest.mark.parametrize(
