@@ -164,21 +164,6 @@ def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
     assert bench.signals() & 0x4400 == 0x0400
 
 
-def test_an_stt_acts_on_what_was_loaded_when_it_was_given():
-    bench = Bench.running()
-    bench.load(0x002A, 0x8000, 0x20000, 1000)
-    bench.sample()
-    bench.command("STT")
-    bench.load(0x0002, 77)
-    assert bench.chip.sample_tick - bench.tick > 0
-    assert bench.status() & MOTOR_OFF
-    bench.sample()
-    assert bench.chip.trajectory.target == 1000
-    bench.command("STT")
-    bench.sample()
-    assert bench.chip.trajectory.target == 77
-
-
 def test_a_smooth_stop_in_position_mode_completes():
     bench = moving()
     bench.load(0x0400)
@@ -316,16 +301,6 @@ def test_excessive_error_flags_or_stops():
         assert bench.signals() & 0x0200 == (0x0200 if name == "LPES" else 0)
 
 
-def test_an_error_that_persists_raises_its_flag_again():
-    bench = moving()
-    bench.command("LPEI", 1)
-    bench.sample()
-    assert bench.status() & EXCESS
-    bench.command("RSTI", 0)
-    bench.sample()
-    assert bench.status() & EXCESS
-
-
 def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
     bench = Bench.running()
     bench.load(0x1828, 0x100000, 0x100000)
@@ -392,19 +367,6 @@ def test_out_of_range_parameters_are_taken_modulo_their_width():
     assert (buffer.acceleration, buffer.velocity, buffer.position) == (1, 2, -1)
     assert bench.chip.filter_buffer.kp == 1
     assert bench.chip.threshold == 0x7FFF
-
-
-def test_rdsum_may_be_read_as_the_sum_instead_of_the_term():
-    for reading, answer in (("term", 500), ("sum", 78)):
-        bench = Bench.running(sum_reading=reading)
-        bench.filter(ki=1000, il=500)
-        bench.load(0x0200)
-        bench.command("STT")
-        bench.sample()
-        bench.chip.trajectory.position = 10000 * 65536
-        bench.sample(2)
-        bench.chip.trajectory.position = 0
-        assert bench.ask("RDSUM") == answer
 
 
 def test_the_table_has_every_opcode_once():

@@ -4,7 +4,6 @@ import pytest
 
 from miro_exact.state import snapshot
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
-from miro_robot.lm629.options import Lm629Options
 from tests.robot.lm629.bench import Bench
 
 BUSY = 480
@@ -166,14 +165,6 @@ def test_reading_when_a_write_is_due_and_writing_when_a_read_is_due_raise_the_co
     assert (bench.read(1), bench.read(1)) == (0x01, 0x80)
 
 
-def test_an_unknown_opcode_is_ignored_and_flagged():
-    bench = Bench.running()
-    bench.ready()
-    bench.write(0, 0x55)
-    bench.ready()
-    assert bench.status() == 0x82
-
-
 def test_a_command_byte_before_the_last_word_abandons_the_earlier_command():
     bench = Bench.running()
     bench.command("LTRJ", 0x002A, 0x0001, 0x0002, 0x0003)
@@ -230,10 +221,3 @@ def test_two_chips_take_one_write():
     assert snapshot(chips[0]) == snapshot(chips[1])
     assert chips[0].desired_position == 3
     assert chips[0].commands[-1] == chips[1].commands[-1]
-
-
-def test_options_that_make_no_sense_are_refused():
-    with pytest.raises(ValueError, match="busy_clocks must be"):
-        Lm629Options(busy_clocks=-1)
-    with pytest.raises(ValueError, match="relative_base must be one of"):
-        Lm629Options(relative_base="elsewhere")

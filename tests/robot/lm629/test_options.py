@@ -408,6 +408,8 @@ def test_options_come_from_plain_values_and_say_what_they_may_be():
         msgspec.convert({"busy_clock": 1}, Lm629Options)
     with pytest.raises(ValueError, match="sign_of_negative must be one of 1, 0, not 2"):
         Lm629Options(sign_of_negative=2)
+    with pytest.raises(ValueError, match=r"busy_clocks must be 0\.\.1048576 clocks, not -1"):
+        Lm629Options(busy_clocks=-1)
 
 
 def test_an_index_caught_before_a_reset_ends_the_wait_for_it():

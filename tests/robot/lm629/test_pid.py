@@ -73,11 +73,6 @@ def test_a_zero_limit_removes_the_integral_term():
     assert [pid.step(30000) for _ in range(5)] == [0] * 5
 
 
-def test_products_may_be_read_as_their_bottom_16_bits():
-    assert loop(kp=0x0870).step(0x7FFF) == 32767
-    assert loop(kp=0x0870, saturates=False).step(0x7FFF) == 0xF790 - 0x10000
-
-
 def error_after_a_jam(saturates):
     """Counts that the motor is behind its desired position, a second after something held it for 0.1 s.
 
