@@ -37,27 +37,11 @@ def test_upper_ram_is_reached_indirectly_and_by_the_stack_only():
     assert sfr(cpu, "P1") == 0xFF
 
 
-def test_mov_direct_direct_names_its_source_first_in_code():
-    """4316E, instruction set: opcode 85."""
-    cpu = stepped("MOV 30h,#11h\nMOV 31h,30h")
-    assert cpu.peek_iram(0x31) == 0x11
-    assert cpu.code_at(3) == 0x85
-    assert cpu.code_at(4) == 0x30
-
-
 def test_push_sp_stores_the_incremented_pointer_and_pop_sp_ends_with_the_byte():
     """4316E, instruction set; what PUSH SP stores is chosen, silicon is not pinned down."""
     assert stepped("PUSH SP").peek_iram(0x08) == 0x08
     cpu = stepped("MOV 07h,#42h\nPOP SP")
     assert cpu.sp == 0x42
-
-
-def test_calls_push_the_low_byte_first():
-    """4316E, instruction set."""
-    cpu = cpu_with("ORG 0120h\nLCALL 0400h")
-    cpu.pc = 0x120
-    cpu.step()
-    assert (cpu.peek_iram(8), cpu.peek_iram(9), cpu.pc) == (0x23, 0x01, 0x400)
 
 
 def test_ajmp_stays_in_the_page_of_the_following_instruction():
@@ -68,11 +52,6 @@ def test_ajmp_stays_in_the_page_of_the_following_instruction():
     assert cpu.pc == 0x800
 
 
-def test_movc_by_pc_counts_from_the_following_instruction():
-    """4316E, instruction set."""
-    assert stepped("MOV A,#01h\nMOVC A,@A+PC\nDB 12h,34h", 2).a == 0x34
-
-
 def test_movc_beyond_ffff_goes_on_at_0000():
     """4316E, memory: addresses are 16 bit and wrap."""
     cpu = cpu_with("MOV DPTR,#0FFFFh\nMOV A,#02h\nMOVC A,@A+DPTR")
@@ -81,27 +60,10 @@ def test_movc_beyond_ffff_goes_on_at_0000():
     assert cpu.a == cpu.code_at(1)
 
 
-def test_cjne_compares_unsigned():
-    """4316E, instruction set: CY = first < second."""
-    assert stepped("MOV A,#80h\nCJNE A,#7Fh,end\nend:", 2).cy == 0
-    assert stepped("MOV A,#7Fh\nCJNE A,#80h,end\nend:", 2).cy == 1
-
-
 def test_inc_and_dec_touch_no_flag():
     """4316E, instruction set."""
     cpu = stepped("MOV A,#0FFh\nINC A\nDEC A\nINC 30h\nDEC @R0")
     assert (cpu.cy, cpu.ac, cpu.ov) == (0, 0, 0)
-
-
-def test_xchd_swaps_low_nibbles_only():
-    cpu = stepped("MOV R0,#30h\nMOV 30h,#12h\nMOV A,#34h\nXCHD A,@R0")
-    assert (cpu.a, cpu.peek_iram(0x30)) == (0x32, 0x14)
-
-
-def test_jbc_clears_the_bit_it_jumps_on():
-    """4316E, instruction set."""
-    cpu = stepped("MOV 20h,#81h\nJBC 20h.7,there\nMOV A,#01h\nthere:\nMOV B,#02h", 3)
-    assert (cpu.peek_iram(0x20), cpu.a, cpu.b) == (0x01, 0, 2)
 
 
 def test_dptr_wraps_and_movx_by_r_takes_the_page_from_p2():
