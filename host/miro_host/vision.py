@@ -11,12 +11,13 @@ from collections import deque
 
 import msgspec
 
-from miro_exact.dmath import wrap_pi
+from miro_exact import dmath
 from miro_exact.state import Rows
 from miro_host.posture import Posture
 
 DEGREE = 0.017453292519943295
 SIGMAS = 3.0
+_SIGMAS = 3.0
 _MEASURED = ("d", -1e6, 1e6)  # metres and radians: far more than a camera sees, and angles that `dmath` takes
 
 
@@ -41,7 +42,7 @@ NO_ERRORS = VisionErrors(position_m=0.0, heading_rad=0.0, pixel_m=0.0)
 
 def error_of(normal: float, bound: float) -> float:
     """A standard normal scaled so that `bound` is 3 sigma, and cut off there: the paper gives a bound."""
-    return bound * (min(max(normal, -SIGMAS), SIGMAS) / SIGMAS)
+    return bound * (min(max(normal, -_SIGMAS), _SIGMAS) / _SIGMAS)
 
 
 def to_grid(x: float, step: float) -> float:
@@ -60,7 +61,7 @@ def measure(true: Posture, normals: tuple[float, float, float], errors: VisionEr
     return Posture(
         to_grid(true.x_m + error_of(normals[0], errors.position_m), errors.pixel_m),
         to_grid(true.y_m + error_of(normals[1], errors.position_m), errors.pixel_m),
-        wrap_pi(true.theta_rad + error_of(normals[2], errors.heading_rad)),
+        dmath.wrap_pi(true.theta_rad + error_of(normals[2], errors.heading_rad)),
     )
 
 

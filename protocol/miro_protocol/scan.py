@@ -156,7 +156,9 @@ class Scanner:
         for byte, stop_good, start_tick in symbols:
             if not 0 <= byte <= 255:
                 raise ValueError(f"character = {byte}: must be 0..255")
-            tick = checked_tick(start_tick, self._step)
+            if not -TICK_LIMIT <= start_tick <= TICK_LIMIT - self._step:
+                checked_tick(start_tick, self._step)
+            tick = start_tick
             found = self._put_symbol(byte, not stop_good, tick)
             if found:
                 self._give_out(found, events)

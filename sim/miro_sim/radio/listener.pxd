@@ -11,6 +11,7 @@ cdef unsigned long long _ONE
 cdef int _DOWN, _NOISE
 
 
+@cython.final
 cdef class Listener:
     cdef readonly Line line
     cdef public int link_state
@@ -24,7 +25,7 @@ cdef class Listener:
     @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stops=bytes, stop='long long')
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)
-    cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except? -1
+    cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     @cython.locals(slot='long long')
     cdef void hear_nothing(self, long long tick, long long until) except *
     @cython.locals(slot='long long')

@@ -47,6 +47,8 @@ class Sender:
 
     def begin(self, start: int, number: int) -> int:
         """Tick at which bit `number` of a transmission begins."""
+        if self.denominator == 1:
+            return start + number * self.numerator
         return start + number * self.numerator // self.denominator
 
     def back(self, start: int, number: int) -> int:

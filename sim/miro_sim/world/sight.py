@@ -82,10 +82,10 @@ class GaussianSight:
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """See `Sight`."""
         found = []
+        first = 3 * self.frame
         for body, vision, stream in zip(self.bodies, self.visions, self.streams, strict=True):
-            draws = [stream.gauss(3 * self.frame + axis) for axis in range(3)]
-            true = Posture(*body.drive.pose_at(tick))
-            found.append(vision.frame(true, (draws[0], draws[1], draws[2])))
+            draws = stream.gauss(first), stream.gauss(first + 1), stream.gauss(first + 2)
+            found.append(vision.frame(Posture(*body.drive.pose_at(tick)), draws))
         self.frame += 1
         return found
 
