@@ -8,6 +8,7 @@ What does not belong here: the scheduler, real-time pacing, and any wall clock.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 
 TICKS_PER_SECOND = 24_000_000
 
@@ -52,20 +53,21 @@ def ticks(seconds: float | Fraction) -> int:
     same float), so `0.001` is one millisecond exactly and not the binary fraction beside it; the product and
     the rounding are exact. Raises ValueError for NaN and infinities.
     """
-    return (2 * _exact(seconds) * TICKS_PER_SECOND + 1) // 2
+    return (2 * exact(seconds) * TICKS_PER_SECOND + 1) // 2
 
 
 def ms(time: float | Fraction) -> int:
     """Milliseconds to ticks, by the rule of `ticks`; a whole number of them is exact (24 000 ticks)."""
-    return ticks(_exact(time) / 1000)
+    return ticks(exact(time) / 1000)
 
 
 def us(time: float | Fraction) -> int:
     """Microseconds to ticks, by the rule of `ticks`; a whole number of them is exact (24 ticks)."""
-    return ticks(_exact(time) / 1_000_000)
+    return ticks(exact(time) / 1_000_000)
 
 
-def _exact(time: float | Fraction) -> Fraction:
+@lru_cache(typed=True)  # a float and a fraction of equal value are two numbers here
+def exact(time: float | Fraction) -> Fraction:
     """The decimal number that a float prints as, everything else as it is."""
     return Fraction(repr(time)) if isinstance(time, float) else Fraction(time)
 

@@ -139,7 +139,7 @@ class Debugger:
         run, unwinder = self.timeline.run, self.symbols.unwinder
         if not isinstance(run, RobotRun) and run.machine.bus.code_of is not None:
             return self.timeline.everywhere
-        first, last = self.symbols.image.symbols.stack()
+        first, last = self.symbols.image.symbols.stack
         on_stack = written.first <= last and written.end > first
         found = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
         return found | unwinder.vectors if written.space == "iram" and on_stack else found

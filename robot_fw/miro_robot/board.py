@@ -174,7 +174,7 @@ class Board(Bus):
     def load(self, image: Image) -> None:
         """Puts the firmware into the CPU's flash; its symbols name the places of faults."""
         self.cpu.load(image.code, image.used)
-        self.cpu.bound_stack(*image.symbols.stack())
+        self.cpu.bound_stack(*image.symbols.stack)
         self.symbols = image.symbols
 
     # ---- time ----------------------------------------------------------------------------------------------

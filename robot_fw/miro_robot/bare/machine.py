@@ -103,7 +103,7 @@ class BareMachine:
         self.cpu = Cpu(self.bus)
         self.cpu.stop_asleep = 1
         self.cpu.load(image.code, image.used)
-        self.cpu.bound_stack(*image.symbols.stack())
+        self.cpu.bound_stack(*image.symbols.stack)
         self.cpu.pc = start
         if code_in_xram:
             self.bus.fill(image.code)

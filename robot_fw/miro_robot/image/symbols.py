@@ -52,6 +52,7 @@ class Symbols:
         """Where the name is. Raises ImageError as `names` does."""
         return self.names.get(name) or self.names.get("_" + name)
 
+    @cached_property
     def stack(self) -> tuple[int, int]:
         """First and last address that the stack may use: from where the linker begins it to the next name above.
 

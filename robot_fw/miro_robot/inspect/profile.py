@@ -74,7 +74,7 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
         FunctionProfile(names.place(first), first, counters.executed_at(first), executed, spent)
         for first, (executed, spent) in by_function.items()
     ]
-    first_address, last = image.symbols.stack()
+    first_address, last = image.symbols.stack
     depth = StackReader(image).all()
     return Profile(
         cycles=activity.cycles,

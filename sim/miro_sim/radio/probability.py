@@ -21,7 +21,7 @@ def threshold(probability: float | Fraction, name: str = "probability") -> int:
     The float stands for the decimal number that it prints as, as in `clock.ticks`. Raises ValueError
     outside 0 .. 1, naming it `name`.
     """
-    exact = Fraction(repr(probability)) if isinstance(probability, float) else Fraction(probability)
+    exact = clock.exact(probability)
     if not 0 <= exact <= 1:
         raise ValueError(f"{name} {probability} is outside 0 .. 1")
     return (2 * exact * ONE + 1) // 2

@@ -63,7 +63,7 @@ def written_bytes(run, begin_tick, end_tick, first, last):
 def wrong_writers(begin_tick, end_tick, count, seed=0):
     """(variable, tick, what was found) where the last writer is not that of brute force; and how many were asked."""
     debugger = debugger_of(robot_run())
-    stack = debugger.symbols.image.symbols.stack()[0]
+    stack = debugger.symbols.image.symbols.stack[0]
     writes = written_bytes(robot_run(), begin_tick, end_tick, 0x20, stack)
     variables = [
         one for one in debugger.symbols.variables_in("") if one.space == "iram" and one.address >= 0x20

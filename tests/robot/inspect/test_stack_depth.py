@@ -91,6 +91,6 @@ def test_no_run_is_deeper_than_what_was_read_of_its_code(parts):
 def test_the_robots_own_firmware_is_read_and_no_run_is_shallower_than_a_call():
     own = load_hex(image_path())
     found = StackReader(own).all()
-    first, last = own.symbols.stack()
+    first, last = own.symbols.stack
     assert 4 < found.size < last - first
     assert found.unknown <= {"a jump by a table"}

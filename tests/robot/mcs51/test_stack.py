@@ -123,12 +123,12 @@ def test_the_stack_is_from_where_the_map_begins_it_to_the_next_variable():
         "_low": Symbol(0x20, "iram"),
         "_main": Symbol(0x62, "code"),
     }
-    assert Symbols(names).stack() == (0x30, 0xFF)
-    assert Symbols(names | {"_high": Symbol(0xF0, "iram"), "_x": Symbol(0x40, "xram")}).stack() == (
+    assert Symbols(names).stack == (0x30, 0xFF)
+    assert Symbols(names | {"_high": Symbol(0xF0, "iram"), "_x": Symbol(0x40, "xram")}).stack == (
         0x30,
         0xEF,
     )
-    assert Symbols({}).stack() == (0, 0xFF)
+    assert Symbols({}).stack == (0, 0xFF)
 
 
 def test_code_outside_of_the_image_is_not_named_after_a_table_far_below():
