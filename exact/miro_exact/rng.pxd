@@ -18,6 +18,8 @@ cdef class Stream:
     cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
 
     cdef void load(self, u64_t block) noexcept
+    @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, at='long long', lane='long long', b='long long', _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
+    cdef void blocks(self, u64_t first, int count, unsigned int *words) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1
     cpdef u64_t u64(self, long long index) except? 1

@@ -2,7 +2,7 @@ cimport cython
 from miro_sim.pitch cimport rays, sensor
 from miro_sim.pitch.rays cimport between
 
-cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH
+cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH, _PAD
 cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
 cdef long long _CIRCLE_UM, _AREA_HALF_UM, _AREA_DEPTH_UM, _BALL_UM
 
@@ -25,7 +25,7 @@ cdef class Scene:
     cdef bint shows_ball(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', lost='long long')
     cdef long long light(self, int pixel) noexcept
-    @cython.locals(column=int, pixel=int)
+    @cython.locals(scale=int, lit='int[::1]', y='short[::1]', cb='short[::1]', cr='short[::1]', column=int, pixel='long long')
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
     cdef void look(self, int pixel) noexcept

@@ -35,6 +35,7 @@ _MIXED = 255
 _UNKNOWN = 254
 _CORNERS = 321
 _WIDTH = 320
+_PAD = 8
 _WALL_HEIGHT_UM = 50_000
 _WALL_UM = 25_000
 _GOAL_HALF_UM = 200_000
@@ -115,20 +116,19 @@ class Scene:
 
     def show(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
         """Puts the pixels of a line into the sensor's; `instants`: how many times their samples are added."""
-        for column in range(first, end):
-            pixel = row * _WIDTH + column
-            if self.lit[pixel] != sensor.scale:
+        scale = sensor.scale
+        lit, y, cb, cr = self.lit, self.y, self.cb, self.cr
+        pixel = row * _WIDTH + first
+        for column in range(first + _PAD, end + _PAD):
+            if lit[pixel] == scale:
+                sensor.y[column], sensor.cb[column], sensor.cr[column] = y[pixel], cb[pixel], cr[pixel]
+            else:
                 if self.paint[pixel] == _UNKNOWN:
                     self.look(pixel)
-                sensor.put(column, self.total[pixel] * instants, self.light(pixel))
-                self.lit[pixel] = sensor.scale
-                self.y[pixel] = sensor.y[column]
-                self.cb[pixel] = sensor.cb[column]
-                self.cr[pixel] = sensor.cr[column]
-            else:
-                sensor.y[column] = self.y[pixel]
-                sensor.cb[column] = self.cb[pixel]
-                sensor.cr[column] = self.cr[pixel]
+                sensor.put(column - _PAD, self.total[pixel] * instants, self.light(pixel))
+                lit[pixel] = scale
+                y[pixel], cb[pixel], cr[pixel] = sensor.y[column], sensor.cb[column], sensor.cr[column]
+            pixel += 1
 
     def look(self, pixel: int) -> None:
         """Fills `paint` and `total` of a pixel."""

@@ -2,7 +2,7 @@ cimport cython
 from miro_exact cimport dmath, rng
 
 cdef long long _MASK, _FRAME_BLOCKS, _LINE_BLOCKS, _FULL
-cdef int _BITS, _WIDTH, _GREY
+cdef int _BITS, _WIDTH, _GREY, _PAD
 
 
 @cython.final
@@ -14,29 +14,28 @@ cdef class Sensor:
     cdef readonly int reach, side
     cdef int shift, half
     cdef int taps[9]
-    cdef int gamma[4096]
-    cdef int luma_noise[4096]
-    cdef int chroma_noise[4096]
-    cdef int y[320]
-    cdef int cb[320]
-    cdef int cr[320]
-    cdef int soft_cb[320]
-    cdef int soft_cr[320]
+    cdef short gamma[4096]
+    cdef short luma_noise[4096]
+    cdef short chroma_noise[4096]
+    cdef unsigned short y[352]
+    cdef unsigned short cb[352]
+    cdef unsigned short cr[352]
+    cdef unsigned short soft_cb[352]
+    cdef unsigned short soft_cr[352]
+    cdef unsigned int words[448]
+    cdef int sums[16]
 
     cpdef begin(self, long long frame, long long tick, int samples)
     @cython.locals(red=int, green=int, blue=int)
     cdef void put(self, int column, long long total, long long light) noexcept
     @cython.locals(value='long long')
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(first='long long', column=int, part=int, word='unsigned int', last='unsigned int', y=int, cb=int, cr=int)
+    @cython.locals(first='long long', column=int, part=int, block=int, word='unsigned int', last='unsigned int')
     cdef void write(self, int row, int left, int width, unsigned char[::1] out, int at) noexcept
-    @cython.locals(inner='long long', inner_end='long long', end='long long', column='long long', total=int,
-                   step='long long')
-    cdef void _soften(self, int* values, int* soft, long long left, long long width) noexcept
-    @cython.locals(total=int, step=int, low=int, high=int)
-    cdef int _at_border(self, int* values, int column) noexcept
-    cdef int _byte(self, int value) noexcept
+    @cython.locals(first='long long', lane='long long', step='long long', sums='int *', tap=short, bend=short)
+    cdef void _soften(self, unsigned short* values, unsigned short* soft, long long left, long long width) noexcept
+    cdef inline int _byte(self, int value) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept
     @cython.locals(column=int, after=int, before=int)
-    cdef void _move(self, int* values, int first, int last, long long by) noexcept
+    cdef void _move(self, unsigned short* values, int first, int last, long long by) noexcept

@@ -30,6 +30,7 @@ _LINE_BLOCKS = 107
 _TICKS = 24_000_000
 _DRAWS = 4096
 _WIDTH = 320
+_PAD = 8  # places of a line's array before its first pixel, for what the low-pass sees beyond the border
 _GREY = 2048  # no colour, with four fraction bits
 
 
@@ -80,6 +81,7 @@ class Sensor:
     NOT_STATE = (
         *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "shift", "half"),
         *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr"),
+        *("words", "sums"),
     )
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
@@ -105,11 +107,13 @@ class Sensor:
             self.gamma[value] = shown[value]
             self.luma_noise[value] = luma[value]
             self.chroma_noise[value] = chroma[value]
-        self.y = [0] * 320
-        self.cb = [0] * 320
-        self.cr = [0] * 320
-        self.soft_cb = [0] * 320
-        self.soft_cr = [0] * 320
+        self.y = [0] * 352
+        self.cb = [0] * 352
+        self.cr = [0] * 352
+        self.soft_cb = [0] * 352
+        self.soft_cr = [0] * 352
+        self.words = [0] * 448
+        self.sums = [0] * 16
 
     def __repr__(self) -> str:
         return f"Sensor({self.settings!r}, {self.stream!r}, frame={self.frame})"
@@ -135,9 +139,9 @@ class Sensor:
         red = self._shown(total & _MASK, light)
         green = self._shown(total >> _BITS & _MASK, light)
         blue = self._shown(total >> 2 * _BITS, light)
-        self.y[column] = (77 * red + 150 * green + 29 * blue + 128) >> 8
-        self.cb[column] = _GREY + ((0 - 43 * red - 85 * green + 128 * blue + 128) >> 8)
-        self.cr[column] = _GREY + ((128 * red - 107 * green - 21 * blue + 128) >> 8)
+        self.y[column + _PAD] = (77 * red + 150 * green + 29 * blue + 128) >> 8
+        self.cb[column + _PAD] = _GREY + ((0 - 43 * red - 85 * green + 128 * blue + 128) >> 8)
+        self.cr[column + _PAD] = _GREY + ((128 * red - 107 * green - 21 * blue + 128) >> 8)
 
     def _shown(self, total: int, light: int) -> int:
         value = ((total * light >> 12) * self.scale >> 24) + self.offset
@@ -147,48 +151,47 @@ class Sensor:
         """The bytes of the line's pixels from `left` on into `out` from `at` on; `side` more were put on each side."""
         if self.jitter:
             self._shake(row, left, width)
-        first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS
         self._soften(self.cb, self.soft_cb, left, width)
         self._soften(self.cr, self.soft_cr, left, width)
+        block = 0
         part = left % 3
-        self.stream.load(first + left // 3)
-        for column in range(left, left + width):
+        first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS + left // 3
+        self.stream.blocks(first, (part + width + 2) // 3, self.words)
+        for column in range(left + _PAD, left + width + _PAD):
+            word = self.words[112 * part + block]
+            last = word >> 24 | (self.words[336 + block] >> 4 * part & 15) << 8
+            out[at] = self._byte(self.y[column] + self.luma_noise[word & 4095])
+            out[at + 1] = self._byte(self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095])
+            out[at + 2] = self._byte(self.soft_cr[column] + self.chroma_noise[last])
+            at += 3
+            part += 1
             if part == 3:
                 part = 0
-                self.stream.load(first + column // 3)
-            word = self.stream.w0 if part == 0 else (self.stream.w1 if part == 1 else self.stream.w2)
-            last = word >> 24 | (self.stream.w3 >> 4 * part & 15) << 8
-            y = self.y[column] + self.luma_noise[word & 4095]
-            cb = self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095]
-            cr = self.soft_cr[column] + self.chroma_noise[last]
-            part += 1
-            out[at] = self._byte(y)
-            out[at + 1] = self._byte(cb)
-            out[at + 2] = self._byte(cr)
-            at += 3
+                block += 1
 
     def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
-        """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border."""
-        inner = max(left, self.reach)
-        end = left + width
-        inner_end = min(end, _WIDTH - self.reach)
-        for column in range(inner, inner_end):
-            total = values[column] * self.taps[0]
-            for step in range(1, self.reach + 1):
-                total += (values[column - step] + values[column + step]) * self.taps[step]
-            soft[column] = total >> 16
-        for column in range(left, min(end, inner)):
-            soft[column] = self._at_border(values, column)
-        for column in range(max(left, inner_end), end):
-            soft[column] = self._at_border(values, column)
+        """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border.
 
-    def _at_border(self, values: list[int], column: int) -> int:
-        total = values[column] * self.taps[0]
-        for step in range(1, self.reach + 1):
-            low = column - step if column >= step else 0
-            high = column + step if column + step < _WIDTH else _WIDTH - 1
-            total += (values[low] + values[high]) * self.taps[step]
-        return total >> 16
+        All taps add up to 1: what is seen beside a pixel counts by how it differs from what is seen there.
+        """
+        for step in range(self.reach):
+            if left < self.reach:
+                values[_PAD - 1 - step] = values[_PAD]
+            if left + width + self.reach > _WIDTH:
+                values[_PAD + _WIDTH + step] = values[_PAD + _WIDTH - 1]
+        sums = self.sums
+        for first in range(left + _PAD, left + width + _PAD, 16):  # as many pixels together
+            for lane in range(16):
+                sums[lane] = values[first + lane] << 16
+            for step in range(1, self.reach + 1):
+                tap = self.taps[step]
+                for lane in range(16):
+                    bend = (
+                        values[first - step + lane] + values[first + step + lane] - 2 * values[first + lane]
+                    )
+                    sums[lane] += bend * tap
+            for lane in range(16):
+                soft[first + lane] = sums[lane] >> 16
 
     def _byte(self, value: int) -> int:
         """A value with four fraction bits as the grabber's byte: rounded, limited, then the bits that it has."""
@@ -211,11 +214,12 @@ class Sensor:
 
     def _move(self, values: list[int], first: int, last: int, by: int) -> None:
         """Each value becomes that `by`/256 pixels to its right; beyond the picture it is as at its border."""
+        first, last = first + _PAD, last + _PAD
         if by >= 0:
             for column in range(first, last + 1):
-                after = values[column + 1 if column + 1 < _WIDTH else column]
+                after = values[column + 1 if column + 1 < _PAD + _WIDTH else column]
                 values[column] += (after - values[column]) * by >> 8
         else:
             for column in range(last, first - 1, -1):
-                before = values[column - 1 if column > 0 else column]
+                before = values[column - 1 if column > _PAD else column]
                 values[column] += (before - values[column]) * (0 - by) >> 8
