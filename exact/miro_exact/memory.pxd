@@ -17,6 +17,8 @@ cdef struct Place:
 cdef class Memory:
     cdef Place *places
     cdef Py_ssize_t number
+    cdef Py_ssize_t fixed  # bytes of all that are no queues
+    cdef bint queues  # whether there are any
     cdef readonly tuple names
     cdef object parts
     cdef bytes data

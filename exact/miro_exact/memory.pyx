@@ -81,7 +81,10 @@ cdef class Memory:
             elif low is not None:
                 place.low = low
                 place.high = high
-            if end is not None:
+            if end is None:
+                self.fixed += place.size * place.count
+            else:
+                self.queues = True
                 place.end = <char *><size_t>end[0]
                 place.end_size = end[1]
 
@@ -89,13 +92,14 @@ cdef class Memory:
         PyMem_Free(self.places)
 
     cdef Py_ssize_t size(self) except -1:
-        cdef Py_ssize_t index, total = 0
+        cdef Py_ssize_t index, total = self.fixed
         cdef long long count
         cdef Place *place
+        if not self.queues:
+            return total
         for index in range(self.number):
             place = &self.places[index]
             if place.end == NULL:
-                total += place.size * place.count
                 continue
             count = length(place.end, place.end_size)
             if count < 0 or count > place.count:

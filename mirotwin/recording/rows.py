@@ -16,8 +16,20 @@ from msgspec.structs import astuple
 from miro_host.eye.track import Sighting
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
-from mirotwin.recording import channels, topics
-from mirotwin.recording.channels import CommandMessage
+from mirotwin.recording import topics
+from mirotwin.recording.channels import (
+    CommandMessage,
+    ControlMessage,
+    FirmwareMessage,
+    Lm629Message,
+    MeasurementMessage,
+    PeriodMessage,
+    PostureMessage,
+    PwmMessage,
+    TruthMessage,
+    WireMessage,
+    action_message,
+)
 
 Head = tuple[int, int, bytes]
 """Channel, time and form of a message."""
@@ -162,51 +174,56 @@ class Rows:
         for sent in period.wire:
             self._wire(sent)
         for action in period.actions:
-            self.message(topics.actions_topic(action.network), action.tick, channels.action_message(action))
-        self._begin(topics.PERIOD, tick, channels.PeriodMessage)
+            self.message(topics.actions_topic(action.network), action.tick, action_message(action))
+        self._begin(topics.PERIOD, tick, PeriodMessage)
         self.values += (tick, period.index, period.digest)
 
     def _wire(self, sent: Transmission) -> None:
-        self._begin(_wire_topic(sent.network), sent.tick, channels.WireMessage)
+        self._begin(_wire_topic(sent.network), sent.tick, WireMessage)
         self.values += (sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
 
     def _robot(self, robot: RobotPeriod, tick: int) -> None:
         """What one robot leaves behind."""
         names: list[str] = _robot_topics(robot.network, robot.slot)
-        _, _, reference, truth, *speeds, seen, answer, accepted, rejected, stale, left, right = astuple(robot)
-        self._begin(names[0], tick, channels.PostureMessage)
-        self.values += (tick, *astuple(reference))
-        self._begin(names[1], tick, channels.TruthMessage)
-        self.values += (tick, *astuple(truth), *speeds)
+        seen, answer, left, right = robot.measurement, robot.control, robot.left, robot.right
+        accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
+        self._begin(names[0], tick, PostureMessage)
+        self._values(tick, robot.reference)
+        self._begin(names[1], tick, TruthMessage)
+        self._values(tick, robot.truth)
+        self.values += (robot.v_m_s, robot.w_rad_s)
         if seen is not None:
-            self._begin(names[2], tick, channels.MeasurementMessage)
-            self.values += (tick, *astuple(seen))
-            if not isinstance(seen, Sighting):
+            self._begin(names[2], tick, MeasurementMessage)
+            self._values(tick, seen)
+            if type(seen) is not Sighting:
                 self.values += (None, None)
         if answer is not None:
             self._control(names[3], answer, tick)
         if accepted is not None and rejected is not None and stale is not None:
-            self._begin(names[4], tick, channels.FirmwareMessage)
+            self._begin(names[4], tick, FirmwareMessage)
             self.values += (tick, accepted, rejected, stale)
-        self._begin(names[5], tick, channels.Lm629Message)
+        self._begin(names[5], tick, Lm629Message)
         self.values.append(tick)
-        duties = self._registers(left) + self._registers(right)
-        self._begin(names[6], tick, channels.PwmMessage)
-        self.values += (tick, *duties)
+        self._registers(left)
+        self._registers(right)
+        self._begin(names[6], tick, PwmMessage)
+        self.values += (tick, left.pwm_sign, left.pwm_magnitude, right.pwm_sign, right.pwm_magnitude)
 
     def _control(self, topic: str, answer: Control, tick: int) -> None:
         if topic not in self.channels:
-            kind = channels.ControlMessage
-            self._add_channel(topic, kind, form_of(kind), tuple(answer.inner))
-        self._begin(topic, tick, channels.ControlMessage)
-        self.values += (tick, *astuple(answer))
+            self._add_channel(topic, ControlMessage, form_of(ControlMessage), tuple(answer.inner))
+        self._begin(topic, tick, ControlMessage)
+        self._values(tick, answer)
 
-    def _registers(self, axis: Axis) -> tuple[int, int]:
-        """The values of one chip in its message; returns sign and magnitude of its PWM, which stand in another."""
-        *registers, sign, magnitude, commands = astuple(axis)
-        self.values += registers
-        self.values.append([CommandMessage(tick, opcode, data) for tick, opcode, data in commands])
-        return sign, magnitude
+    def _registers(self, axis: Axis) -> None:
+        commands = [CommandMessage(tick, opcode, data) for tick, opcode, data in axis.commands]
+        self.values += (axis.desired_position, axis.real_position, axis.desired_velocity, axis.status)
+        self.values.append(commands)
+
+    def _values(self, tick: int, record: msgspec.Struct) -> None:
+        """The tick, and all that a record holds."""
+        self.values.append(tick)
+        self.values += astuple(record)
 
     def _begin(self, topic: str, tick: int, kind: type[msgspec.Struct]) -> None:
         """A message, whose values are the next ones."""

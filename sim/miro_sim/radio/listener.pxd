@@ -20,7 +20,7 @@ cdef class Listener:
     cdef Stream errors, noise, idle, lost, collision
     cdef Chain bursts, dropouts
     cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
-    cdef bint squelch, perfect_idle
+    cdef bint squelch, noise_alone, perfect_idle
 
     @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stops=bytes, stop='long long')
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
@@ -35,7 +35,9 @@ cdef class Listener:
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     @cython.locals(level=int, chance='unsigned long long')
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
-    @cython.locals(sender=Sender, first='long long', number='long long', begin='long long', sent=int, level=int)
+    @cython.locals(
+        sender=Sender, first='long long', number='long long', begin='long long', sent=int, level=int, alone=cython.bint
+    )
     cdef void hear_data(
         self,
         long long tick,

@@ -52,6 +52,7 @@ class Listener:
         "lost",
         "lost_threshold",
         "noise",
+        "noise_alone",
         "perfect_idle",
         "squelch",
         "threshold",
@@ -75,7 +76,8 @@ class Listener:
         if params.slicer is not None and params.eb_n0_db is not None:
             self.slicer = Slicer(params.slicer, params.eb_n0_db)
         parts = (self.bursts, self.dropouts, self.slicer)
-        self.perfect_idle = not self.false_start and all(part is None for part in parts)
+        self.noise_alone = all(part is None for part in parts)
+        self.perfect_idle = not self.false_start and self.noise_alone
         self.link_state = UP
         self.bit_errors = 0
 
@@ -188,9 +190,11 @@ class Listener:
         first = (start - sender.latency) // _BIT  # number of the first error draw
         number = sender.number(tick - start)
         begin = sender.begin(start, number)
+        alone = self.noise_alone and rank + 1 == len(senders)
         while begin < until:
-            sent = sender.bit(data, stops, number)
-            level = self.bit(begin, sent, first + number, begin >= tick, senders, rank)
+            level = sent = sender.bit(data, stops, number)
+            if not alone or self.errors.below(first + number, self.threshold):
+                level = self.bit(begin, sent, first + number, begin >= tick, senders, rank)
             if self.lost_threshold:
                 if self.lost.below(first + number - number % _CHARACTER, self.lost_threshold):
                     level = 1

@@ -208,6 +208,8 @@ class Network:
     def hear(self, tick: int) -> None:
         """The PC's receiver hears what the robots sent up to `tick`."""
         heard = self.uplink.receive(tick)
+        if not heard:
+            return
         self.log.note_heard(heard)
         for found in self.telemetry.receive(heard):
             if isinstance(found, Received):
