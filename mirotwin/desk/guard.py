@@ -15,7 +15,7 @@ from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, FrameType, Opcode
 from mirotwin.shell.command import Option, Options
-from mirotwin.shell.options import FiniteNumber
+from mirotwin.shell.options import NAME, FiniteNumber
 
 HEADING = "A robot at a port"
 MAX_SPEED_M_S = 0.5
@@ -30,7 +30,7 @@ _FASTEST = FiniteNumber(0.0, WHEELS.limit_m_s)
 class DeskOptions(Options, frozen=True, kw_only=True):
     """Where a robot is, and what may be done to it. `port` None: no robot, only its twin."""
 
-    port: Annotated[str | None, Option(metavar="URL", heading=HEADING, help=_WHERE)] = None
+    port: Annotated[str | None, Option(type=NAME, metavar="URL", heading=HEADING, help=_WHERE)] = None
     allow_motion: Annotated[bool, Option(heading=HEADING, needs="port", help=_MOTION)] = False
     max_speed: Annotated[
         float,

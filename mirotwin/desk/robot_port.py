@@ -266,13 +266,24 @@ class RobotPort:
 
     # ---- who is there ------------------------------------------------------------------------------------
 
-    def greet(self, robots: int | None = None, sent: Iterable[Transmission] = ()) -> None:
-        """Asks each robot of the network some times, standing; then silence, after which what is `sent` is fresh.
+    def greet(self, sizes: Sequence[int] = (), sent: Iterable[Transmission] = ()) -> int:
+        """Asks who is there, in networks of these sizes (default: the scenario's); the first in which robots answer.
 
-        Raises BadInput where no robot answers.
+        Then comes silence, after which what is `sent` is fresh. Raises BadInput where no robot answers.
         """
-        robots = robots or self.networks[0].spec.robots
-        self._counted, self.delays, first, cursor = {}, [], len(self.wire), Cursor(self.log)
+        sizes, first = sizes or (self.networks[0].spec.robots,), len(self.wire)
+        for robots in sizes:
+            if counted := self._who_answers(robots, sent):
+                self.slots, self._counted = tuple(sorted(counted)), counted
+                self.began_tick = self._now
+                self.waits = Waits(cast("World", self))
+                return robots
+        self._keep(self._decoder.flush(), self._heard_tick)
+        raise BadInput(self.url, "", *self._why_nobody(sizes, first))
+
+    def _who_answers(self, robots: int, sent: Iterable[Transmission]) -> dict[int, tuple[int, int]]:
+        """By slot, how many frames each has accepted and rejected; each is asked some times, standing."""
+        self._counted, self.delays, cursor = {}, [], Cursor(self.log)
         decoder = Decoder(robots)
         told = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
         seq = (next(told, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
@@ -287,20 +298,15 @@ class RobotPort:
             if said is not None and said.slot == said.seq % robots:
                 since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
                 counted[said.slot] = (said.accepted + since, said.rejected)
-        if not counted:
-            self._keep(self._decoder.flush(), self._heard_tick)
-            raise BadInput(self.url, "", *self._why_nobody(robots, first))
-        self.slots, self._counted = tuple(sorted(counted)), counted
-        self.began_tick = self._now
-        self.waits = Waits(cast("World", self))
+        return counted
 
-    def _why_nobody(self, robots: int, first: int) -> tuple[str, str]:
+    def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
         """What came instead of answers, and what to do."""
         came = b"".join(one.data for one in self.wire[first:] if one.direction == UP)
-        asked = f"no robot of a network of {robots} answers {ROUNDS * robots} questions"
+        asked = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
         if not came:
             return f"{asked}: nothing comes", "is it switched on, and is this its radio's port?"
-        if any(isinstance(event, Received) for event in Decoder(robots).feed(came)):
+        if any(isinstance(event, Received) for event in Decoder(sizes[0]).feed(came)):
             return f"{asked}: the port echoes what is sent", "turn the echo of the adapter off"
         if self.delays:
             return f"{asked}, but others answer", "is it a network of another size?"

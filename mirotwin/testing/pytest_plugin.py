@@ -114,6 +114,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _check_options(config: pytest.Config) -> None:
+    if config.getoption("--mirotwin-port") == "":
+        raise pytest.UsageError("--mirotwin-port: is empty; name the port of the robots, or leave it out")
     if _number(config, "repeat", 1) < 1:
         raise pytest.UsageError(
             f"--mirotwin-repeat: {_number(config, 'repeat', 1)} is too few; give 1 or more"

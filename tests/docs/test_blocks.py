@@ -71,6 +71,7 @@ NOT_RUN = {
     "docs/fuzz-any-8051.md": 1,
     "docs/fuzzing.md": 1,
     "docs/gains.md": 1,
+    "docs/howto/desk.md": 1,
     "docs/howto/reproduce.md": 2,
     "docs/index.md": 1,
     "docs/measured.md": 1,

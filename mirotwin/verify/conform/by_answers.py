@@ -18,7 +18,7 @@ from miro_protocol.table import ROBOT_COUNTS, TICKS_PER_MS
 from miro_protocol.transmission import Transmission, joined
 from miro_sim.world.events import Cursor
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.desk.robot_port import PortError, RobotPort
+from mirotwin.desk.robot_port import RobotPort
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule, Topology
@@ -100,7 +100,7 @@ class PortScript(TrialScript):
 def try_at_port(rules: Sequence[Rule], desk: DeskOptions) -> Iterator[Outcome]:
     """Each as soon as it is known. Raises BadInput where no robot answers, PortError."""
     with RobotPort(desk, trial_of(rules[0]).scenario) as port:
-        topology = _robot_at(port)
+        topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
 
         def tried(rule: Rule) -> Outcome:
             if rule.id in NOT_OBSERVABLE:
@@ -108,18 +108,6 @@ def try_at_port(rules: Sequence[Rule], desk: DeskOptions) -> Iterator[Outcome]:
             return _try_often(rule, port, topology)
 
         yield from in_order(rules, tried)
-
-
-def _robot_at(port: RobotPort) -> Topology:
-    """That in the lowest slot of a network of three, or of five."""
-    for robots in ROBOT_COUNTS:
-        try:
-            port.greet(robots)
-            break
-        except BadInput as error:
-            if robots == ROBOT_COUNTS[-1] or isinstance(error, PortError):
-                raise
-    return Topology(robots, port.slots[:1])
 
 
 def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
@@ -150,7 +138,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     rule.write(script)
     last = script.ask(slot, gap_ms=36.0)
     sent = _whole(script.said)
-    port.greet(script.n, sent)
+    port.greet((script.n,), sent)
     cursor, begun = Cursor(port.log), len(port.late_ticks)
     seen = Observed(script.n, slot)
 

@@ -177,6 +177,14 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     )
 
 
+@pytest.mark.parametrize("command", ["replay", "test", "conform"])
+def test_a_port_without_a_name_does_not_mean_the_twin(mirotwin, pytester, command):
+    code, _, err = mirotwin(command, "some.file", "--port", "")
+    assert (code, "'--port': the path is empty" in err) == (2, True)
+    found = pytester.runpytest_inprocess("--mirotwin-port=")
+    found.stderr.fnmatch_lines(["ERROR: --mirotwin-port: is empty; name the port of the robots*"])
+
+
 @pytest.mark.parametrize("workers", ["2", "auto"])
 def test_a_port_is_not_shared_by_workers_of_xdist(pytester, monkeypatch, workers):
     monkeypatch.setenv("PYTEST_XDIST_AUTO_NUM_WORKERS", "2")
