@@ -42,7 +42,14 @@ _MOVES = {
 }  # fmt: skip
 _MOST_FRAMES = 1000
 _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
-_REASONS = {"begin": "entry", "case": "exception", "interrupted": "pause", "goto": "goto", "step": "step"}
+_REASONS = {
+    "breakpoint": "breakpoint",
+    "begin": "entry",
+    "case": "exception",
+    "interrupted": "pause",
+    "goto": "goto",
+    "step": "step",
+}
 _UNUSABLE = (AttributeError, LookupError, TypeError, ValueError)  # what comes of arguments of another form
 Shown = Callable[[], Value]
 
@@ -277,7 +284,7 @@ class Adapter:
         number = int(digits) if word == "breakpoint" else 0
         kind = next((kind for kind, numbers in self.kinds.items() if number in numbers), "")
         reason = (
-            kind.partition(" in ")[0] or _REASONS.get(why) or ("exception" if "fault" in why else "pause")
+            kind.partition(" in ")[0] or _REASONS.get(word) or ("exception" if "fault" in why else "pause")
         )
         self.children.clear()
         self._event(

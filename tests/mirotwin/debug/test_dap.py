@@ -187,8 +187,11 @@ def test_sources_are_told_by_their_names_and_breakpoints_may_be_none(adapter):
 def test_the_verbs_of_the_console_work_in_the_debug_console(adapter):
     _, client = adapter
     client.begin(subject="fig6", at="20ms")
-    for text, said in (("r stepi", "step: "), ("where", "#0"), ("print tick", "tick = ")):
+    done = (("r stepi", "step: "), ("where", "#0"), ("print tick", "tick = "), ("break act", "breakpoint 1"))
+    for text, said in done:
         assert said in client.ask("evaluate", expression=text, context="repl")["body"]["result"]
+    client.send("continue", threadId=1)
+    assert client.until(event="stopped")["body"]["reason"] == "breakpoint"
 
 
 @pytest.mark.parametrize(
