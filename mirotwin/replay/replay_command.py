@@ -66,26 +66,26 @@ def replay_case(job: Job, quiet: bool) -> int:
         again = rerun_job(job, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
     judged = all(one.name != name or one.verdict != "not judged" for one in again.checks.verdicts())
     verdict = verdict_of(job.case.verdict, again.failures, job.case.changed, judged)
-    _say(verdict)
-    if again.failures and not quiet:
-        show(debug_line(job.file, foreign_path(job.runs_on)))
-    return verdict.code
+    return _told(verdict, debug_line(job.file, foreign_path(job.runs_on)), quiet)
 
 
 def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:
     """The same for a case of a bare processor. `check`: FILE.py:FUNCTION, for a case whose check is in a file."""
     from mirotwin.verify.bare.case import load_case_firmware, replay_bare  # loads the bare processor
 
-    verdict = replay_bare(path, load_case_firmware(path, firmware), check)
-    _say(verdict)
-    if verdict.failure is not None and not quiet:
-        show(debug_line(path, firmware, check=check))
-    return verdict.code
+    image = load_case_firmware(path, firmware)
+    verdict = replay_bare(path, image, check)
+    again = debug_line(path, firmware, check=check)
+    return _told(verdict, again, quiet)
 
 
-def _say(verdict: CaseVerdict) -> None:
+def _told(verdict: CaseVerdict, again: str, quiet: bool) -> int:
+    """Says the verdict, and `again`, the command that stands at what failed; the exit code."""
     for line in verdict.lines:
         (show if verdict.code == DONE else complain)(line)
+    if verdict.failure is not None and not quiet:
+        show(again)
+    return verdict.code
 
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")

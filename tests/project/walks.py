@@ -97,7 +97,7 @@ def walk(code, module, function, record, first, made_too):
                         one.id
                         for target in node.targets
                         for one in ast.walk(target)
-                        if isinstance(one, ast.Name)
+                        if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
                     }
                 continue
             there = code.called(key[0], node)

@@ -14,7 +14,6 @@ from typing import Any
 
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.settings import Setting, in_text, make
-from miro_sim.scenario.text import check_integers
 
 Table = dict[str, Any]
 SCENARIO, SET = "scenario", "set"
@@ -36,7 +35,6 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     settings = raw.get(SET, {})
     if not isinstance(settings, dict):
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
-    check_integers(raw, origin)  # they could not be written as text either
     _check_no_part_of_network(own.get(NETWORK), origin, name)
     try:
         base = tables_of(_beside(origin, name))

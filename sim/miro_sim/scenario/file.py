@@ -4,7 +4,6 @@ Nothing but `ScenarioError` leaves these functions, whatever the text.
 """
 
 import re
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from miro_sim.scenario.places import check_places
 from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
-from miro_sim.scenario.text import check_integers, check_size, written
+from miro_sim.scenario.text import check_integers, tables, written
 from miro_sim.scenario.variants import VariantError, with_variant
 
 _BUILTIN = Path(__file__).parent / "builtin"
@@ -132,9 +131,8 @@ def _parsed(
     text: str, origin: str, settings: Sequence[str], also: Also, notes: list[str]
 ) -> tuple[dict[str, Any], Scenario, bool]:
     """The tables with the settings made, the scenario, and whether the text alone says all of it."""
-    check_size(text, origin)
     try:
-        raw = _tables(text, origin)
+        raw = tables(text, origin)
         whole, own = with_base(raw, origin, _base_tables)
         return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
     except RecursionError:
@@ -142,9 +140,7 @@ def _parsed(
 
 
 def _base_tables(source: str) -> dict[str, Any]:
-    text = source_text(source)
-    check_size(text, source)
-    return _tables(text, source)
+    return tables(source_text(source), source)
 
 
 def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
@@ -157,15 +153,6 @@ def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> 
 
 def _too_deep(origin: str) -> ScenarioError:
     return ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels")
-
-
-def _tables(text: str, origin: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(origin, text, str(error)) from None
-    except ValueError:  # an integer with more digits than Python converts
-        raise ScenarioError(origin, "", "an integer of thousands of digits") from None
 
 
 def _checked(
@@ -232,14 +219,6 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
                 raise ScenarioError(origin, path, error.what, error.remedy) from None
         complete.append(network)
     return {**raw, "network": complete}
-
-
-def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:
-    what, _, position = message.partition(" (at ")
-    position = position.rstrip(")")
-    if position == "end of document":
-        position = f"line {text.count(chr(10)) + 1}"
-    return ScenarioError(origin, position, f"not TOML: {what}")
 
 
 def _check_finite(raw: dict[str, Any], origin: str) -> None:

@@ -1,5 +1,6 @@
-"""The text of a scenario as TOML: what may be given to the parser, and writing one."""
+"""The text of a scenario as TOML: reading its tables, and writing them."""
 
+import tomllib
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,6 +21,27 @@ def check_size(text: str, origin: str) -> None:
     if line is not None:
         what = f"a key of more than {KEY_PARTS} parts"
         raise ScenarioError(origin, f"line {line}", what, "remove it; no key of a scenario has more than 6")
+
+
+def tables(text: str, origin: str) -> dict[str, Any]:
+    """The tables that the text holds. Raises ScenarioError."""
+    check_size(text, origin)
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(origin, text, str(error)) from None
+    except ValueError:  # an integer with more digits than Python converts
+        raise ScenarioError(origin, "", "an integer of thousands of digits") from None
+    check_integers(raw, origin)  # they could not be written as text either
+    return raw
+
+
+def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:
+    what, _, position = message.partition(" (at ")
+    position = position.rstrip(")")
+    if position == "end of document":
+        position = f"line {text.count(chr(10)) + 1}"
+    return ScenarioError(origin, position, f"not TOML: {what}")
 
 
 def check_integers(value: Any, origin: str, path: str = "") -> None:
