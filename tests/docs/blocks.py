@@ -15,8 +15,6 @@ A comment in front of a block says what a reader need not know:
                                  newcomer follows (`sandbox.FIRST_USE`) when the reader comes to it
 """
 
-from __future__ import annotations
-
 import re
 import textwrap
 from pathlib import Path

@@ -7,8 +7,6 @@
 Blocks that are slow (`<!-- slow: .. -->`) are run here; blocks that are not run are counted.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re
@@ -32,7 +30,7 @@ class Count:
     def __init__(self):
         self.run = 0
         self.left_out = 0
-        self.refused: list[str] = []
+        self.refused = []
 
     def __str__(self):
         return f"{self.run} lines run, {self.left_out} not run, {len(self.refused)} refused"

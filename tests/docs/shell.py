@@ -5,8 +5,6 @@ A fork costs some milliseconds where a new interpreter costs half a second of lo
 It has arguments, files, exit code and output as the program has them.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

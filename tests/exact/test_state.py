@@ -1,7 +1,5 @@
 """State from tables: flat bytes, what is refused, and names of what differs."""
 
-from __future__ import annotations
-
 import struct
 from collections import deque
 
@@ -45,13 +43,13 @@ class Cart:
         self.moving = 1
         self.levels = [1, 2, 3]
         self.wheels = {"left": Wheel(), "right": Wheel()}
-        self.spare: Wheel | None = None
+        self.spare = None
         self.ticks = [30, 40, 50, 60]
         self.end = 4
         self.bytes = bytearray(b"ab..")
         self.flaws = bytearray(4)
         self.count = 2
-        self.waiting: deque[tuple[int, bytes]] = deque([(1, b"xy"), (1, b"")])
+        self.waiting = deque([(1, b"xy"), (1, b"")])
         self.pose = (1.0, -0.0)
         self.text = b"hi"
         self.edges = [3, 5]

@@ -4,8 +4,6 @@ build/fuzzing/found/TARGET      inputs that reached something new
 build/fuzzing/findings/TARGET   inputs that break the promise, and the report of each
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

@@ -17,8 +17,6 @@ MOST_S = 0.4
 ROOT = str(Path(__file__).parents[2])
 _OURS = ("/exact/", "/protocol/", "/robot_fw/", "/host/", "/sim/")
 
-Feature = tuple[str, int, int]
-
 
 def kept(name):
     """Names and contents, in the order of names."""

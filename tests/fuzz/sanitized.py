@@ -4,8 +4,6 @@ With clang and Atheris the modules also tell libFuzzer what they execute, and li
 sanitizers, which Atheris brings. With GCC, or without Atheris, the compiler's own runtime is loaded.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import os

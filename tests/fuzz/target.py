@@ -5,8 +5,6 @@ apart, and raises where the promise is broken: any exception but the documented 
 for people, or a round trip that does not come back.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import re

@@ -24,8 +24,6 @@ slot = 2
 reference.kind = "arc"
 """
 
-Result = tuple[int, str, str]
-
 
 @pytest.fixture(scope="session")
 def mirotwin():

@@ -7,8 +7,6 @@ runs one again and leaves its file in the current folder. What belongs here: goo
 which command reads them. What does not: what a format means.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import random
@@ -116,8 +114,6 @@ BRACKETS = (
 
 RESUMMED = "image, sums put right"
 
-Commands = list[list[str]]
-
 
 def hex_records(code):
     """Intel HEX."""
@@ -140,7 +136,7 @@ class Seeds:
 
     def __init__(self, folder):
         self.folder = folder
-        self.kinds: dict[str, tuple[str, bytes, Commands]] = {}
+        self.kinds = {}
         image = image_path()
         self.pieces = [image.with_suffix(suffix).read_bytes() for suffix in (".ihx", ".map", ".cdb", ".rst")]
         for name in ("echo.ihx", "named.ihx"):

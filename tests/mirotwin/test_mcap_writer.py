@@ -14,7 +14,6 @@ from mirotwin.recording import writer as mcap_writer
 from mirotwin.recording.container import BrokenOff, records
 from mirotwin.recording.writer import McapWriter
 
-Step = tuple[str, int, int, bytes]
 NAMES = ("schema", "channel", "message", "message", "message", "message", "flush")
 STEPS = st.lists(
     st.tuples(
@@ -111,7 +110,7 @@ class Journal(io.BytesIO):
 
     def __init__(self):
         super().__init__()
-        self.states: list[bytes] = []
+        self.states = []
 
     def write(self, data, /):
         piece = bytes(data[:300])  # a raw file may take less than it is given

@@ -5,8 +5,6 @@ with times that say that they are older. The folder is `build/mutants`, which gi
 by the hash of all that it was built from. Processes may build at the same time.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

@@ -5,8 +5,6 @@ preprocessor is one token of kind `directive`, but for the body of a `#define`: 
 say `macro`, so that constants with names can be changed where they are defined.
 """
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ difference in time alone says by how much. With other times positions are others
 out, and of an answer neither the positions nor its CRC are compared.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from typing import NamedTuple

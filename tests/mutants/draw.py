@@ -4,8 +4,6 @@ The draw is spread over files and operators: of each operator in each file one c
 proportion to how many there are. So a small file is seen, and a table of constants does not fill the list.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mistakes that a fuzzer has to find: each needs an input that a bench hardly sends."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from tests.mutants.planted import PLANTED, Planted

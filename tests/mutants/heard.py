@@ -1,7 +1,5 @@
 """Inputs that show the mistakes of `for_fuzzing`, written by hand, and the run that all checks of firmware watch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Which rules of `mirotwin conform` an image breaks."""
 
-from __future__ import annotations
-
 import time
 
 import msgspec

@@ -8,8 +8,6 @@ simple statements (a call, an assignment, `break`, `return`), no declarations an
 when its decision is negated.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from tests.mutants.c_tokens import words

@@ -1,7 +1,5 @@
 """Mistakes that people make in such firmware, each planted by hand: one text of one file becomes another one."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

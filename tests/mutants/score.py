@@ -12,8 +12,6 @@ Exit code 1 if the score is below 95 %, if a planted mistake lives, if somebody 
 kills nobody.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

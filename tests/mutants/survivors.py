@@ -8,8 +8,6 @@ An entry is named by the mutant's id and has `because`, a sentence or two, and `
     missing      it does what they forbid, and no rule notices
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

@@ -3,11 +3,9 @@
 Arrays hold all samples of a window at once: [row, column, sample row, sample column].
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +15,6 @@ from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import IDENTITIES, TEAMS
 from miro_sim.pitch import sensor as ours
 from miro_sim.pitch.paints import BLACK_FLOOR, NUMBERS, PAINTS
-
-Ints = Any  # numpy array of int64
 
 
 class Body(NamedTuple):
@@ -46,8 +42,8 @@ class NaiveCamera:
         self.settings = settings
         self.pattern = pattern
         self.stream = stream
-        self.bodies: list[Body] = []
-        self.ball: tuple[float, float] | None = None
+        self.bodies = []
+        self.ball = None
 
     def window(self, left, top, width, height, frame, tick):
         """The bytes of a window."""

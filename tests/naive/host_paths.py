@@ -4,7 +4,6 @@ What is a derivative there is a numerical one here; what is a formula for a poly
 equations here. Nothing is shared with the code under test.
 """
 
-import bisect
 import math
 
 from mpmath import atan, atan2, cos, diff, hypot, lu_solve, matrix, mp, mpf, pi, sin
@@ -136,10 +135,3 @@ def quickest(found, speed, accel, lateral, turn, grid=1500):
         times.append(times[-1] + 2 * way / (math.sqrt(z[k]) + math.sqrt(z[k + 1])))
         covered.append(covered[-1] + way)
     return times, covered
-
-
-def covered_at(times, ways, t):
-    """Way in m behind the start at t."""
-    k = min(bisect.bisect_right(times, t), len(times) - 1)
-    share = (t - times[k - 1]) / (times[k] - times[k - 1])
-    return ways[k - 1] + min(share, 1.0) * (ways[k] - ways[k - 1])

@@ -3,8 +3,6 @@
 Commands are generators that wait for their words; it shares nothing with the package but its options.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from fractions import Fraction
@@ -29,25 +27,25 @@ class NaiveLm629:
         self.lost = 0
         self.port_byte = 0
         self.driven = 0
-        self.alive_at: int | None = None
-        self.signals: set[int] = set()
+        self.alive_at = None
+        self.signals = set()
         self.index_position = 0
         self.clear("hard")
 
     def clear(self, reset):
-        self.reset: str | None = reset
+        self.reset = reset
         self.pid = NaivePid(self.options.pid_saturates, self.options.sum_rounding == "down")
         self.excess = False
         self.buffer = {"control": 0, "a": 0, "v": 0, "p": 0}
         self.relative = self.newer_position = False
         self.filter = {"kp": 0, "ki": 0, "kd": 0, "il": 0, "ds": 0}
-        self.start: dict[str, int] | None = None
+        self.start = None
         self.start_relative = False
-        self.update: dict[str, int] | None = None
+        self.update = None
         kept = set() if self.options.reset_clears_lpes or reset == "hard" else {9}
         kept |= set() if self.options.reset_clears_index else {0}
         self.signals &= kept
-        self.mask: set[int] = set()
+        self.mask = set()
         self.real = self.velocity_counts = 0
         if self.options.reset_clears_index:
             self.index_position = 0
@@ -55,10 +53,10 @@ class NaiveLm629:
         self.speed = self.a = self.limit = self.target = 0
         self.activity = "none"
         self.mode_bits = 0
-        self.breakpoint: tuple[int, int] | None = None
+        self.breakpoint = None
         self.magnitude = self.sign = 0
         self.busy_until = 0
-        self.words: Words | None = None
+        self.words = None
         self.answer = b""
         self.phase, self.high = 0, 0
         self.strobe = ""

@@ -3,8 +3,6 @@
 Times are fractions of a nanosecond. It shares nothing with `miro_robot.lm629.bus_timing` but the names of the limits.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 TICK_NS = Fraction(125, 3)
@@ -17,7 +15,6 @@ NEEDED_NS = {
     "PS hold": 30,
     "recovery between two accesses": 120,
 }
-Pins = tuple[int, int, int, int, int]  # cs, rd, wr, ps, data
 
 
 def strobe(pins):
@@ -27,7 +24,7 @@ def strobe(pins):
 
 class NaiveBusTiming:
     def __init__(self):
-        self.history: list[tuple[int, Pins]] = [(-(10**9), (1, 1, 1, 1, 0xFF))]
+        self.history = [(-(10**9), (1, 1, 1, 1, 0xFF))]  # tick; cs, rd, wr, ps, data
 
     def since(self, tick, change):
         """How long ago `change` last happened, edges on `tick` itself not counted."""

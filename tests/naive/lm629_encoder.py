@@ -1,7 +1,5 @@
 """The LM629's encoder inputs, sampled clock by clock."""
 
-from __future__ import annotations
-
 FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
@@ -16,19 +14,19 @@ class NaiveEncoder:
         self.double_step = double_step
         self.hurry = hurry
         self.filter_clocks = filter_clocks
-        self.phases: list[tuple[int, tuple[int, int]]] = []
-        self.index_levels: list[tuple[int, int]] = [(-1, 1)]
-        self.accepted: tuple[int, int] | None = None
+        self.phases = []
+        self.index_levels = [(-1, 1)]
+        self.accepted = None
         self.accepted_index = 1
-        self.phase_run: list[tuple[int, int]] = []
-        self.index_run: list[int] = []
+        self.phase_run = []
+        self.index_run = []
         self.clock = 0
         self.drop()
 
     def drop(self):
         self.counts = 0
         self.armed = False
-        self.caught: int | None = None
+        self.caught = None
 
     def set_phases(self, tick, a, b):
         if self.accepted is None:

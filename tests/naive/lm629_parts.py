@@ -3,8 +3,6 @@
 Positions are fractions of a count, the stopping distance is added up term by term.
 """
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 
@@ -54,7 +52,7 @@ class NaivePid:
         self.forget()
 
     def forget(self):
-        self.errors: list[int] = []
+        self.errors = []
         self.sum = self.last_taken = self.held = self.integral = 0
         self.until_next = 0
 

@@ -5,8 +5,6 @@ A cycle runs: counts (with what was sampled in the cycle before), flags, then sa
 happen between two calls of `cycle`.
 """
 
-from __future__ import annotations
-
 
 class NaiveTimers:
     """Registers are plain attributes; `pulses1` and `pulses2` list what the serial port would be clocked by."""
@@ -19,7 +17,7 @@ class NaiveTimers:
         self.clock_out = 0
         self.samples = [self._pins(1, 1, 1, 1, 1, 1)] * 2  # of the last two cycles, older first
         self.overflowed1 = False  # timer 1, in the last cycle
-        self.overflowed2: list[int] = []  # timer 2: ticks within the last cycle
+        self.overflowed2 = []  # timer 2: ticks within the last cycle
 
     @staticmethod
     def _pins(int0, int1, t0, t1, t2, t2ex):

@@ -4,8 +4,6 @@ Driven tick by tick of the crystal: `tick(now, rxd)` for each, with `clock(now)`
 clock source overflows. Software reads and writes between two machine cycles.
 """
 
-from __future__ import annotations
-
 
 class NaiveUart:
     """Two divide-by-16 counters with their shift registers."""
@@ -17,15 +15,15 @@ class NaiveUart:
         self.halves = {"rx": 0, "tx": 0}
         # transmitter
         self.divider = 0
-        self.pending: list[int] | None = None  # bits not yet on the pin
+        self.pending = None  # bits not yet on the pin
         self.delay = 0
-        self.due: list[tuple[int, int, bool]] = []  # (tick, level, last)
+        self.due = []  # (tick, level, last)
         # receiver
         self.previous = 1
-        self.state: int | None = None  # 16x ticks since the fall
-        self.samples: list[int] = []
-        self.bits: list[int] = []
-        self.delivery: tuple[int, list[int]] | None = None
+        self.state = None  # 16x ticks since the fall
+        self.samples = []
+        self.bits = []
+        self.delivery = None
 
     @property
     def nine(self):

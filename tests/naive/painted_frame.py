@@ -3,8 +3,6 @@
 Every pixel has 4 x 4 samples; each is traced to the plane of the tops.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

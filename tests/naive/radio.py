@@ -4,8 +4,6 @@ Written from the definitions in `miro_sim.radio` and its README; draws come from
 evaluated from the beginning at every call.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from fractions import Fraction
 from functools import cache
@@ -14,9 +12,7 @@ from typing import NamedTuple
 from miro_sim.radio.probability import margin_table
 from tests.naive import rng
 
-Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
 """(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
-Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
 NO_OTHERS = []
 
@@ -64,7 +60,7 @@ class Sender:
             2500 * (10**6 + listener.crystal_offset_ppm), 10**6 + params.baud_offset_ppm
         )
         # arrival, bits, ticks at which they begin, and for bad stop bits the tick at which they go back to mark
-        self.arrivals: list[tuple[int, list[int], list[int], dict[int, int]]] = []
+        self.arrivals = []
         over = 0
         for start, data, *bad_stop in sent:
             late = rng.u32(seed, f"{name}/jitter", start // 2500) * (params.jitter_ticks + 1) // 2**32

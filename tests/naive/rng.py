@@ -10,8 +10,6 @@ from functools import cache
 
 import mpmath
 
-Words = tuple[int, int, int, int]
-
 
 def philox4x32_10(counter, key):
     a, b, c, d = counter

@@ -1,7 +1,5 @@
 """The rules of `miro_protocol.robot_rules`, each said over a whole history with nothing remembered on the way."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 CHARACTER = 25_000  # 10 bits at 9600 baud
@@ -104,7 +102,7 @@ class Wheel:
         self.control = 0
         self.velocity = 0
         self.acceleration = 0
-        self.order: tuple[str, int, int, bool] = ("off", 0, 0, False)
+        self.order = ("off", 0, 0, False)
 
     def reset(self):
         self.__init__()

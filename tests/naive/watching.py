@@ -4,8 +4,6 @@ It asks the CPU nothing but its public state, and knows an interrupt by the prog
 instruction executed.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import NamedTuple
 

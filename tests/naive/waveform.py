@@ -4,8 +4,6 @@ Moves a board on by one instruction at a time and asks every part for its level 
 remembered but the list of changes. Which pin is wired to what is taken from the table in `robot_fw/README.md`.
 """
 
-from __future__ import annotations
-
 from miro_exact.state import TICK
 from miro_robot.mcs51.opcodes import CYCLES
 from miro_robot.plant import Plant
@@ -51,8 +49,8 @@ class Sampler:
     def __init__(self, cpu, board=None):
         self.cpu = cpu
         self.board = board
-        self.changes: dict[str, list[tuple[int, int]]] = {}
-        self.routines: list[int] = []
+        self.changes = {}
+        self.routines = []
 
     def run(self, end_tick):
         while 12 * self.cpu.cycles < end_tick:

@@ -1,7 +1,5 @@
 """A run's digest, in this process's engine: `python -m tests.sim.digest_of --engine compiled "fig6 0.5 s seed 7"`."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

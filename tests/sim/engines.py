@@ -4,8 +4,6 @@ Only instructions that were executed count: the firmware sleeps most of the time
 the next seed.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import itertools

@@ -14,8 +14,6 @@ A Python that rounds sums twice (x87 arithmetic, Debian's for i386) must refuse 
 the golden one is a failure.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

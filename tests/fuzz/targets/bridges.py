@@ -1,7 +1,5 @@
 """The ports of `serve`: telnet negotiation fed with bytes, and TCP and terminals with a client that does anything."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket

@@ -6,7 +6,6 @@ the input says otherwise. The state must be refused with a ValueError and withou
 
 from tests.fuzz.target import Draws, Target, folder, refused
 
-Span = tuple[int, int]
 _FRESH_AFTER = 64
 """Inputs that one world, board or machine loads: what was loaded before must not matter."""
 

@@ -6,9 +6,6 @@ The law is asked in every stage of a step. Where a sign function switches, the m
 held within what the law does in one step.
 """
 
-from collections.abc import Callable
-from typing import Literal, Protocol
-
 import msgspec
 
 from miro_exact.dmath import atan2, sincos
@@ -18,15 +15,6 @@ from miro_host.theory import radius
 from tests.host.theory import computed_torque
 from tests.host.theory.matrices import Vector, solution, times
 from tests.host.theory.unicycle import cartesian_rates, inertia, polar_rates
-
-Chart = Literal["cartesian", "polar"]
-Torques = Callable[[float], Vector]
-
-
-class Demand(Protocol):
-    """A law: z_r' + u in m/s2 and rad/s2 for a robot at a posture with velocities v, w, t seconds after the start."""
-
-    def __call__(self, t_s, posture, v, w, /): ...
 
 
 class SimulatedStep(msgspec.Struct, frozen=True):

@@ -1,10 +1,7 @@
 """An engine for tests: it changes inputs by chance, in this process, and keeps those that reach new edges."""
 
-from __future__ import annotations
-
 import random
 import time
-from pathlib import Path
 
 from mirotwin.fuzz.engine import EngineProgress
 
@@ -22,7 +19,7 @@ class RandomEngine:
         self.seen = bytearray(target.map_size)
         self.queue = list(seeds)
         self.count = 0
-        self.found: dict[str, list[Path]] = {"queue": [], "crashes": []}
+        self.found = {"queue": [], "crashes": []}
         self.stopped = False
         self.began_s = time.monotonic()
         target.use_map(self.edges)

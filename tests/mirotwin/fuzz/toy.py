@@ -1,9 +1,5 @@
 """A target for tests of engines, without a robot: it fails for an input that begins with FZ."""
 
-from __future__ import annotations
-
-from typing import Any
-
 from mirotwin.fuzz.target import TargetFailure
 
 
@@ -15,8 +11,8 @@ class Toy:
 
     def __init__(self):
         self.executions = 0
-        self.failure: TargetFailure | None = None
-        self.edges: Any = bytearray(self.map_size)
+        self.failure = None
+        self.edges = bytearray(self.map_size)
 
     def use_map(self, edges):
         self.edges = edges

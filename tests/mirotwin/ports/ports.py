@@ -20,9 +20,9 @@ class Rig:
     def __init__(self):
         self.world = World(live_scenario("fig6").scenario, 1, own_image())
         self.selector = DefaultSelector()
-        self.told: list[str] = []
+        self.told = []
         self.context = PortContext(RadioPort(self.world), self.selector, self.told.append)
-        self.open: list[Endpoint] = []
+        self.open = []
 
     def opened(self, port):
         self.open.append(port)

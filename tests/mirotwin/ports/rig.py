@@ -1,8 +1,5 @@
 """What the tests of plugs share: a served session, frames, and whether a recording replays to its own digests."""
 
-from __future__ import annotations
-
-import os
 import signal
 import subprocess
 import sys
@@ -130,4 +127,3 @@ NO_SELECTOR = SimpleNamespace(
     unregister=lambda *_: None,
     modify=lambda *_: None,
 )
-ENVIRONMENT = dict(os.environ)

@@ -15,7 +15,6 @@ import serial
 from tests import children
 from tests.mirotwin.ports.rig import ANSWER_BYTES, CLEAN, ROOT, python, question, replays, sent_bytes, served
 
-Result = tuple[int, str, str]
 PARTS = ["case.part.stream", "run.part.mcap", "summary.part.json"]
 SETTINGS = [word for setting in CLEAN for word in ("--set", setting)]
 

@@ -3,18 +3,15 @@
 import threading
 import time
 import warnings
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 import serial
 
 from miro_exact.clock import HOST_CHARACTER_TICKS, ticks
-from mirotwin.ports.serial_port import Serial
 from tests.mirotwin.ports.rig import ANSWER_BYTES, python, question, replays, sent_bytes
 
 URL = "miro://fig6?set=network.radio.bit_error_rate=0"
-Open = Callable[..., Serial]
 
 
 @pytest.fixture

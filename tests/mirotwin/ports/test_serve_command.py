@@ -21,7 +21,6 @@ from tests.mirotwin.ports.rig import (
     served,
 )
 
-Result = tuple[int, str, str]
 PARTS = ["case.part.stream", "run.part.mcap", "summary.part.json"]
 SETTINGS = [word for setting in CLEAN for word in ("--set", setting)]
 

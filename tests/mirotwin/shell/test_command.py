@@ -1,7 +1,5 @@
 """A record of options is the parser, the defaults and the line that gives the command again."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated

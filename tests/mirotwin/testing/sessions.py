@@ -1,7 +1,5 @@
 """pytest sessions as a user runs them: a folder with tests of its own, and pytest there."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

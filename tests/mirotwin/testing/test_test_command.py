@@ -1,14 +1,12 @@
 """`mirotwin test`: which files are tests, their verdicts, and what a failure leaves."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from mirotwin.verify.steps.running import collect
-from tests.mirotwin.conftest import Result
 
 ROOT = Path(__file__).parents[3]
 HEAD = 'scenario = "silent"\nduration_s = 0.5\n'
@@ -22,7 +20,6 @@ BAD = GOOD.replace("within_ms", "within_s")
 CHECKED = (
     HEAD + "expect.failsafe_stop_ms = 100.0\nstep = [{ pause_ms = 5 }, { send = 'team', left_m_s = 0.2 }]\n"
 )
-Call = Callable[..., Result]
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
@@ -33,7 +31,7 @@ class Probe(Board):
     """Notes every change of a port the firmware makes. With `deaf` the wire /RD is broken: the bus reads FFh."""
 
     def __init__(self, *args, **kwargs):
-        self.writes: list[tuple[int, int, int]] = []
+        self.writes = []
         self.deaf = False
         super().__init__(*args, **kwargs)
 
@@ -61,8 +59,8 @@ class Rig:
         self.board.load(IMAGE)
         self.now = 0
         self.line_free = 0
-        self.pending: list[tuple[int, int]] = []
-        self.edges: list[tuple[int, int]] = []
+        self.pending = []
+        self.edges = []
         self.received = 0
         if boot:
             self.run_to(BOOTED)

@@ -1,7 +1,5 @@
 """Reads a VCD back with pyvcd's reader, which shares no code with its writer."""
 
-from __future__ import annotations
-
 import io
 from bisect import bisect_right
 from dataclasses import dataclass, field

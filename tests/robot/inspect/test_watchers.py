@@ -1,7 +1,5 @@
 """Watchers see what a CPU does, and change nothing of it."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -64,7 +62,7 @@ class Log(Watcher):
     """Notes everything it is told in the words of the naive twin."""
 
     def __init__(self):
-        self.steps: list[watching.Step] = []
+        self.steps = []
 
     def executed(self, cpu, pc, start):
         self.steps.append(watching.Step("run", pc, start, cpu.cycles, cpu.pc, cpu.sp))

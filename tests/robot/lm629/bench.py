@@ -3,8 +3,6 @@
 Only what several tests need; the sequences under test stand in the tests.
 """
 
-from __future__ import annotations
-
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.options import Lm629Options
@@ -19,7 +17,7 @@ class Bench:
     def __init__(self, chip=None, tick=0):
         self.chip = Lm629() if chip is None else chip
         self.tick = tick
-        self.edges: list[tuple[int, int, int, int]] = []
+        self.edges = []
         self.pins = (1, 1, 1, 1, 0xFF)
 
     @classmethod

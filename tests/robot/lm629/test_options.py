@@ -1,6 +1,5 @@
 """Every rule that was chosen can be read the other way, and then the chip does otherwise."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -325,7 +324,6 @@ def counts_of_a_short_state(bench):
     return bench.chip.real_position
 
 
-Reading = tuple[str, object, Callable[[Bench], object], object, object]
 READINGS = (
     ("busy_clocks", 160, busy_ticks, 480 - 24, 640 - 24),
     ("busy_judged", "end", lost_writes, 1, 0),

@@ -1,7 +1,5 @@
 """A CPU with a recording bus, and short cuts for running assembled lines on it."""
 
-from __future__ import annotations
-
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.mcs51.asm import SFRS, assemble
@@ -11,12 +9,12 @@ class RecordingBus(Bus):
     """Remembers every call; external memory is a dictionary."""
 
     def __init__(self):
-        self.ports: list[tuple[int, int, int]] = []
-        self.reads: list[tuple[int, int]] = []
-        self.writes: list[tuple[int, int, int]] = []
-        self.faults: list[tuple[int, int, int]] = []
-        self.sent: list[tuple[int, int]] = []
-        self.memory: dict[int, int] = {}
+        self.ports = []
+        self.reads = []
+        self.writes = []
+        self.faults = []
+        self.sent = []
+        self.memory = {}
 
     def port_written(self, port, latch, tick):
         self.ports.append((port, latch, tick))

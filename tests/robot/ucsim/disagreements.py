@@ -7,8 +7,6 @@ prints the table that has to stand there. Sources: Atmel's 8051 Hardware Manual 
 (1919D) and the AT89C51AC2 data sheet (4127H).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

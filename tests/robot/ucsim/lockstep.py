@@ -6,8 +6,6 @@ The other is a program: each step begins in the state that the one before left. 
 wherever it runs.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

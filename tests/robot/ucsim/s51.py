@@ -5,8 +5,6 @@ commands: `exec FILE` echoes each command before its output, and `dump /b` print
 without guessing.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

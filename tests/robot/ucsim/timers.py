@@ -4,8 +4,6 @@ A random walk seldom meets an overflow; here a timer is started shortly before o
 length pass, and its registers are copied to internal RAM all the time.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from miro_robot.mcs51.cpu import Cpu

@@ -5,8 +5,6 @@ stays. So each opcode comes up about equally often, in states that the walk itse
 `scattered` is a row of single steps instead: each begins at a random place in a state of `states.py`.
 """
 
-from __future__ import annotations
-
 from random import Random
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A robot drives at up to 1.46 m/s, gains and loses 6 m/s2 and turns at up to 8 ra
 that two are often in one window; where it would touch, or leave the pitch, it stops at once and thinks again.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import random

@@ -1,7 +1,5 @@
 """Random scenes for the camera: anywhere in the picture, crowded, at borders, with every setting."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from miro_exact.rng import Stream

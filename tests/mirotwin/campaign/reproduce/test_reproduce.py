@@ -41,7 +41,6 @@ from mirotwin.commands import main
 
 pytestmark = pytest.mark.slow
 
-DAY = "2026-11-22"
 VALUES = {
     "rms_x_cm": 0.5,
     "rms_y_cm": 0.5,

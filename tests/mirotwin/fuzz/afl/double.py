@@ -1,7 +1,5 @@
 """A target of a few branches: what the fork server and the launcher are tested with."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 
@@ -33,8 +31,8 @@ class Double:
 
     def __init__(self, kind=2, raises=False, sleeps=False, always=False):
         self.kind, self.raises, self.sleeps, self.always = kind, raises, sleeps, always
-        self.edges: Any = bytearray(MAP_SIZE)
-        self.failure: Any = None
+        self.edges = bytearray(MAP_SIZE)
+        self.failure = None
         self.executions = 0
 
     def use_map(self, edges):

@@ -1,7 +1,5 @@
 """What the tests of Foxglove's topics share: a run of two teams, its export, and messages as the library reads them."""
 
-from __future__ import annotations
-
 import io
 from functools import cache
 from typing import Any, NamedTuple

@@ -1,11 +1,8 @@
 """The scene lies on the picture: what is drawn in 3D falls on the pixels that show it."""
 
-from __future__ import annotations
-
 import base64
 import io
 import math
-from typing import Any
 
 import msgspec
 import pytest
@@ -13,8 +10,6 @@ from PIL import Image
 
 from mirotwin.report.foxglove.messages import LINE_LIST, CameraCalibration, FrameTransform
 from tests.mirotwin.report.foxglove.test_optics import drawn
-
-Point = tuple[float, float, float]
 
 
 class Frame:
@@ -28,12 +23,12 @@ class Frame:
             for one in shown
             if one.topic == "/foxglove/transforms" and one.time_ns == found.time_ns
         )
-        self.frames: dict[str, Any] = {part["child_frame_id"]: part for part in transforms}
+        self.frames = {part["child_frame_id"]: part for part in transforms}
         self.camera = msgspec.convert(self.frames["net0/camera"], FrameTransform)
         (calibration, *_) = [one.content for one in shown if one.topic == "/foxglove/net0/calibration"]
         self.optics = msgspec.convert(calibration, CameraCalibration)
         (scene, *_) = [one.content["entities"] for one in shown if one.topic == "/foxglove/scene"]
-        self.scene: dict[str, Any] = {entity["id"]: entity for entity in scene}
+        self.scene = {entity["id"]: entity for entity in scene}
 
     def colour(self, frame, point):
         """Of the pixel that shows a point; (0, 0) of OpenCV is the middle of the first pixel."""

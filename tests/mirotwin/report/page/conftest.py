@@ -19,7 +19,6 @@ reference.kind = "line"
 slot = 2
 reference.kind = "arc"
 """
-Called = tuple[int, str]
 
 
 def called(*arguments):

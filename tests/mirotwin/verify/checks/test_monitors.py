@@ -8,7 +8,6 @@ from miro_host.plugins import PluginError
 from miro_robot.event_log import RECEIVED
 from miro_sim.scenario.file import load, parse
 from miro_sim.world import conditions
-from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Monitor
@@ -157,7 +156,7 @@ class ListingMonitor(Monitor[Listing]):
 
     def __init__(self, check, subject):
         super().__init__(check, subject)
-        self.heard: list[Event] = []
+        self.heard = []
 
     def event(self, event):
         self.heard.append(event)

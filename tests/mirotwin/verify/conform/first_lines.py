@@ -1,7 +1,5 @@
 """Usual mistakes, and words that the first three lines of `mirotwin conform` must say of firmware with one of them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -1,7 +1,5 @@
 """Mistakes to plant in the firmware's source, and the rules that each must fail."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 
