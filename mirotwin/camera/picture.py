@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import PICTURE_BYTES, read_input
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH
-from miro_host.eye.frame import Pixels
+from miro_host.eye.grabber import Pixels
 
 SUFFIXES = (".png", ".ppm")
 _DAMAGED = (

@@ -3,9 +3,25 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Protocol
 
 from miro_exact.state import Rows
 from miro_host.eye.track import Sighting
+
+
+class Pixels(Protocol):
+    """A picture as the tracker gets it, out of the grabber's memory. `width`, `height` in pixels."""
+
+    width: int
+    height: int
+
+    def window(self, left: int, top: int, width: int, height: int) -> bytearray:
+        """The pixels of a window that lies inside the picture: rows from the top, three bytes a pixel.
+
+        Y, Cb, Cr of ITU-R BT.601 in full range (JFIF): Y 0 to 255, Cb and Cr 128 where there is no colour.
+        """
+        ...
+
 
 Sightings = tuple[Sighting | None, ...]
 _NUMBER = ("d", -1e6, 1e6)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from miro_host.eye.frame import Pixels
+from miro_host.eye.grabber import Pixels
 from miro_host.eye.lens import Lens
 from miro_host.eye.pitch_marks import Mark
 

@@ -26,7 +26,7 @@ import msgspec
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
-from miro_host.eye.frame import Pixels
+from miro_host.eye.grabber import Pixels
 from miro_host.eye.lens import Lens
 from miro_host.eye.mark_finder import expected, find
 from miro_host.eye.pitch_marks import MARKS, Mark

@@ -19,7 +19,7 @@ from typing import Literal
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.colours import CLASS_OF, ColourClasses
-from miro_host.eye.frame import Pixels
+from miro_host.eye.grabber import Pixels
 from miro_host.eye.notes import Notes, Pair, Window
 from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName

@@ -14,7 +14,7 @@ from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
-from mirotwin.report.foxglove import frames, notes, paths, pitch, robots
+from mirotwin.report.foxglove import frames, notes, pitch, robots
 from mirotwin.report.foxglove.messages import (
     CompressedImage,
     FrameTransforms,
@@ -64,9 +64,9 @@ class Derived:
         for network, spec in enumerate(() if scenario is None else scenario.networks):
             for robot in spec.robot:
                 assert scenario is not None
-                points = paths.reference_points(robot, scenario.duration_s)
+                points = robots.reference_points(robot, scenario.duration_s)
                 self._paths[network, robot.slot] = points
-        self._trails: dict[RobotId, paths.Trail] = {}
+        self._trails: dict[RobotId, robots.Trail] = {}
         self._notes: dict[RobotId, notes.RobotNotes] = {}
         self._count = 0
 
@@ -90,7 +90,7 @@ class Derived:
 
     def _trail(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
         place = robot.network, robot.slot
-        return self._trails.setdefault(place, paths.Trail()).add(robot, index, at)
+        return self._trails.setdefault(place, robots.Trail()).add(robot, index, at)
 
     def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
         found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
@@ -114,7 +114,7 @@ class Derived:
             place = robot.network, robot.slot
             yield from robots.drawn(*place, pattern, at)
             if self._paths.get(place):
-                yield paths.reference(*place, self._paths[place], at)
+                yield robots.reference_line(*place, self._paths[place], at)
 
 
 def image(network: int, tick: int, png: bytes) -> Said:

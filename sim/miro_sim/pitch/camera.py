@@ -184,7 +184,7 @@ class Camera:
         self.sensor.begin(frame, tick, 16 * self.field_sets)
 
     def window(self, left: int, top: int, width: int, height: int) -> bytearray:
-        """A window's pixels: see `miro_host.eye.frame`. Raises ValueError for one that is not inside the picture."""
+        """A window's pixels: see `miro_host.eye.grabber`. Raises ValueError for one that is not inside the picture."""
         if min(left, top, width - 1, height - 1) < 0 or left + width > _WIDTH or top + height > _HEIGHT:
             raise ValueError(
                 f"window {width} x {height} at ({left}, {top}) is not inside {_WIDTH} x {_HEIGHT}"
