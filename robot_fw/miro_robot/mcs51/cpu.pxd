@@ -75,8 +75,12 @@ cdef class Cpu(Executor):
     @cython.final
     cdef int _block(self) except -1
     @cython.final
+    cdef int _expect(self, long long earliest) except -1
+    @cython.final
     @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1
+    @cython.final
+    cdef int _other_register(self, int address, long long cycle) except -1
     @cython.locals(value=int, port=int)
     cdef int write_sfr_bit(self, int address, int mask, int level) except -1
     @cython.locals(folded=int, parity=int)

@@ -361,8 +361,7 @@ class Cpu(Executor):
         self.at = self.pc
         self.cycles += 2
         self.call(8 * source + 3)
-        self.next_event = 0
-        self.limit = 0
+        self._expect(self.cycles)
 
     def end_of_interrupt(self) -> None:
         self.leave_edges()
@@ -372,7 +371,11 @@ class Cpu(Executor):
     def _block(self) -> None:
         """No interrupt before one more instruction has been executed: after RETI and writes to IE, IP."""
         self.blocked = self.cycles
-        self.next_event = 0
+        self._expect(self.cycles + 1)
+
+    def _expect(self, earliest: int) -> None:
+        """What is due next may have changed; nothing that the pins ask for has."""
+        self.next_event = self.peripherals.next_event(earliest)
         self.limit = 0
 
     # Special function registers
@@ -380,8 +383,9 @@ class Cpu(Executor):
     def register(self, address: int, cycle: int) -> int:
         """A register, ports at their latches, with everything below `cycle` done."""
         value = self.working_register(address)
-        if value >= 0:
-            return value
+        return value if value >= 0 else self._other_register(address, cycle)
+
+    def _other_register(self, address: int, cycle: int) -> int:
         if address == _PSW:
             return self.psw()
         if address == _SP:
@@ -393,7 +397,7 @@ class Cpu(Executor):
     def read_sfr(self, address: int) -> int:
         if address & 0xCF == 0x80:
             return self.peripherals.pin_levels((address - _P0) >> 4, self.start)
-        return self.register(address, self.start + 1)
+        return self._other_register(address, self.start + 1)
 
     def read_latch(self, address: int) -> int:
         return self.register(address, self.start + 1)
@@ -422,9 +426,8 @@ class Cpu(Executor):
             if address in (_IE, _IP):
                 self.marks = self.marks if self.peripherals.interrupts.in_service else 0
                 self._block()
-            if sooner:
-                self.next_event = 0
-                self.limit = 0
+            elif sooner:
+                self._expect(self.cycles)
 
     def psw(self) -> int:
         """P is the parity of ACC, whatever was written."""

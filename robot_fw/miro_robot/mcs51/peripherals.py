@@ -409,7 +409,8 @@ class Peripherals:
         self.timers.sync(cycle)
         if address == _TCON:
             self.timers.write_control(value, cycle)
-            self.external.write(value, cycle)
+            if (value ^ self.external.control) & 0x0F:
+                self.external.write(value, cycle)
         elif address == _TMOD:
             self.timers.write_mode(value)
         elif address in (_TL0, _TL1):

@@ -38,7 +38,7 @@ cdef class Timers:
     cdef long long quiet_until(self) noexcept
     cpdef long long next_flag(self, int timer) noexcept
     cpdef void fall(self, int timer, long long cycle) noexcept
-    @cython.locals(timer=int)
+    @cython.locals(changed=int, timer=int)
     cpdef void write_control(self, int value, long long cycle) noexcept
     cdef void write_mode(self, int value) noexcept
     cdef void set_gates(self, int levels) noexcept

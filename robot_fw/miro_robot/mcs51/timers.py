@@ -151,9 +151,10 @@ class Timers:
 
     def write_control(self, value: int, cycle: int) -> None:
         """TCON.7:4 is written; `cycle` is the first to see it."""
+        changed = value ^ self.control
         self.control = value & 0xF0
         self._note_counting()
-        for timer in range(2):
+        for timer in range(2 if changed & 0xA0 else 0):
             if value & (0x20 << (2 * timer)):
                 self.interrupts.ask(1 + 2 * timer, cycle)
             else:
