@@ -19,7 +19,7 @@ cdef class Camera:
     cdef readonly rays.Rays rays
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
-    cdef int sets, field_sets, side, black, near_count, seer_count, cornered, more_um, first, samples
+    cdef int sets, field_sets, side, black, near_count, seer_count, cornered, more_um, around_um, first, samples
     cdef int middle_u, middle_v, fall_u, fall_v
     cdef bint sure, sampled
     cdef int low_u[4]
@@ -40,6 +40,8 @@ cdef class Camera:
     cdef int sin[60]
     cdef int top_x[4]
     cdef int top_y[4]
+    cdef int corner_u[4]
+    cdef int corner_v[4]
     cdef int u[16]
     cdef int v[16]
     cdef int seen[16]
@@ -71,15 +73,18 @@ cdef class Camera:
     @cython.locals(scene=scene.Scene, behind=int, on_top=int, entered=int, team=int, identity=int, body=int,
                    total='long long')
     cdef long long _alone(self, int place, int pixel) noexcept
-    @cython.locals(low_u=int, high_u=int, low_v=int, high_v=int, around=int, inside_u=int, within=int, sample=int)
-    cdef int _within(self, int place, int pixel, int box) noexcept
+    @cython.locals(low_u=int, high_u=int, low_v=int, high_v=int, around=int)
+    cdef inline int _within(self, int place, int pixel, int box) noexcept
+    @cython.locals(inside_u=int, within=int, sample=int)
+    cdef int _count(self, int place, int pixel, int low_u, int high_u, int low_v, int high_v) noexcept
     @cython.locals(fall_u='long long', fall_v='long long', low_u=int, high_u=int, low_v=int, high_v=int,
                    reach='long long', middle='long long', low='long long', high='long long', around='long long',
                    entered=int, sample=int, u=int, v=int)
     cdef int _across(self, int place, int pixel, int within) noexcept
-    @cython.locals(u='int *', v='int *', corner=int, x='long long', y='long long', turn_u=int, turn_v=int, step_u=int,
-                   step_v=int, column=int, at_u=int, at_v=int, by_u=int, by_v=int)
+    @cython.locals(u='int *', v='int *', corner=int, x='long long', y='long long', column=int)
     cdef void _sample(self, int place, int pixel) noexcept
+    @cython.locals(twist=int, column=int, p=int, at=int, by=int)
+    cdef inline void _spread(self, int* samples, int a, int b, int c, int d) noexcept
     @cython.locals(first=int, corner=int, ray=int)
     cdef void _find_corners(self, int pixel) noexcept
     @cython.locals(scene=scene.Scene, sample=int, index=int, behind=int, ball_seen=bint, paint=int, ball=int,

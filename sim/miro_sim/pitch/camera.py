@@ -58,7 +58,20 @@ class Camera:
         *("field_sets", "side", "black", "robots", "team_paint", "identity_paint", "x", "y", "cos", "sin"),
         *("spread_um", "drift_um", "near", "near_count", "span_first", "span_end", "seers", "seer_count"),
         *("first", "samples", "cornered", "top_x", "top_y", "low_u", "high_u", "low_v", "high_v"),
-        *("more_um", "middle_u", "middle_v", "fall_u", "fall_v", "sure", "sampled", "u", "v"),
+        *(
+            "corner_u",
+            "corner_v",
+            "more_um",
+            "around_um",
+            "middle_u",
+            "middle_v",
+            "fall_u",
+            "fall_v",
+            "sure",
+            "sampled",
+            "u",
+            "v",
+        ),
         *("seen", "height_um"),
     )
 
@@ -102,7 +115,10 @@ class Camera:
         self.cornered = -1
         self.top_x = [0] * 4
         self.top_y = [0] * 4
+        self.corner_u = [0] * 4
+        self.corner_v = [0] * 4
         self.more_um = 0
+        self.around_um = 0
         self.middle_u = 0
         self.middle_v = 0
         self.fall_u = 0
@@ -291,6 +307,7 @@ class Camera:
     def _turn(self, place: int, pixel: int) -> None:
         """Where the pixel's middle is in the axes of a robot at an instant, and how far from it its samples are."""
         self.sampled = False
+        self.around_um = self.spread_um[place] + self.more_um
         x = self.rays.middle_x[pixel] - self.x[place]
         y = self.rays.middle_y[pixel] - self.y[place]
         self.middle_u = (x * self.cos[place] + y * self.sin[place]) >> 15
@@ -340,11 +357,15 @@ class Camera:
         """How many samples lie in a rectangle."""
         low_u, high_u = self.low_u[box] - self.middle_u, self.high_u[box] - self.middle_u
         low_v, high_v = self.low_v[box] - self.middle_v, self.high_v[box] - self.middle_v
-        around = self.spread_um[place] + self.more_um
+        around = self.around_um
         if low_u > around or high_u < -around or low_v > around or high_v < -around:
             return 0
         if low_u <= -around and high_u >= around and low_v <= -around and high_v >= around:
             return self.samples
+        return self._count(place, pixel, low_u, high_u, low_v, high_v)
+
+    def _count(self, place: int, pixel: int, low_u: int, high_u: int, low_v: int, high_v: int) -> int:
+        """How many samples lie within these distances of the middle."""
         if not self.sampled:
             self._sample(place, pixel)
         within = 0
@@ -359,7 +380,7 @@ class Camera:
         reach = abs(fall_u) + abs(fall_v)
         middle = self.middle_u * fall_v - self.middle_v * fall_u
         low, high = -_HALF_UM * reach - middle, _HALF_UM * reach - middle
-        around = (self.spread_um[place] + self.more_um) * reach
+        around = self.around_um * reach
         if low > around or high < -around:
             return 0
         if low <= -around and high >= around:
@@ -383,27 +404,29 @@ class Camera:
             return
         if self.cornered != pixel:
             self._find_corners(pixel)
-        u, v = self.u, self.v
+        u, v = self.corner_u, self.corner_v
         for corner in range(4):
             x = self.top_x[corner] - self.x[place]
             y = self.top_y[corner] - self.y[place]
-            u[corner] = (x * self.cos[place] + y * self.sin[place]) >> 15
-            v[corner] = (y * self.cos[place] - x * self.sin[place]) >> 15
-        step_u, step_v = 16 * (u[1] - u[0]), 16 * (v[1] - v[0])
-        turn_u, turn_v = 2 * (u[0] - u[1] - u[2] + u[3]), 2 * (v[0] - v[1] - v[2] + v[3])
-        by_u, by_v = 8 * (u[2] - u[0]) + (turn_u >> 1), 8 * (v[2] - v[0]) + (turn_v >> 1)
-        at_u = 64 * (u[0] - self.middle_u) + (step_u >> 1) + by_u
-        at_v = 64 * (v[0] - self.middle_v) + (step_v >> 1) + by_v
-        for column in range(4):
-            u[column], v[column] = at_u >> 6, at_v >> 6
-            u[4 + column], v[4 + column] = (at_u + 2 * by_u) >> 6, (at_v + 2 * by_v) >> 6
-            u[8 + column], v[8 + column] = (at_u + 4 * by_u) >> 6, (at_v + 4 * by_v) >> 6
-            u[12 + column], v[12 + column] = (at_u + 6 * by_u) >> 6, (at_v + 6 * by_v) >> 6
-            at_u, at_v = at_u + step_u + turn_u, at_v + step_v + turn_v
-            by_u, by_v = by_u + turn_u, by_v + turn_v
+            u[corner] = ((x * self.cos[place] + y * self.sin[place]) >> 15) - self.middle_u
+            v[corner] = ((y * self.cos[place] - x * self.sin[place]) >> 15) - self.middle_v
+        self._spread(self.u, u[0], u[1], u[2], u[3])
+        self._spread(self.v, v[0], v[1], v[2], v[3])
         if self.samples < 16:
             for column in range(8):
-                u[8 - self.first + column] = _FAR_UM
+                self.u[8 - self.first + column] = _FAR_UM
+
+    def _spread(self, samples: list[int], a: int, b: int, c: int, d: int) -> None:
+        """Sixteen samples, row by row, between corners: a b above, c d below; as `rays.between`."""
+        twist = a - b - c + d
+        for column in range(4):
+            p = 2 * column + 1
+            at = 64 * a + 8 * p * (b - a)
+            by = 8 * (c - a) + p * twist
+            samples[column] = (at + by) >> 6
+            samples[4 + column] = (at + 3 * by) >> 6
+            samples[8 + column] = (at + 5 * by) >> 6
+            samples[12 + column] = (at + 7 * by) >> 6
 
     def _find_corners(self, pixel: int) -> None:
         """Where the pixel's corners are at the height of the tops; corners in rows: two above, two below."""
