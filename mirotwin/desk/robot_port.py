@@ -119,7 +119,6 @@ class RobotPort:
         self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=())]
         self.end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
         self.observers: list[Callable[[Period], object]] = []
-        self.faults: tuple[()] = ()
         self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []
         self.slots: tuple[int, ...] = ()

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
+
+import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.desk.guard import DeskOptions
@@ -41,28 +44,24 @@ from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import CHECK, Expected, as_settings
 from mirotwin.verify.steps.running import KINDS, Outcome, Verdict, collect, run_test, stem_of
 
-WORDS = {
-    "passed": "passed",
-    "failed": "FAILED",
-    "fault": "FAULT",
-    "error": "ERROR",
-    "not observable": "not observable",
-}
-CODES: dict[Verdict, int] = {
-    "error": BAD_INPUT,
-    "fault": FIRMWARE_FAULT,
-    "failed": EXPECTATION_FAILED,
-    "passed": DONE,
-    "not observable": NOTHING_JUDGED,
+
+class Told(msgspec.Struct, frozen=True):
+    """How a verdict is told: in its own line, by the exit code, where files are counted, and in JUnit."""
+
+    line: str
+    code: int
+    counted: str
+    junit: Literal["passed", "failure", "error", "skipped"]
+
+
+TOLD: dict[Verdict, Told] = {
+    "error": Told("ERROR", BAD_INPUT, "cannot be run", "error"),
+    "fault": Told("FAULT", FIRMWARE_FAULT, "with a firmware fault", "failure"),
+    "failed": Told("FAILED", EXPECTATION_FAILED, "failed", "failure"),
+    "passed": Told("passed", DONE, "passed", "passed"),
+    "not observable": Told("not observable", NOTHING_JUDGED, "not observable", "skipped"),
 }
 """In the order of precedence."""
-
-
-_JUNIT: dict[str, Literal["passed", "error", "skipped"]] = {
-    "passed": "passed",
-    "error": "error",
-    "not observable": "skipped",
-}
 
 
 class TestOptions(Options, frozen=True, kw_only=True):
@@ -191,14 +190,9 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     if quiet and passed:
         return
     steps = f"{outcome.done} of {outcome.steps} steps, " if outcome.steps else ""
-    how = (
-        ""
-        if outcome.verdict == "error" or not outcome.digest  # of a bare processor, of a robot at a port
-        else f" ({steps}{in_ms(outcome.tick)}, digest {outcome.digest[:12]})"
-    )
-    if not outcome.digest and outcome.steps:
-        how = f" ({steps}{in_ms(outcome.tick)})"
-    show_line(f"{WORDS[outcome.verdict]}  {outcome.path}{how}")
+    digest = f", digest {outcome.digest[:12]}" if outcome.digest else ""  # of a robot at a port there is none
+    how = f" ({steps}{in_ms(outcome.tick)}{digest})" if steps or digest else ""
+    show_line(f"{TOLD[outcome.verdict].line}  {outcome.path}{how}")
     for line in (*outcome.lines, *outcome.notes):
         show_line(f"    {line}")
     if outcome.left:
@@ -215,18 +209,12 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
 
 def _summary(outcomes: Sequence[Outcome]) -> int:
     """Prints what came of all; returns the exit code."""
-    counted = {verdict: [one.verdict for one in outcomes].count(verdict) for verdict in CODES}
-    words = {
-        "error": "cannot be run",
-        "fault": "with a firmware fault",
-        "failed": "failed",
-        "passed": "passed",
-        "not observable": "not observable",
-    }
-    said = ", ".join(f"{count} {words[verdict]}" for verdict, count in counted.items() if count)
+    counted = Counter(one.verdict for one in outcomes)
+    found = [verdict for verdict in TOLD if counted[verdict]]
+    said = ", ".join(f"{counted[verdict]} {TOLD[verdict].counted}" for verdict in found)
     unseen = sum(one.unseen for one in outcomes)
     show_line(said + (f"; {unseen} steps and expectations are not observable on a port" if unseen else ""))
-    return next(code for verdict, code in CODES.items() if counted[verdict])
+    return TOLD[found[0]].code
 
 
 def _write_junit(
@@ -237,7 +225,7 @@ def _write_junit(
             name=stem_of(one.path),
             classname=str(Path(one.path).parent).strip("./").replace("/", ".") or "scenario",
             time_s=time_s,
-            verdict=_JUNIT.get(one.verdict, "failure"),
+            verdict=TOLD[one.verdict].junit,
             lines=(*one.lines, *one.notes),
             properties={
                 "seed": str(one.seed),

@@ -209,11 +209,9 @@ def _test_cases(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Test
     for outcome in outcomes:
         rule = by_id[outcome.rule]
         case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
-        if outcome.cause:
-            because = f"not judged: {outcome.cause} failed, {find(outcome.cause).broken}"
-            case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
-        elif outcome.unsure or outcome.unseen:
-            because = f"{outcome.verdict}: {outcome.unsure or outcome.unseen}"
+        cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
+        if because := cause or outcome.unsure or outcome.unseen:
+            because = f"{outcome.verdict}: {because}"
             case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
         elif outcome.failures:
             lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
