@@ -57,18 +57,13 @@ AnswerPair = tuple[TimedAnswer | None, TimedAnswer | None]
 """Of the robot and of its twin, to the same question; None: there is none."""
 
 
-class RobotBesideTwin(msgspec.Struct, frozen=True):
-    """The answers of the robot in `slot` and of its twin. `unsure_ticks`: how well their times are known."""
-
-    slot: int
-    pairs: list[AnswerPair]
-    unsure_ticks: int
-
-
 class PortComparison(msgspec.Struct, frozen=True):
-    """`silent`: slots of the twin's robots that do not answer at the port; `not_judged`: values that time left open."""
+    """`robots`: the answers by slot; `unsure_ms`: how well their times are known. `silent`: slots of the twin's robots
+    that do not answer at the port; `not_judged`: values that time left open.
+    """
 
-    robots: list[RobotBesideTwin]
+    robots: dict[int, list[AnswerPair]]
+    unsure_ms: float
     differences: list[Difference]
     silent: tuple[int, ...]
     not_judged: int
@@ -93,17 +88,18 @@ def compare(
     silent = {answer.said.slot for answer in answers(twin)} - set(there)
     sent = _Sent(port, robots)
     found: list[Difference] = []
-    beside, open_values = [], 0
+    beside, unsure, open_values = {}, 0, 0
     for slot in there:
         both = _side_by_side(answers(port, [slot]), answers(twin, [slot]), port[-1].tick - rule.within_ticks)
         late = [here.tick - there.tick for here, there in both if here is not None and there is not None]
-        beside.append(RobotBesideTwin(slot, both, max(late, default=0)))
+        beside[slot], unsure = both, max([unsure, *late])
         for one in _judged(both, late, slot, sent, rule):
             if one is None:
                 open_values += 1
             else:
                 found.append(one)
-    return PortComparison(beside, sorted(found, key=lambda one: one.tick), tuple(sorted(silent)), open_values)
+    found.sort(key=lambda one: one.tick)
+    return PortComparison(beside, unsure / TICKS_PER_MS, found, tuple(sorted(silent)), open_values)
 
 
 def _side_by_side(

@@ -133,7 +133,6 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
         first = f"in control period {found[0].period}, {found[0].said(WORDS)}"
         complain(f"the robot differs from its twin {first}")
     elif not as_json:
-        count = sum(len(one.pairs) for one in comparison.robots)
-        unsure_ms = max((one.unsure_ticks for one in comparison.robots), default=0) / TICKS_PER_MS
+        count, unsure_ms = sum(map(len, comparison.robots.values())), comparison.unsure_ms
         show(f"the robot answers as its twin does, {count} times; times are known to {unsure_ms:.1f} ms")
     return code

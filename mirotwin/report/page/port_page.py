@@ -10,8 +10,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_protocol.table import TICKS_PER_MS
-from mirotwin.desk.compare import ANSWERS, FIELDS, PortComparison, RobotBesideTwin, TimedAnswer, compare
+from mirotwin.desk.compare import ANSWERS, FIELDS, AnswerPair, PortComparison, TimedAnswer, compare
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.document import render
@@ -37,10 +36,10 @@ def port_page(job: Job, quiet: bool) -> bytes:
     end_s = seconds(len(job.recorded) * CONTROL_PERIOD_TICKS)
     found = beside_twin(job, quiet)
     figures = {
-        f"plot-{robot.slot}-{channel.replace(' ', '-')}": _figure(
-            robot, channel, end_s, _marks(found.differences, robot.slot, channel)
+        f"plot-{slot}-{channel.replace(' ', '-')}": _figure(
+            pairs, channel, end_s, _marks(found.differences, slot, channel)
         )
-        for robot in found.robots
+        for slot, pairs in found.robots.items()
         for channel in SHOWN
     }
     values = {
@@ -50,7 +49,6 @@ def port_page(job: Job, quiet: bool) -> bytes:
         "duration_s": end_s,
         "found": found,
         "shown": SHOWN,
-        "unsure_ms": max((robot.unsure_ticks for robot in found.robots), default=0) / TICKS_PER_MS,
         "differences": found.differences[:FIRST],
     }
     return render("port.html", figures, msgspec.json.encode({}), values)
@@ -62,14 +60,14 @@ def _marks(differences: Sequence[Difference], slot: int, channel: str) -> list[f
     return list(dict.fromkeys(seconds(one.tick) for one in parted))[:FIRST]
 
 
-def _figure(robot: RobotBesideTwin, channel: str, end_s: float, marks: list[float]) -> Any:
+def _figure(pairs: Sequence[AnswerPair], channel: str, end_s: float, marks: list[float]) -> Any:
     from bokeh.models import Range1d
 
     from mirotwin.report.page.axes import add_failures, panel, tagged
 
     made = panel(SHOWN[channel], Range1d(start=0.0, end=end_s, bounds=(0.0, end_s)), x_label="t [s]")
     for side, colour, width in ((1, "robot1", 4.0), (0, "robot0", 1.5)):
-        answers = [one for pair in robot.pairs if (one := pair[side])]
+        answers = [one for pair in pairs if (one := pair[side])]
         times = [seconds(one.tick) for one in answers]
         line = made.step(times, _course(answers, channel), mode="after", line_width=width)
         tagged(line.glyph, line_color=colour)

@@ -24,7 +24,7 @@ from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule, Topology
 from mirotwin.verify.conform.run import Outcome, in_order
 from mirotwin.verify.conform.trial import trial_of
-from mirotwin.verify.conform.trial_script import Frame, How, Pairs, TrialScript
+from mirotwin.verify.conform.trial_script import Found, Frame, How, Pairs, TrialScript
 
 _REASONS: dict[str, tuple[str, ...]] = {
     "it is switched off and on, or reset": ("P01", "P02", "P03", "P19", "P55", "P56"),
@@ -137,6 +137,14 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     script = PortScript(topology, standing=not port.guard.desk.allow_motion)
     rule.write(script)
     last = script.ask(slot, gap_ms=36.0)
+    fresh = script.fresh % 256
+
+    def counted(seen: Observed) -> Found:
+        said = [one.said for one in seen.answers if one.frame.seq == last.seq and one.said is not None]
+        found = f"{said[-1].accepted}" if said else "no answer"
+        return None if found == f"{fresh}" else (seen.end_tick, found)
+
+    script.expect(last.end_tick, f"{fresh} frames accepted by {last.what}", counted, by_answers=True)
     sent = _whole(script.said)
     port.greet((script.n,), sent)
     cursor, begun = Cursor(port.log), len(port.late_ticks)
@@ -153,20 +161,12 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     port.play(sent, gather)
     gather(port.tick)
-    answered = [one for one in seen.answers if one.frame.seq == last.seq and one.said is not None][-1:]
     unsure = max(*port.late_ticks[begun:], max(port.delays) - shortest)
-
-    def failed(tick: int, wanted: str, found: str) -> tuple[Failure, int]:
-        return Failure("conforms_to", 0, slot, tick, wanted, found), unsure
 
     for one in script.expected:  # what power-on did is told by now
         if one.by_answers and (not one.slots or slot in one.slots) and "of power-on" not in one.wanted:
             if (what := one.test(seen)) is not None:
-                return failed(what[0], one.wanted, what[1])
-    counts = [one.said.accepted for one in answered if one.said is not None]
-    if counts != [script.fresh % 256]:
-        found = f"{counts[0]}" if counts else "no answer"
-        return failed(port.tick, f"{script.fresh % 256} frames accepted by {last.what}", found)
+                return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
     return None, unsure
 
 
