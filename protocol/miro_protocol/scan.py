@@ -153,10 +153,11 @@ class Scanner:
     def feed_symbols(self, symbols: Iterable[Symbol]) -> list[Event]:
         """Characters with stop bit and time, as a UART and a timer deliver them."""
         events: list[Event] = []
+        least, most = -TICK_LIMIT, TICK_LIMIT - self._step
         for byte, stop_good, start_tick in symbols:
             if not 0 <= byte <= 255:
                 raise ValueError(f"character = {byte}: must be 0..255")
-            if not -TICK_LIMIT <= start_tick <= TICK_LIMIT - self._step:
+            if not least <= start_tick <= most:
                 checked_tick(start_tick, self._step)
             tick = start_tick
             found = self._put_symbol(byte, not stop_good, tick)
