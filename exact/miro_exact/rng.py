@@ -185,10 +185,11 @@ def half_normal_table() -> list[int]:
     """Entry k: 2^63 P(|z| < k/16) rounded to an integer, for k = 0, 1, .. until that is 2^63.
 
     In integers with 128 fraction bits, from P(|z| < x) = 2 phi(x) (x + x^3/3 + x^5/15 + ..) (Marsaglia
-    2004), a series without cancellation; 1/phi(x) = sqrt(2 pi) exp(x^2/2) is a series of the same kind.
+    2004), a series without cancellation; 1/phi(x) = sqrt(2 pi) exp(x^2/2) grows by exp((2k + 1)/512) after entry k.
     """
     one = 1 << 128
     root = 0x281B263FEC4E0B2CAF9483F5CE459DC5F  # floor(2^128 sqrt(2 pi))
+    growth, ratio = one, 0x100802005560011127D41D5BD72F4C8F3  # exp(1/512)
     table = []
     area_63 = k = 0
     while area_63 < 1 << 63:
@@ -201,13 +202,8 @@ def half_normal_table() -> list[int]:
             area += odd
             n += 2
             odd = odd * k * k // (256 * n)
-        growth = 0
-        term = one
-        n = 0
-        while term:
-            growth += term
-            n += 1
-            term = term * k * k // (512 * n)
+        growth = growth * ratio >> 128  # exp(x^2/2)
+        ratio = ratio * 0x10100802AB55777D28A2A42D26AA9EE67 >> 128  # times exp(1/256)
         area_63 = ((2 * area * one // root) * one // growth + (1 << 64)) >> 65
     return [*table, area_63]
 
