@@ -104,12 +104,7 @@ def test_the_blocks_that_are_not_run_are_these():
 
 def test_documents_are_found_and_have_blocks():
     kinds = Counter(block.language for document in DOCUMENTS for block in blocks_in(document))
-    assert set(DOCUMENTS) >= {
-        "README.md",
-        "docs/start.md",
-        "host/README.md",
-        "mirotwin/testing/README.md",
-    }
+    assert set(DOCUMENTS) >= {"README.md", "docs/start.md", "host/README.md", "mirotwin/testing/README.md"}
     assert kinds["python"] > 20
     assert kinds["sh"] + kinds["console"] + kinds["indented"] > 60
 

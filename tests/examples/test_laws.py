@@ -93,11 +93,7 @@ def python(site, code, *arguments, check=True):
 
 def mirotwin(site, *arguments):
     return children.run(
-        [MIROTWIN, *arguments],
-        env=environment(site),
-        capture_output=True,
-        text=True,
-        check=False,
+        [MIROTWIN, *arguments], env=environment(site), capture_output=True, text=True, check=False
     )
 
 

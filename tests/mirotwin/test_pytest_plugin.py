@@ -82,12 +82,7 @@ def pytest_runtestloop(session):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "how", "code"),
-    [
-        (["gone.py"], "", 4),
-        (["-k", "gone"], "", 5),
-        ([], "off", 2),
-        ([], "down", 3),
-    ],
+    [(["gone.py"], "", 4), (["-k", "gone"], "", 5), ([], "off", 2), ([], "down", 3)],
 )
 def test_too_few_lines_do_not_hide_what_else_went_wrong(tmp_path, monkeypatch, arguments, how, code):
     """pytest: 2 interrupted, 3 an internal error, 4 a usage error, 5 no tests."""

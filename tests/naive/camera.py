@@ -138,10 +138,7 @@ class NaiveCamera:
         )
         over = inside(x, y)
         ring = ((x <= 675_000) & (y <= 475_000)) | ((x <= 825_000) & (y <= 225_000))
-        x, y = (
-            abs(self._at(slope_x, camera_x, 0) - 550_000),
-            abs(self._at(slope_y, camera_y, 0) - 350_000),
-        )
+        x, y = (abs(self._at(slope_x, camera_x, 0) - 550_000), abs(self._at(slope_y, camera_y, 0) - 350_000))
         paint = np.where(on_line(x, y), NUMBERS["line"], NUMBERS["floor"])
         paint = np.where(inside(x, y), paint, NUMBERS["wall face"])
         return np.where(over, paint, np.where(ring, NUMBERS["wall top"], NUMBERS["outside"]))

@@ -27,11 +27,7 @@ def arc_point(s, heading, curvature):
     if curvature == 0:
         return s * cos(heading), s * sin(heading), heading
     theta = heading + curvature * s
-    return (
-        (sin(theta) - sin(heading)) / curvature,
-        -(cos(theta) - cos(heading)) / curvature,
-        theta,
-    )
+    return ((sin(theta) - sin(heading)) / curvature, -(cos(theta) - cos(heading)) / curvature, theta)
 
 
 def reference(t, speed, ramp, heading, curvature):

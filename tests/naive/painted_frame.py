@@ -10,13 +10,7 @@ import numpy as np
 
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.lens import Lens
-from miro_host.eye.patterns import (
-    IDENTITIES,
-    PATCH_MM,
-    PATTERNS,
-    ROBOT_HALF_MM,
-    ROBOT_HEIGHT_M,
-)
+from miro_host.eye.patterns import IDENTITIES, PATCH_MM, PATTERNS, ROBOT_HALF_MM, ROBOT_HEIGHT_M
 
 SAMPLES = 4
 PAINTS = {

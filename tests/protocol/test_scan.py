@@ -91,10 +91,7 @@ def test_a_character_that_is_no_byte_is_refused_by_name(kind, byte):
 def test_a_tick_beyond_64_bits_is_refused_and_nothing_is_taken(kind, tick):
     scanner = kind(FORMATS[0])
     before = snapshot(scanner)
-    for feed in (
-        lambda: scanner.feed(b"a", tick),
-        lambda: scanner.feed_symbols([(1, True, tick)]),
-    ):
+    for feed in (lambda: scanner.feed(b"a", tick), lambda: scanner.feed_symbols([(1, True, tick)])):
         with pytest.raises(ValueError, match=f"tick = {tick}: must be"):
             feed()
         assert snapshot(scanner) == before

@@ -53,8 +53,7 @@ def finish(one):
 
 
 @pytest.mark.parametrize(
-    ("parameters", "estimator"),
-    [(LeakyParameters(), None), (ByEar(), None), (Gains(), PredictParameters())],
+    ("parameters", "estimator"), [(LeakyParameters(), None), (ByEar(), None), (Gains(), PredictParameters())]
 )
 @pytest.mark.parametrize("at_tick", [5_000, 1_000_003, 9_999_999, 10 * CONTROL_PERIOD_TICKS])
 def test_a_world_saved_anywhere_goes_on_with_the_memory_of_its_parts(parameters, estimator, at_tick):

@@ -48,13 +48,7 @@ def refusal(lines):
 def test_everything_is_off_unless_asked_for():
     """Only what every scenario has had: errors of 1e-4, a key-up, noise between frames."""
     params = msgspec.structs.asdict(radio(""))
-    names = (
-        "jitter_s",
-        "baud_offset_ppm",
-        "crystal_offset_ppm",
-        "false_starts_hz",
-        "lost_character_rate",
-    )
+    names = ("jitter_s", "baud_offset_ppm", "crystal_offset_ppm", "false_starts_hz", "lost_character_rate")
     assert [params[name] for name in names] == [0] * len(names)
     assert (params["bursts"], params["dropouts"], params["slicer"]) == (None, None, None)
 

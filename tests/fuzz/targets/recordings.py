@@ -220,5 +220,5 @@ TARGETS = {
             b'"digest":',
             b'"data":',
         ),
-    ),
+    )
 }

@@ -258,10 +258,7 @@ TARGETS = {
     ),
     "settings": Target("--set KEY=VALUE", _settings, _settings_seeds, most_bytes=512, words=_KEYS),
     "startup": Target(
-        "an accepted scenario becomes a world that begins to run",
-        _world,
-        _world_seeds,
-        words=_KEYS,
+        "an accepted scenario becomes a world that begins to run", _world, _world_seeds, words=_KEYS
     ),
     "case": Target("stream files as `replay` takes them", _case, _case_seeds, words=STREAM_WORDS + _KEYS),
     "url": Target(

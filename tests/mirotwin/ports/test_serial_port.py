@@ -225,8 +225,7 @@ def test_what_cannot_be_opened_is_a_serial_exception_of_one_line(miro, url, said
 
 
 @pytest.mark.parametrize(
-    "named",
-    [{"baudrate": 115200}, {"parity": "E"}, {"stopbits": 2}, {"bytesize": 7}, {"xonxoff": True}],
+    "named", [{"baudrate": 115200}, {"parity": "E"}, {"stopbits": 2}, {"bytesize": 7}, {"xonxoff": True}]
 )
 def test_a_rate_or_format_that_the_radio_does_not_have_is_refused(miro, named):
     with pytest.raises(ValueError, match=r"this radio has|xonxoff"):

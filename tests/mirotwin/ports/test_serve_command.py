@@ -11,15 +11,7 @@ import pytest
 
 from miro_protocol import stream
 from tests import children
-from tests.mirotwin.ports.rig import (
-    ANSWER_BYTES,
-    CLEAN,
-    PROGRAM,
-    question,
-    replays,
-    sent_bytes,
-    served,
-)
+from tests.mirotwin.ports.rig import ANSWER_BYTES, CLEAN, PROGRAM, question, replays, sent_bytes, served
 
 PARTS = ["case.part.stream", "run.part.mcap", "summary.part.json"]
 SETTINGS = [word for setting in CLEAN for word in ("--set", setting)]

@@ -68,10 +68,7 @@ def test_commands_may_come_at_another_time_within_the_tolerance():
     assert differences(recorded, faster, CompareRule(kind="commands")) == []
     assert differences(recorded, faster, CompareRule(kind="commands", within_ticks=2496)) == []
     (first, _) = differences(recorded, faster, CompareRule(kind="commands", within_ticks=2495))
-    assert (first.recorded, first.replayed) == (
-        "LTRJ 1Fh 0400 at tick 100000",
-        "LTRJ 1Fh 0400 at tick 97504",
-    )
+    assert (first.recorded, first.replayed) == ("LTRJ 1Fh 0400 at tick 100000", "LTRJ 1Fh 0400 at tick 97504")
 
 
 def test_another_value_at_the_same_time_is_a_difference_under_commands():
@@ -162,7 +159,7 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
     named = {one.channel for one in found}
     assert {"control v_m_s", "control inner.u1", "actions"} <= named
     assert [one.replayed for one in found if one.channel == "actions"] == [
-        *("robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7"),
+        *("robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7")
     ]
     assert found[0].channel == "actions"
 

@@ -148,11 +148,7 @@ def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed, name):
 
 def test_where_no_check_can_judge_what_was_sent_is_left(mixed):
     (folder,) = [path for path in (mixed / "left").iterdir() if "misspells_a_function" in path.name]
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "report.txt",
-        "sent.stream",
-        "summary.json",
-    ]
+    assert sorted(path.name for path in folder.iterdir()) == ["report.txt", "sent.stream", "summary.json"]
     assert run(mixed, f"mirotwin replay left/{folder.name}/sent.stream").returncode == 0
 
 

@@ -76,12 +76,7 @@ def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here)
 
 @pytest.mark.parametrize(
     "command",
-    [
-        ("run", "fig6"),
-        ("test", "a.scenario.toml"),
-        ("campaign", "run", "c.toml"),
-        ("fuzz", "--time", "1s"),
-    ],
+    [("run", "fig6"), ("test", "a.scenario.toml"), ("campaign", "run", "c.toml"), ("fuzz", "--time", "1s")],
 )
 def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, command):
     code, out, err = mirotwin(*command, "--expect", "stands_stil")

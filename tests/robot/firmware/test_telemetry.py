@@ -93,8 +93,7 @@ def test_a_question_that_comes_while_it_answers_is_obeyed_and_counted_and_not_an
 
 
 @pytest.mark.parametrize(
-    ("waited_ms", "flags"),
-    [(20, Flags.MOTORS_OFF), (150, Flags.MOTORS_OFF | Flags.STOPPED)],
+    ("waited_ms", "flags"), [(20, Flags.MOTORS_OFF), (150, Flags.MOTORS_OFF | Flags.STOPPED)]
 )
 def test_the_first_answer_says_that_motors_were_off_and_whether_110_ms_passed(waited_ms, flags):
     rig = Rig()

@@ -6,14 +6,7 @@ from hypothesis import strategies as st
 
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
-from miro_robot.harness.program import (
-    BYTES,
-    FRAMES,
-    MOST_CHARACTERS,
-    MOST_TICKS,
-    SESSION,
-    Program,
-)
+from miro_robot.harness.program import BYTES, FRAMES, MOST_CHARACTERS, MOST_TICKS, SESSION, Program
 
 MS = 24_000
 

@@ -80,10 +80,7 @@ def sampled(sampler, first_tick, end_tick):
     [
         pytest.param(0, 2 * MS, {"left_rst_n", "right_busy", "left_hi", "p3_2", "d0"}, id="start-up"),
         pytest.param(
-            ACTS_AT,
-            4 * MS,
-            {"left_pwm", "right_sign", "asleep", "isr_timer1", "d7", "txd"},
-            id="a frame",
+            ACTS_AT, 4 * MS, {"left_pwm", "right_sign", "asleep", "isr_timer1", "d7", "txd"}, id="a frame"
         ),
         pytest.param(ACTS_AT - 2 * MS, MS, {"isr_serial", "rxd", "high_priority"}, id="characters"),
     ],

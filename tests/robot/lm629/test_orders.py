@@ -11,8 +11,7 @@ STT, RESET, LTRJ, RDRP = 0x01, 0x00, 0x1F, 0x0A
 CONTROLS = st.integers(0, 0x1FFF)
 LOADS = st.builds(lambda word, data: word.to_bytes(2, "big") + data, CONTROLS, st.binary(max_size=12))
 COMMANDS = st.one_of(
-    st.tuples(st.just(LTRJ), LOADS),
-    st.tuples(st.sampled_from([STT, RESET, RDRP]), st.just(b"")),
+    st.tuples(st.just(LTRJ), LOADS), st.tuples(st.sampled_from([STT, RESET, RDRP]), st.just(b""))
 )
 
 

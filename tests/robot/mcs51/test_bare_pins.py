@@ -103,11 +103,7 @@ def test_edges_on_every_tick_are_taken_in_bounded_steps():
 
 def test_a_file_has_comments_and_empty_lines():
     text = "# pins\n\n0 * P1.0 1  # high\r\n  24 * P3.2 0\n24 * P3.3 0\n"
-    assert read_pins(text, "a.pins") == (
-        PinEvent(0, 1, 0, 1),
-        PinEvent(24, 3, 2, 0),
-        PinEvent(24, 3, 3, 0),
-    )
+    assert read_pins(text, "a.pins") == (PinEvent(0, 1, 0, 1), PinEvent(24, 3, 2, 0), PinEvent(24, 3, 3, 0))
 
 
 @pytest.mark.parametrize(

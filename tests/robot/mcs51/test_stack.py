@@ -50,8 +50,7 @@ def test_a_stack_that_runs_into_what_lies_above_is_a_fault(text):
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["POP ACC", "DEC SP", "MOV SP,#07h", "MOV A,#10h\nMOV SP,A", "MOV SP,#31h\nANL SP,#0Fh", "RET"],
+    "text", ["POP ACC", "DEC SP", "MOV SP,#07h", "MOV A,#10h\nMOV SP,A", "MOV SP,#31h\nANL SP,#0Fh", "RET"]
 )
 def test_a_stack_that_goes_below_its_start_is_a_fault(text):
     assert kinds(text) == [UNDER]
@@ -124,10 +123,7 @@ def test_the_stack_is_from_where_the_map_begins_it_to_the_next_variable():
         "_main": Symbol(0x62, "code"),
     }
     assert Symbols(names).stack == (0x30, 0xFF)
-    assert Symbols(names | {"_high": Symbol(0xF0, "iram"), "_x": Symbol(0x40, "xram")}).stack == (
-        0x30,
-        0xEF,
-    )
+    assert Symbols(names | {"_high": Symbol(0xF0, "iram"), "_x": Symbol(0x40, "xram")}).stack == (0x30, 0xEF)
     assert Symbols({}).stack == (0, 0xFF)
 
 

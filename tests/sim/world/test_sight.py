@@ -150,9 +150,7 @@ def test_a_grabber_is_as_many_frames_late_as_it_says(delay):
 
 def test_each_host_follows_its_own_robots_among_those_of_the_other():
     one = world(
-        'kind = "pixels"\ncalibration = "exact"',
-        *((0, 0, 0), (2, 30, 20)),
-        others=((0, 12, 0), (2, 30, 32)),
+        'kind = "pixels"\ncalibration = "exact"', *((0, 0, 0), (2, 30, 20)), others=((0, 12, 0), (2, 30, 32))
     )
     before = None
     for _ in range(12):

@@ -54,10 +54,7 @@ def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text):
 
 
 def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed():
-    assert detect(gzip.compress(b"x")) == (
-        "raw",
-        "looks packed by gzip, unpack it first; read as raw bytes",
-    )
+    assert detect(gzip.compress(b"x")) == ("raw", "looks packed by gzip, unpack it first; read as raw bytes")
 
 
 @given(st.binary(max_size=300))

@@ -79,12 +79,7 @@ def test_the_failure_names_the_wheels_and_what_the_firmware_has_counted():
 
 @pytest.mark.parametrize(
     "radio",
-    [
-        "bit_error_rate = 0.5",
-        "lost_frames = 1.0",
-        "lost_character_rate = 0.9",
-        "baud_offset_ppm = 40000",
-    ],
+    ["bit_error_rate = 0.5", "lost_frames = 1.0", "lost_character_rate = 0.9", "baud_offset_ppm = 40000"],
 )
 def test_a_robot_that_no_frame_reaches_is_not_judged(radio):
     assert judged(world(image_of(HANGS), f"network.radio={{{radio}}}"))["acts_at_all"] == "not judged"

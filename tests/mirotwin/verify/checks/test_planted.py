@@ -26,7 +26,7 @@ MISTAKES = {
     "acts on a frame that is repeated": {"moves_only_when_fresh", "failsafe_stop_ms"},
     "takes frames with a bad CRC": {"accepts_only_sent", "moves_only_when_fresh", "failsafe_stop_ms"},
     "takes the velocities of the robot before it": {
-        *("acts_within_ms", "back_in_sync_within_ms", "accepts_only_sent"),
+        *("acts_within_ms", "back_in_sync_within_ms", "accepts_only_sent")
     },
     "does not cut off": {"wheels_within_m_s", "accepts_only_sent", "acts_within_ms"},
     "loses sync for good after a bad CRC": {

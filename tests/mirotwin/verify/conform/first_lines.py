@@ -93,8 +93,7 @@ FIRST_LINES = {
         ("begin with P31", "wanted a smooth stop, found the left wheel told off")
     ),
     "motors that never go off": Named(
-        ("begin with P32", "found left not within 734.88 ms"),
-        ("failsafe.c", "        motion_off();\n", ""),
+        ("begin with P32", "found left not within 734.88 ms"), ("failsafe.c", "        motion_off();\n", "")
     ),
     "never answers": Named(
         ("begin with P42", "wanted an answer to some of 9 questions in a row, found none")

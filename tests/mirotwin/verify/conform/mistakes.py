@@ -43,12 +43,10 @@ MISTAKES = {
         "P04",
     ),
     "looks at the first sync byte only": Mistake(
-        *("decode.c", " && rx_character[RX_INDEX(from + 1)] == SYNC_1", ""),
-        "P05",
+        *("decode.c", " && rx_character[RX_INDEX(from + 1)] == SYNC_1", ""), "P05"
     ),
     "looks at the second sync byte only": Mistake(
-        *("decode.c", "rx_character[RX_INDEX(from)] == SYNC_0 && ", ""),
-        "P05",
+        *("decode.c", "rx_character[RX_INDEX(from)] == SYNC_0 && ", ""), "P05"
     ),
     "takes the layout of 3 for its own": Mistake(
         *("decode.c", "wire_start(robots == 3 ? CRC_START_RX3 : CRC_START_RX5);"),
@@ -56,12 +54,10 @@ MISTAKES = {
         "P06 P23",
     ),
     "looks at the low byte of the CRC only": Mistake(
-        *("decode.c", " && crc_high == CRC_RESIDUE >> 8", ""),
-        "P07",
+        *("decode.c", " && crc_high == CRC_RESIDUE >> 8", ""), "P07"
     ),
     "looks at the high byte of the CRC only": Mistake(
-        *("decode.c", "crc_low == (CRC_RESIDUE & 0xFF) && ", ""),
-        "P07",
+        *("decode.c", "crc_low == (CRC_RESIDUE & 0xFF) && ", ""), "P07"
     ),
     "takes frames with a bad CRC": Mistake(
         *(
@@ -75,23 +71,19 @@ MISTAKES = {
     "does not see a gap": Mistake("uart.c", "if (!TF0 && high == 0xFF && low", "if (low", "P10"),
     "does not see a long gap": Mistake("uart.c", "if (!TF0 && ", "if (", "P10"),
     "measures spacings too short": Mistake(
-        *("uart.c", "(65536UL - SPACING_MAX - 1 + RESTART_CYCLES)", "(65536UL - SPACING_MAX + 69)"),
-        "P11",
+        *("uart.c", "(65536UL - SPACING_MAX - 1 + RESTART_CYCLES)", "(65536UL - SPACING_MAX + 69)"), "P11"
     ),
     "leaves a frame in the window": Mistake(
         "decode.c", "    run = 0;\n    return true;", "    return true;", "P12"
     ),
     "loses count after 256 characters": Mistake(
-        *("decode.c", "else if (run < RX_SIZE)\n        ++run;", "else\n        ++run;"),
-        "P13",
+        *("decode.c", "else if (run < RX_SIZE)\n        ++run;", "else\n        ++run;"), "P13"
     ),
     "starts again after a bad CRC": Mistake(
-        *("decode.c", "++frames_rejected;", "++frames_rejected; run = 0;"),
-        "P14",
+        *("decode.c", "++frames_rejected;", "++frames_rejected; run = 0;"), "P14"
     ),
     "wants a pause before the preamble": Mistake(
-        *("decode.c", "    if (run < frame_size)", "    if (run != frame_size + RX3_PREAMBLE + 1)"),
-        "P04 P13",
+        *("decode.c", "    if (run < frame_size)", "    if (run != frame_size + RX3_PREAMBLE + 1)"), "P04 P13"
     ),
     "is deaf for a while after a bad stop bit": Mistake(
         *("decode.c", "    if (run < frame_size)"),
@@ -118,8 +110,7 @@ MISTAKES = {
         "P21",
     ),
     "takes the velocities of the robot before it": Mistake(
-        *("motion.c", "u8 at = slot * PAIR_SIZE;", "u8 at = (slot - 1) * PAIR_SIZE;"),
-        "P22 P23",
+        *("motion.c", "u8 at = slot * PAIR_SIZE;", "u8 at = (slot - 1) * PAIR_SIZE;"), "P22 P23"
     ),
     "does not move on a question": Mistake(
         *("main.c", "        motion_team();\n        telemetry_answer();", "        telemetry_answer();"),
@@ -137,42 +128,32 @@ MISTAKES = {
         "P26",
     ),
     "does not cut off backwards": Mistake(
-        *("motion.c", "velocity < -VELOCITY_SATURATION", "velocity < -32767"),
-        "P26",
+        *("motion.c", "velocity < -VELOCITY_SATURATION", "velocity < -32767"), "P26"
     ),
     "starts one wheel after the other": Mistake(
         *("motion.c", "    load_velocity(RIGHT, last_right);\n    start_both();"),
         "    lm629_command(STT);\n    load_velocity(RIGHT, last_right);\n    lm629_command(STT);",
         "P27",
     ),
-    "stops after 40 ms": Mistake(
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == 40)"),
-        "P28 P29",
-    ),
+    "stops after 40 ms": Mistake(*("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == 40)"), "P28 P29"),
     "stops after 125 ms": Mistake(
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"),
-        "P29",
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"), "P29"
     ),
     "stops after 111 ms": Mistake(
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 1)"),
-        "P29",
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 1)"), "P29"
     ),
     "stops after 108 ms": Mistake(
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 2)"),
-        "P29",
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 2)"), "P29"
     ),
     "puts the failsafe off by frames that are not fresh": Mistake(
-        *("failsafe.c", "        ++frames_stale;", "        ++frames_stale; restart();"),
-        "P30",
+        *("failsafe.c", "        ++frames_stale;", "        ++frames_stale; restart();"), "P30"
     ),
     "stops abruptly": Mistake("motion.c", "halt_both(TRJ_SMOOTH_STOP);", "halt_both(0x02);", "P31"),
     "stops with another acceleration": Mistake(
-        *("motion.c", "HIGH(DEFAULT_ACCELERATION), 0, 0};", "HIGH(DEFAULT_ACCELERATION) + 1, 0, 0};"),
-        "P31",
+        *("motion.c", "HIGH(DEFAULT_ACCELERATION), 0, 0};", "HIGH(DEFAULT_ACCELERATION) + 1, 0, 0};"), "P31"
     ),
     "goes off after 501 ms": Mistake(
-        *("failsafe.c", "age == FAILSAFE_OFF_MS)", "age == FAILSAFE_OFF_MS + 1)"),
-        "P32",
+        *("failsafe.c", "age == FAILSAFE_OFF_MS)", "age == FAILSAFE_OFF_MS + 1)"), "P32"
     ),
     "never goes off": Mistake("failsafe.c", "        motion_off();\n", "", "P30 P32"),
     "stays off": Mistake(
@@ -188,8 +169,7 @@ MISTAKES = {
     ),
     "forgets UDF": Mistake("motion.c", "    lm629_command(UDF);\n", "", "P35"),
     "takes 16 bits of an acceleration": Mistake(
-        *("motion.c", "    lm629_word(acceleration[3], acceleration[2]);", "    lm629_word(0, 0);"),
-        "P36",
+        *("motion.c", "    lm629_word(acceleration[3], acceleration[2]);", "    lm629_word(0, 0);"), "P36"
     ),
     "takes an acceleration in motion": Mistake(
         *(
@@ -204,8 +184,7 @@ MISTAKES = {
         "P37",
     ),
     "loads an acceleration when one wheel stands": Mistake(
-        *("motion.c", "!(on_target(LEFT) && on_target(RIGHT))", "!on_target(LEFT)"),
-        "P37",
+        *("motion.c", "!(on_target(LEFT) && on_target(RIGHT))", "!on_target(LEFT)"), "P37"
     ),
     "forgets an acceleration that waits": Mistake(
         *(
@@ -216,8 +195,7 @@ MISTAKES = {
         "P37",
     ),
     "takes the settings of others": Mistake(
-        *("motion.c", "    if (PAYLOAD[SERVICE_SLOT] != slot)\n        return;\n", ""),
-        "P38",
+        *("motion.c", "    if (PAYLOAD[SERVICE_SLOT] != slot)\n        return;\n", ""), "P38"
     ),
     "takes an unknown opcode for an acceleration": Mistake(
         *(
@@ -228,16 +206,13 @@ MISTAKES = {
         "P39",
     ),
     "takes type 2 for a question": Mistake(
-        *("main.c", "    case TYPE_TEAM_ASK:", "    case TYPE_TELEMETRY:\n    case TYPE_TEAM_ASK:"),
-        "P40",
+        *("main.c", "    case TYPE_TEAM_ASK:", "    case TYPE_TELEMETRY:\n    case TYPE_TEAM_ASK:"), "P40"
     ),
     "answers in another robot's turn": Mistake(
-        *("telemetry.c", "seq % robots != slot", "seq % robots == 2"),
-        "P41 P43",
+        *("telemetry.c", "seq % robots != slot", "seq % robots == 2"), "P41 P43"
     ),
     "answers with another number": Mistake(
-        *("telemetry.c", "put(TYPE_TELEMETRY | seq);", "put(TYPE_TELEMETRY | ((seq + 1) & 0x3F));"),
-        "P41",
+        *("telemetry.c", "put(TYPE_TELEMETRY | seq);", "put(TYPE_TELEMETRY | ((seq + 1) & 0x3F));"), "P41"
     ),
     "leaves out FFh": Mistake(
         *("telemetry.c", "tx_frame[TX_PREAMBLE] = PREAMBLE_LAST;", "tx_frame[TX_PREAMBLE] = PREAMBLE_BYTE;"),
@@ -248,16 +223,14 @@ MISTAKES = {
         "P43",
     ),
     "begins a new answer in the middle of one": Mistake(
-        *("telemetry.c", "seq % robots != slot || tx_busy", "seq % robots != slot"),
-        "P44",
+        *("telemetry.c", "seq % robots != slot || tx_busy", "seq % robots != slot"), "P44"
     ),
     "keeps its flags": Mistake("telemetry.c", "    failsafe_flags = 0;\n", "", "P45"),
     "never says that it stopped": Mistake(
         "failsafe.c", "        failsafe_flags |= FLAG_STOPPED;\n", "", "P45"
     ),
     "says the left status twice": Mistake(
-        *("telemetry.c", "put(lm629_status(RIGHT));", "put(lm629_status(LEFT));"),
-        "P46",
+        *("telemetry.c", "put(lm629_status(RIGHT));", "put(lm629_status(LEFT));"), "P46"
     ),
     "says desired positions": Mistake(
         "lm629.h", "#define RDRP            0x0A", "#define RDRP            0x08", "P47"
@@ -268,12 +241,10 @@ MISTAKES = {
         "P47",
     ),
     "counts valid frames as accepted": Mistake(
-        *("failsafe.c", "        ++frames_stale;", "        ++frames_accepted;"),
-        "P48",
+        *("failsafe.c", "        ++frames_stale;", "        ++frames_accepted;"), "P48"
     ),
     "stops counting at 255": Mistake(
-        *("failsafe.c", "    ++frames_accepted;", "    if (frames_accepted != 255) ++frames_accepted;"),
-        "P48",
+        *("failsafe.c", "    ++frames_accepted;", "    if (frames_accepted != 255) ++frames_accepted;"), "P48"
     ),
     "does not count rejected frames": Mistake("decode.c", "++frames_rejected;", ";", "P49"),
     "is mute once its motors are off": Mistake(
@@ -285,16 +256,13 @@ MISTAKES = {
         "P50",
     ),
     "writes while a chip is busy": Mistake(
-        *("lm629.c", "write_cycle(opcode);", "write_cycle(opcode); write_cycle(opcode);"),
-        "P51",
+        *("lm629.c", "write_cycle(opcode);", "write_cycle(opcode); write_cycle(opcode);"), "P51"
     ),
     "stays in an interrupt": Mistake(
-        *("failsafe.c", "    ++ticks;\n    sleep = 0;", "    for (;;) ++ticks;"),
-        "P52",
+        *("failsafe.c", "    ++ticks;\n    sleep = 0;", "    for (;;) ++ticks;"), "P52"
     ),
     "pushes for ever": Mistake(
-        *("main.c", "    EA = 1;", "    __asm\n    00999$: push acc\n    sjmp 00999$\n    __endasm;"),
-        "P53",
+        *("main.c", "    EA = 1;", "    __asm\n    00999$: push acc\n    sjmp 00999$\n    __endasm;"), "P53"
     ),
     "executes A5h": Mistake(
         "main.c", "    EA = 1;", "    __asm\n    .db 0xA5\n    __endasm;\n    EA = 1;", "P54"
@@ -308,12 +276,10 @@ MISTAKES = {
         "lm629.c", "BOOT_POLLS      200", "BOOT_POLLS      50", "P57"
     ),
     "says nothing of a chip that does not come up": Mistake(
-        *("telemetry.c", " | (lm629_ready ? 0 : FLAG_INIT_FAILED)", ""),
-        "P58",
+        *("telemetry.c", " | (lm629_ready ? 0 : FLAG_INIT_FAILED)", ""), "P58"
     ),
     "waits for ever for a chip to come up": Mistake(
-        *("lm629.c", "        if (!--polls)\n            return false;", "        ;"),
-        "P58",
+        *("lm629.c", "        if (!--polls)\n            return false;", "        ;"), "P58"
     ),
     "tells positions of two samples": Mistake(
         "telemetry.c",
