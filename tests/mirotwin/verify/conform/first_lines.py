@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Named(NamedTuple):
-    """`says`: all of it. `source`: file, right and wrong text, unless the mistake is a planted one."""
+    """`says`: all of it. `source`: file, right and wrong text, unless the mistake is one of `MISTAKES` or `PLANTED`."""
 
     says: tuple[str, ...]
     source: tuple[str, str, str] | None = None
@@ -21,19 +21,10 @@ FIRST_LINES = {
             "    u16 speed;\n\n    velocity = -velocity;\n    speed = velocity;\n",
         ),
     ),
-    "a sign that is lost": Named(
-        (_PLAIN, "the right one goes the wrong way"), ("motion.c", "        mode = TRJ_VELOCITY;\n", "")
-    ),
+    "drives backward velocities forward": Named((_PLAIN, "the right one goes the wrong way")),
     "swaps the wheels": Named((_PLAIN, "left and right are exchanged")),
     "takes the velocities of the robot before it": Named((_PLAIN, "these are the velocities of robot 0")),
-    "bytes the other way round": Named(
-        (_PLAIN, "the bytes of each are exchanged"),
-        (
-            "motion.c",
-            "(int)((u16)PAYLOAD[at + 1] << 8 | PAYLOAD[at])",
-            "(int)((u16)PAYLOAD[at] << 8 | PAYLOAD[at + 1])",
-        ),
-    ),
+    "takes bytes the other way round": Named((_PLAIN, "the bytes of each are exchanged")),
     "twice the velocity": Named(
         (_PLAIN, "2 times as fast"), ("motion.c", _SPEED, "    speed <<= 1;\n" + _SPEED)
     ),
@@ -79,9 +70,7 @@ FIRST_LINES = {
         (_PLAIN, "its serial port takes 7 of 23 characters"),
         ("uart.c", "    RCAP2L = TIMER2_RELOAD_LOW;\n", "    RCAP2L = TIMER2_RELOAD_LOW - 78;\n"),
     ),
-    "takes a step less": Named(
-        ("P16", "team frame 8 steps on"), ("failsafe.c", "step > FRESH_STEPS", "step >= FRESH_STEPS")
-    ),
+    "takes 7 steps": Named(("P16", "team frame 8 steps on")),
     "acts on a frame that is repeated": Named(("begin with P17", "0 steps on, seq 21 not acted on")),
     "stops after 100 ms": Named(
         ("begin with P29", "found the left one 99.94 ms after it"),
@@ -92,9 +81,7 @@ FIRST_LINES = {
     "stops by opening the loops": Named(
         ("begin with P31", "wanted a smooth stop, found the left wheel told off")
     ),
-    "motors that never go off": Named(
-        ("begin with P32", "found left not within 734.88 ms"), ("failsafe.c", "        motion_off();\n", "")
-    ),
+    "never goes off": Named(("begin with P32", "found left not within 734.88 ms")),
     "never answers": Named(
         ("begin with P42", "wanted an answer to some of 9 questions in a row, found none")
     ),

@@ -46,7 +46,7 @@ def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin):
 
 @needs_sdcc
 def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_path):
-    image = planted_file(tmp_path, "stops after 125 ms")
+    image = planted_file(tmp_path, "stops 15 ms late")
     (tmp_path / "out" / "miro.map").unlink()
     (tmp_path / "out" / "miro.cdb").unlink()
     folder = tmp_path / "cases"
