@@ -15,8 +15,6 @@ from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
 from tests.mirotwin.verify.conform.first_lines import FIRST_LINES
 from tests.mirotwin.verify.conform.images import FAULTS, HANGS, image_of
 from tests.mirotwin.verify.conform.mistakes import MISTAKES
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
 
 pytestmark = pytest.mark.slow
@@ -135,13 +133,8 @@ def test_the_table_begins_with_the_rule_that_hides_most_and_folds_those_that_it_
 
 
 def planted_image(name):
-    one = FIRST_LINES[name]
-    file, right, wrong = one.source or (MISTAKES[name][:3] if name in MISTAKES else PLANTED[name][1:4])
-    sources = source_files()
-    assert sources[file].count(right) == 1
-    made = build({file: sources[file].replace(right, wrong)})
-    assert not made.error
-    return made.image
+    own = FIRST_LINES[name].source
+    return built(*(own or (MISTAKES[name][:3] if name in MISTAKES else PLANTED[name][1:4]))).path
 
 
 @needs_sdcc

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mirotwin.verify.steps.running import run_test
-from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
+from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, planted
 
 EXAMPLES = Path(__file__).parents[4] / "examples" / "hil-steps"
 STEPS_ALONE = """
@@ -21,16 +21,11 @@ step = [
 ]
 """
 MISTAKES = {
-    "stops 15 ms late": (
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"),
-        "step 6 (110 ms): wait_for command: tick ",
-    ),
-    "stops 15 ms early": (
-        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 15)"),
-        "step 5: never command: tick ",
-    ),
-    "never stops": ("failsafe.c", "        motion_stop();\n", "", "step 6 (110 ms): wait_for command: tick "),
+    "stops 15 ms late": "step 6 (110 ms): wait_for command: tick ",
+    "stops 15 ms early": "step 5: never command: tick ",
+    "never stops": "step 6 (110 ms): wait_for command: tick ",
 }
+EARLY = ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 15)")
 
 
 def run(path, image):
@@ -40,17 +35,16 @@ def run(path, image):
 @needs_sdcc
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_steps_alone_find_it_at_the_step_that_it_concerns(mistake, tmp_path):
-    file, right, wrong, place = MISTAKES[mistake]
     path = tmp_path / "alone.scenario.toml"
     path.write_text(STEPS_ALONE)
-    outcome = run(path, built(file, right, wrong))
+    outcome = run(path, built(*EARLY) if mistake == "stops 15 ms early" else planted(mistake))
     assert outcome.verdict == "failed"
-    assert outcome.lines[0].startswith(f"step failed: {place}")
+    assert outcome.lines[0].startswith(f"step failed: {MISTAKES[mistake]}")
 
 
 @needs_sdcc
 def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_path):
-    image = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
+    image = planted("stops 15 ms late")
     outcome = run(EXAMPLES / "failsafe.scenario.toml", image)
     step, check = outcome.lines[:2]
     assert step.startswith("step failed: step 9 (smooth stop): wait_for command: tick ")
