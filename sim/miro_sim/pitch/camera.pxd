@@ -81,7 +81,8 @@ cdef class Camera:
                    reach='long long', middle='long long', low='long long', high='long long', around='long long',
                    entered=int, sample=int, u=int, v=int)
     cdef int _across(self, int place, int pixel, int within) noexcept
-    @cython.locals(u='int *', v='int *', corner=int, x='long long', y='long long', column=int)
+    @cython.locals(u='int *', v='int *', cosine='long long', sine='long long', corner=int, x='long long', y='long long',
+                   column=int)
     cdef void _sample(self, int place, int pixel) noexcept
     @cython.locals(twist=int, column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int a, int b, int c, int d) noexcept

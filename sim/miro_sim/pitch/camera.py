@@ -7,8 +7,8 @@ the floor; in a robot's axes that is a straight line from `top` on by `fall`:
     side of a robot    the line enters the square on its way down
     else               the scene without robots, unless the ball hides the side
 
-Of several sides the highest is seen; where robots stand in
-each other, the first one is. All in um and integers. `fall` is taken at the middle of the pixel.
+Of several sides the highest is seen; where robots stand in each other, the first one is. All in um and integers.
+`fall` is taken at the middle of the pixel.
 
 The samples of a pixel lie around its middle, no further from it than `spread_um` along the robot's axes. So where that
 is far enough from all edges, no sample is looked at; and any pixel gives the same bits in any window. Where it is so by
@@ -362,16 +362,16 @@ class Camera:
             return 0
         if low_u <= -around and high_u >= around and low_v <= -around and high_v >= around:
             return self.samples
-        return self._count(place, pixel, low_u, high_u, low_v, high_v)
+        return self._count(place, pixel, low_u - 1, high_u + 1, low_v - 1, high_v + 1)
 
     def _count(self, place: int, pixel: int, low_u: int, high_u: int, low_v: int, high_v: int) -> int:
-        """How many samples lie within these distances of the middle."""
+        """How many samples lie between these distances from the middle."""
         if not self.sampled:
             self._sample(place, pixel)
         within = 0
         for sample in range(16):
-            inside_u = (self.u[sample] >= low_u) & (self.u[sample] <= high_u)
-            within += inside_u & (self.v[sample] >= low_v) & (self.v[sample] <= high_v)
+            inside_u = (self.u[sample] > low_u) & (self.u[sample] < high_u)
+            within += inside_u & (self.v[sample] > low_v) & (self.v[sample] < high_v)
         return within
 
     def _across(self, place: int, pixel: int, within: int) -> int:
@@ -405,11 +405,12 @@ class Camera:
         if self.cornered != pixel:
             self._find_corners(pixel)
         u, v = self.corner_u, self.corner_v
+        cosine, sine = self.cos[place], self.sin[place]
         for corner in range(4):
             x = self.top_x[corner] - self.x[place]
             y = self.top_y[corner] - self.y[place]
-            u[corner] = ((x * self.cos[place] + y * self.sin[place]) >> 15) - self.middle_u
-            v[corner] = ((y * self.cos[place] - x * self.sin[place]) >> 15) - self.middle_v
+            u[corner] = ((x * cosine + y * sine) >> 15) - self.middle_u
+            v[corner] = ((y * cosine - x * sine) >> 15) - self.middle_v
         self._spread(self.u, u[0], u[1], u[2], u[3])
         self._spread(self.v, v[0], v[1], v[2], v[3])
         if self.samples < 16:
