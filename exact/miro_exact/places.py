@@ -12,7 +12,7 @@ import re
 
 C_TYPES = (
     *("unsigned long long", "long long", "unsigned int", "unsigned short", "unsigned char"),
-    *("int", "bint", "double"),
+    *("short", "int", "bint", "double"),
 )
 _CLASS = re.compile(r"^cdef class (\w+)[^\n]*:\n((?:(?:[ \t]+[^\n]*)?\n)*)", re.M)
 _FIELD = re.compile(rf"^    cdef (?:public |readonly )?({'|'.join(C_TYPES)}) ([\w\[\], ]+)$", re.M)

@@ -74,6 +74,7 @@ __all__ = [
 
 CODES = {
     "int": "i",
+    "short": "h",
     "bint": "i",
     "long long": "q",
     "double": "d",
