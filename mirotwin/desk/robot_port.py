@@ -294,7 +294,7 @@ class RobotPort:
         self.run_to(self.tick + PAUSE_TICKS)
         counted = {}
         for said in [answer_of(event.frame) for _, event in cursor.read() if event.frame]:
-            if said is not None and said.slot == said.seq % robots:
+            if said is not None and said.seq in self._asked and said.slot == said.seq % robots:
                 since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
                 counted[said.slot] = (said.accepted + since, said.rejected)
         return counted
@@ -307,7 +307,7 @@ class RobotPort:
             return f"{asked}: nothing comes", "is it switched on, and is this its radio's port?"
         if any(isinstance(event, Received) for event in Decoder(sizes[0]).feed(came)):
             return f"{asked}: the port echoes what is sent", "turn the echo of the adapter off"
-        if self.delays:
+        if any(isinstance(event, Received) for event in TelemetryDecoder().feed(came)):
             return f"{asked}, but others answer", "is it a network of another size?"
         what = f"{asked}: {len(came)} characters come that are no answer, {came[:6].hex(' ')} .."
         return what, "is this the radio's port, and is its rate 9600 baud?"

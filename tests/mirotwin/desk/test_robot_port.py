@@ -16,7 +16,7 @@ import serial
 from miro_exact.bad_input import BadInput
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
-from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.verify.rig_options import silent_scenario
@@ -216,8 +216,9 @@ def answering(pty, answer):
         (lambda data: data, "the port echoes what is sent; turn the echo"),
         (lambda data: bytes(7), "[0-9]+ characters come that are no answer, 00 00 .*9600 baud"),
         (lambda data: b"", "nothing comes; is it switched on"),
+        (lambda data: encode(TelemetryFrame(40, 1), 3), "but others answer; is it a network of another"),
     ],
-    ids=["echo", "garbage", "silence"],
+    ids=["echo", "garbage", "silence", "answers to what nobody asked"],
 )
 def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     answering(pty, answer)
