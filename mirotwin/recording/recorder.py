@@ -192,7 +192,7 @@ class Recorder:
                 self._add([(topic, fault.tick, message)])
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
-        """Adds a frame of a network's camera, behind all that was added before."""
+        """Adds a frame of a network's camera, after all that was added before."""
         with self._undisturbed:
             self._write_waiting()
             self._add([(topics.image_topic(network), tick, image_message(network, tick, png))])

@@ -43,7 +43,7 @@ cdef class Rows:
     cdef _robot(self, robot, tick)
     cdef _control(self, str topic, answer, tick)
     cdef _registers(self, axis)
-    cdef _values(self, tick, record)
+    cdef _posture(self, tick, at)
     @cython.locals(found=tuple)
     cdef _begin(self, str topic, tick, kind)
     cdef _add_channel(self, str topic, kind, bytes form, inner)

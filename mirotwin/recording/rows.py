@@ -14,6 +14,7 @@ import msgspec
 from msgspec.structs import astuple
 
 from miro_host.eye.track import Sighting
+from miro_host.posture import Posture
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import topics
@@ -102,6 +103,7 @@ class Chunk:
                     out[end] = byte
                     end += 1
                     continue
+                assert at < len(text), "there are fewer values than the forms have places for"
                 while text[at] != _LINE_END:
                     out[end] = text[at]
                     end += 1
@@ -160,7 +162,7 @@ class Rows:
         self.write(heads, values)
 
     def message(self, topic: str, tick: int, message: msgspec.Struct) -> None:
-        """Any message, as its own only value."""
+        """Any message, encoded as one value."""
         if topic not in self.channels:
             self._add_channel(topic, type(message), WHOLE, None)
         self._begin(topic, tick, type(message))
@@ -183,20 +185,19 @@ class Rows:
         self.values += (sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
 
     def _robot(self, robot: RobotPeriod, tick: int) -> None:
-        """What one robot leaves behind."""
+        """All messages of one robot."""
         names: list[str] = _robot_topics(robot.network, robot.slot)
         seen, answer, left, right = robot.measurement, robot.control, robot.left, robot.right
         accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
         self._begin(names[0], tick, PostureMessage)
-        self._values(tick, robot.reference)
+        self._posture(tick, robot.reference)
         self._begin(names[1], tick, TruthMessage)
-        self._values(tick, robot.truth)
+        self._posture(tick, robot.truth)
         self.values += (robot.v_m_s, robot.w_rad_s)
         if seen is not None:
             self._begin(names[2], tick, MeasurementMessage)
-            self._values(tick, seen)
-            if type(seen) is not Sighting:
-                self.values += (None, None)
+            self._posture(tick, seen)
+            self.values += (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
         if answer is not None:
             self._control(names[3], answer, tick)
         if accepted is not None and rejected is not None and stale is not None:
@@ -213,17 +214,17 @@ class Rows:
         if topic not in self.channels:
             self._add_channel(topic, ControlMessage, form_of(ControlMessage), tuple(answer.inner))
         self._begin(topic, tick, ControlMessage)
-        self._values(tick, answer)
+        self.values.append(tick)
+        self.values += astuple(answer)
 
     def _registers(self, axis: Axis) -> None:
         commands = [CommandMessage(tick, opcode, data) for tick, opcode, data in axis.commands]
         self.values += (axis.desired_position, axis.real_position, axis.desired_velocity, axis.status)
         self.values.append(commands)
 
-    def _values(self, tick: int, record: msgspec.Struct) -> None:
-        """The tick, and all that a record holds."""
-        self.values.append(tick)
-        self.values += astuple(record)
+    def _posture(self, tick: int, at: Posture) -> None:
+        """By name: a plug-in's reference may give a posture that holds more."""
+        self.values += (tick, at.x_m, at.y_m, at.theta_rad)
 
     def _begin(self, topic: str, tick: int, kind: type[msgspec.Struct]) -> None:
         """A message, whose values are the next ones."""
@@ -242,7 +243,7 @@ class Rows:
 
 @cache
 def _robot_topics(network: int, slot: int) -> list[str]:
-    """Of what a robot leaves behind in each period."""
+    """Of the messages that a robot has in each period, in their order."""
     names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
     return [topics.robot_topic(network, slot, name) for name in names]
 

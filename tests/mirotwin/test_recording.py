@@ -26,6 +26,7 @@ from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.recording.rows import Chunk
 from mirotwin.recording.writer import MAGIC
 from tests.mirotwin.synthetic import periods
 from tests.naive import recording_messages
@@ -72,6 +73,14 @@ def test_what_was_done_to_robots_and_radios_comes_out_again():
 FINITE = st.floats(allow_nan=False)
 TICKS = st.integers(0, 1 << 54)
 POSTURES = st.builds(Posture, FINITE, FINITE, FINITE)
+
+
+class PosturePlus(Posture, frozen=True):
+    """As a plug-in's reference may give it."""
+
+    curvature: float
+
+
 MAPS = st.dictionaries(st.text(max_size=5), FINITE, max_size=3)
 WHOLE = st.integers(-(1 << 63), (1 << 63) - 1)
 AXES = st.builds(
@@ -86,7 +95,7 @@ ROBOTS = st.builds(
     RobotPeriod,
     network=st.integers(0, 1),
     slot=st.integers(0, 2),
-    reference=POSTURES,
+    reference=POSTURES | st.builds(PosturePlus, *[FINITE] * 4),
     truth=POSTURES,
     v_m_s=FINITE,
     w_rad_s=FINITE,
@@ -129,6 +138,11 @@ def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, ch
     ]
     wanted = [message for period in written for message in recording_messages.messages(period)]
     assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
+
+
+def test_a_chunk_reads_no_value_beyond_those_that_it_is_given():
+    with pytest.raises(AssertionError, match="fewer values than the forms have places for"):
+        Chunk().fill([(1, 0, b"[\n,\n]")], 0, b"1\n", 0, 100)
 
 
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(monkeypatch):
