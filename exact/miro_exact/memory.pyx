@@ -224,9 +224,8 @@ cdef class Attributes:
     """Fields that are Python objects, and a Memory wherever some are not, packed in one go.
 
     Each is (part, name, shape, codes, number of items, split): the shape is NUMBER or one of its neighbours, the codes
-    are those of the cells, a number that is no array has 0 items. A Memory is the part of a field that is all of it.
-    `slow` packs the same fields, and says what is wrong
-    with one: where a value is odd, it is asked.
+    are those of the cells, a number that is no array has 0 items. A Memory is the part of a field of shape MEMORY,
+    which has no name. `slow` packs the same fields, and says what is wrong with one: where a value is odd, it is asked.
     """
 
     def __cinit__(self, list fields, slow):

@@ -84,9 +84,10 @@ class Stream:
             self.block = block
 
     def blocks(self, first: int, count: int, words: list[int]) -> None:
-        """Puts blocks `first` on of kind 0 into `words`: each first word, from 112 on each second one, and so on.
+        """Writes up to 112 blocks of kind 0 into `words`, from block number `first` on.
 
-        Up to three blocks more are written, so that four at a time are worked out: as `philox4x32`, in vectors.
+        Their first words stand from 0 on, their second words from 112 on, and so on. Four blocks at a time are worked
+        out, as `philox4x32` does, in vectors: up to three more than `count` are written.
         """
         m0, m1, mask = 0xD2511F53, 0xCD9E8D57, 0xFFFFFFFF  # in locals, compilers know that these are 32 bits
         for at in range(0, count, 4):
