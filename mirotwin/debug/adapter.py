@@ -43,13 +43,10 @@ _MOVES = {
 _MOST_FRAMES = 1000
 _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
 _REASONS = {
-    "breakpoint": "breakpoint",
-    "begin": "entry",
-    "case": "exception",
-    "interrupted": "pause",
-    "goto": "goto",
+    "breakpoint": "breakpoint", "begin": "entry", "case": "exception", "firmware": "exception", "goto": "goto",
     "step": "step",
-}
+}  # fmt: skip
+"""By the first word of why it stopped; "pause" for any other."""
 _UNUSABLE = (AttributeError, LookupError, TypeError, ValueError)  # what comes of arguments of another form
 Shown = Callable[[], Value]
 
@@ -89,6 +86,8 @@ class Adapter:
             body = handler(request["arguments"])
         except BadInput as error:
             self._respond(request, refused=str(error))
+        except OSError as error:
+            self._respond(request, refused=f"{error.filename}: {error.strerror}")
         except _UNUSABLE as error:
             self._respond(request, refused=f"{command}: arguments that cannot be used: {error!r}")
         else:
@@ -283,13 +282,10 @@ class Adapter:
         word, _, digits = why.partition(" ")
         number = int(digits) if word == "breakpoint" else 0
         kind = next((kind for kind, numbers in self.kinds.items() if number in numbers), "")
-        reason = (
-            kind.partition(" in ")[0] or _REASONS.get(word) or ("exception" if "fault" in why else "pause")
-        )
         self.children.clear()
         self._event(
             "stopped",
-            reason=reason,
+            reason=kind.partition(" in ")[0] or _REASONS.get(word, "pause"),
             description=text or why,
             text=text or None,
             threadId=self.its.timeline.focus + 1,
@@ -395,6 +391,8 @@ class Adapter:
         self.console.do(text)
         if self.its.timeline.tick != before:
             self.run_after = partial(self._stopped, "goto")
+        if self.console.ended:
+            self.on_terminate(given)
         return {"result": "\n".join(self.console.lines), "variablesReference": 0}
 
     def on_completions(self, given: Message) -> Message:

@@ -121,8 +121,7 @@ def _complete(console: Console) -> None:
         import readline
     except ImportError:  # not on every system
         return
-    symbols = console.symbols
-    names = [*(name.removeprefix("_") for name in symbols.image.symbols.names), *symbols.known_names()]
+    names = console.symbols.known_names()
 
     def offer(text: str, state: int) -> str | None:
         words = names if " " in readline.get_line_buffer().lstrip() else VERBS

@@ -166,11 +166,8 @@ _OPERATORS: dict[str, Callable[..., Any]] = {
     "%": lambda a, b: a - b * _divided(a, b),
 }  # fmt: skip
 _SIGNS: dict[str, Callable[..., Any]] = {
-    "-": operator.neg,
-    "~": operator.invert,
-    "!": operator.not_,
-    "+": operator.pos,
-}
+    "-": operator.neg, "~": operator.invert, "!": operator.not_, "+": operator.pos,
+}  # fmt: skip
 
 
 def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:

@@ -43,6 +43,7 @@ class Symbols:
     def __init__(self, image: Image, folders: Sequence[Path]) -> None:
         self.image = image
         self.debug = DebugInfo.of(image)
+        self.line = self.debug.line_at
         self.sources = Sources([image.path.parent, *folders])
         self.names = SymbolNames(image)
         self.unwinder = Unwinder(image, self.names)
@@ -55,9 +56,6 @@ class Symbols:
         self.instructions = instructions_of(image.code, image.used, known)
 
     # Places
-
-    def line(self, address: int) -> SourceLine | None:
-        return self.debug.line_at(address)
 
     def function(self, address: int) -> str:
         """Its name as C has it."""
@@ -115,7 +113,8 @@ class Symbols:
 
     def known_names(self) -> list[str]:
         """For completion and remedies."""
-        return [*self.variables.by_name, *SPECIAL, *SFRS, *BITS, *SIZES]
+        symbols = (name.removeprefix("_") for name in self.image.symbols.names)
+        return [*symbols, *self.variables.by_name, *SPECIAL, *SFRS, *BITS, *SIZES]
 
 
 class Moment:

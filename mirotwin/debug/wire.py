@@ -37,19 +37,20 @@ class Wire:
         self.sequence = 0
         self.data = b""
         self.came: queue.SimpleQueue[Message | BadInput | None] = queue.SimpleQueue()
-        self.back: list[Message | None] = []
+        self.back: list[Message | BadInput | None] = []
         threading.Thread(target=self._read_all, daemon=True).start()
 
     def next(self, wait: bool = True) -> Message | None:
         """The next message; None at the end of input, and (without `wait`) an empty one where none is there yet.
 
-        Raises BadInput for what is no message.
+        Raises BadInput for what is no message, again and again: nothing is read after it.
         """
         try:
             found = self.back.pop(0) if self.back else self.came.get(block=wait)
         except queue.Empty:
             return {}
         if isinstance(found, BadInput):
+            self.back.append(found)
             raise found
         return found
 

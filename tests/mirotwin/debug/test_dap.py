@@ -88,6 +88,17 @@ def test_garbage_ends_it_with_one_line(adapter, garbage):
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("move", ["continue", "evaluate"])
+def test_garbage_during_a_run_ends_it_with_one_line(adapter, move):
+    process, client = adapter
+    client.begin(subject="silent", set=["duration_s=60"])
+    client.send(move, threadId=1, expression="continue", context="repl")
+    client.raw(b"GET / HTTP/1.1\r\n\r\n")
+    code, err = ended(process)
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.startswith("mirotwin: error: --dap: the client sends no message of the protocol")
+
+
 def test_a_client_that_dies_leaves_no_process(adapter):
     process, client = adapter
     client.begin(subject="fig6")
@@ -190,8 +201,12 @@ def test_the_verbs_of_the_console_work_in_the_debug_console(adapter):
     done = (("r stepi", "step: "), ("where", "#0"), ("print tick", "tick = "), ("break act", "breakpoint 1"))
     for text, said in done:
         assert said in client.ask("evaluate", expression=text, context="repl")["body"]["result"]
+    targets = client.ask("completions", text="break failsafe_ti", column=18)["body"]["targets"]
+    assert targets == [{"label": "failsafe_tick"}]
     client.send("continue", threadId=1)
     assert client.until(event="stopped")["body"]["reason"] == "breakpoint"
+    client.send("evaluate", expression="quit", context="repl")
+    client.until(event="terminated")
 
 
 @pytest.mark.parametrize(
@@ -201,15 +216,20 @@ def test_the_verbs_of_the_console_work_in_the_debug_console(adapter):
         ({"subject": "no_such_scenario"}, "no_such_scenario"),
         ({"subject": "fig6", "at": "12"}, "it has no unit"),
         ({"subject": "fig6", "slot": "x"}, "its keys are"),
+        ({"subject": "fig6", "resume": "gone.world"}, "gone.world: No such file or directory"),
+        ({"subject": "/"}, "/: "),
     ],
 )
-def test_a_launch_that_cannot_be_done_says_why(adapter, configuration, said):
-    _, client = adapter
+def test_a_launch_that_cannot_be_done_says_why_and_another_one_may_follow(adapter, configuration, said):
+    process, client = adapter
     client.ask("initialize")
     assert client.ask("threads")["message"] == "threads: there is no run yet; send launch first"
     answer = client.ask("launch", **configuration)
     assert not answer["success"]
     assert said in answer["message"]
+    assert client.begin(subject="fig6")["reason"] == "entry"
+    client.ask("disconnect")
+    assert ended(process) == (0, "")
 
 
 def test_it_listens_on_a_port_of_this_machine_alone():
