@@ -11,6 +11,7 @@ import sys
 
 import pytest
 
+from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
@@ -105,6 +106,15 @@ def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
     assert summary["complete"] is False
     assert summary["digest"] == recording.digest
     assert "complete" not in json.loads(before["summary.json"])
+
+
+def test_both_parts_say_which_part_of_which_robot_failed(mirotwin, short, tmp_path, monkeypatch):
+    at_period(monkeypatch, 3, raising(BadInput("net0/robot0", "", "law 'mine' failed")))
+    assert mirotwin("run", short, "--out", tmp_path, "-q")[0] == 2
+    said = recording_reader.read(tmp_path / "run.part.mcap").broken_off
+    assert said.endswith("was broken off: net0/robot0: law 'mine' failed")
+    reason = json.loads((tmp_path / "summary.part.json").read_bytes())["reason"]
+    assert reason == "net0/robot0: law 'mine' failed"
 
 
 def test_a_run_that_recorded_nothing_leaves_nothing(mirotwin, short, tmp_path, monkeypatch):
