@@ -12,7 +12,6 @@ from typing import NamedTuple
 from miro_sim.radio.probability import margin_table
 from tests.naive import rng
 
-"""(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
 Symbol = tuple[int, bool, int]
 NO_OTHERS = []
 

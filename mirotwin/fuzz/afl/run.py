@@ -1,7 +1,7 @@
 """One campaign of afl-fuzz: its jobs, how far they are, and the inputs that they leave.
 
 The folder, beside what afl-fuzz makes itself (`JOB/queue`, `JOB/crashes`, ..): `JOB.log` is afl-fuzz's output,
-`JOB.target` what the target process complained of, `JOB.counts` what it was fed.
+`JOB.target` what the target process complained of, `JOB.counts` how many inputs that has run.
 """
 
 from __future__ import annotations

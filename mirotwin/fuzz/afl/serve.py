@@ -3,7 +3,7 @@
     python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
 
 SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,
-`BESIDE.counts` how many inputs it has run (`counts`).
+`BESIDE.counts` how many inputs it has run (`job.Counts`).
 
 AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
 puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too

@@ -29,7 +29,7 @@ REASONS = {
     "AFL_SKIP_BIN_CHECK": "the target is a Python program, which no compiler has instrumented",
     "AFL_MAP_SIZE": "bytes of the edge map; the default is eight times as large and slower",
     "AFL_NO_UI": "the output goes to a file",
-    "AFL_NO_AFFINITY": "the command binds each job to a core itself: see `cores`",
+    "AFL_NO_AFFINITY": "the command binds each job to a core itself: see `run.cores_for`",
     "AFL_NO_CRASH_README": "folders hold inputs only",
     "AFL_FORKSRV_INIT_TMOUT": "milliseconds in which the target has to be ready",
 }
