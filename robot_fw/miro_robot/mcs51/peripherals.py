@@ -94,12 +94,12 @@ class Peripherals:
         self.now = cycle
         self.smod = 0
         self.interrupts.clear()
+        self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
         self.external.clear(cycle)
         self.timers.clear(cycle)
         self.timer2.clear(cycle)
         self.uart.clear(cycle)
         self.shift.abort()
-        self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
         self.timers.set_gates(self.external.levels)
         self.timer2.up = (self.p1 >> 1) & 1
         self.timer_wait = -1

@@ -76,6 +76,19 @@ def test_power_down_freezes_timers_and_only_reset_leaves_it():
     assert sfr(cpu, "TL0") == frozen
 
 
+def test_a_level_that_went_low_while_reset_was_held_interrupts_after_it():
+    cpu = cpu_with(
+        "LJMP main\nORG 0003h\nINC 30h\nCLR EX0\nRETI\nORG 0040h\nmain:\nMOV IE,#81h\nSETB TR0\nSJMP $"
+    )
+    cpu.hold()
+    cpu.set_external(3, 0xFB, 12 * 10)
+    cpu.run(100)
+    cpu.reset()
+    assert sfr(cpu, "TCON") == 0x02
+    cpu.run(120)
+    assert cpu.peek_iram(0x30) == 1
+
+
 def test_an_idle_cpu_with_nothing_enabled_sleeps_on_and_general_flags_are_kept():
     cpu = cpu_with("MOV PCON,#0Dh\nSJMP $")
     cpu.run(100)
