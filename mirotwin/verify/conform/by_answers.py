@@ -46,9 +46,9 @@ LEFT_OUT = {
     "bad stop bits": ("P04", "P13", "P43", "P49"),
     "pauses within a frame of less than 5 ms": ("P04", "P13", "P49"),
     "the flags of power-on": ("P45",),
-    "what all answers are late by alike": ("P41", "P44"),
+    "a delay that all answers share": ("P41", "P44"),
 }
-"""What of the trials of rules that can be seen no PC can do."""
+"""What no PC can do of a trial -> rules whose other parts can be seen."""
 SHORTEST_US = 5000.0
 """A pause that a PC can make within a frame."""
 SURE_TICKS = 5 * TICKS_PER_MS

@@ -162,7 +162,7 @@ def test_a_folder_that_another_campaign_uses_is_told(tmp_path):
         until(first.new_queue, "the first")
         said = error_of(campaign(tmp_path))
         assert "is in use; another campaign runs in this folder" in said
-        assert first.progress()
+        assert first.jobs[0].running
 
 
 def test_a_folder_with_a_file_in_the_place_of_a_job_is_told(tmp_path):
