@@ -191,7 +191,7 @@ class World:
         return self.waits.until(conditions, None if within is None else _whole(within))
 
     def inject(
-        self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: tuple[int, ...] = ()
+        self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: Sequence[int] = ()
     ) -> int:
         """Puts characters on the air of `network`; returns the tick of the first start bit.
 
@@ -202,7 +202,7 @@ class World:
         then, and indices of no characters.
         """
         at_tick = None if at_tick is None else _whole(at_tick)
-        return self._network(network).inject(data, at_tick, self.tick, bad_stop)
+        return self._network(network).inject(data, at_tick, self.tick, tuple(bad_stop))
 
     def earliest_tick(self, network: int = 0) -> int:
         """The earliest tick for the first start bit of what is injected now."""

@@ -165,10 +165,10 @@ def test_an_injection_into_a_frame_of_the_station_is_refused():
         world.inject(b"\x55", at_tick=97_000)
 
 
-@pytest.mark.parametrize("place", [8, 22])
-def test_a_frame_with_a_bad_stop_bit_is_recorded_as_sent_and_refused_by_the_robot(place):
+@pytest.mark.parametrize(("place", "indices"), [(8, (8,)), (22, [22])])
+def test_a_frame_with_a_bad_stop_bit_is_recorded_as_sent_and_refused_by_the_robot(place, indices):
     world = silent()
-    tick = world.inject(FRAME, at_tick=100_000, bad_stop=(place,))
+    tick = world.inject(FRAME, at_tick=100_000, bad_stop=indices)
     world.run_to(tick + place * HOST_CHARACTER_TICKS)
     event = world.run_until(wait.Received(byte=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
     while event.tick < tick + place * HOST_CHARACTER_TICKS:
