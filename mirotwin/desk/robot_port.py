@@ -282,7 +282,7 @@ class RobotPort:
 
     def _who_answers(self, robots: int, sent: Iterable[Transmission]) -> dict[int, tuple[int, int]]:
         """By slot, how many frames each has accepted and rejected; each is asked some times, standing."""
-        self._counted, self.delays, cursor = {}, [], Cursor(self.log)
+        self._counted, self._asked, self.delays, cursor = {}, {}, [], Cursor(self.log)
         decoder = Decoder(robots)
         told = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
         seq = (next(told, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
@@ -297,7 +297,7 @@ class RobotPort:
             if said is not None and said.seq in self._asked and said.slot == said.seq % robots:
                 since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
                 counted[said.slot] = (said.accepted + since, said.rejected)
-        return counted
+        return counted if self.delays else {}  # without any, the numbers are those of later questions
 
     def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
         """What came instead of answers, and what to do."""

@@ -48,7 +48,7 @@ class ProgressBar:
             self._progress.stop()
 
     def to(self, done: float, said: str = "") -> None:
-        """Moves the bar. Cheap enough to call once a control period. `said`: of a column that shows it."""
+        """Moves the bar. Cheap enough to call once a control period. `said`: the text of a column that shows one."""
         if not self._shown:
             return
         if self._progress is None:

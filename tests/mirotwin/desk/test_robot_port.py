@@ -210,6 +210,12 @@ def answering(pty, answer):
     return thread
 
 
+def answer_ahead(data, steps):
+    """Of the robot that is asked, with the number of a question that comes so many steps later."""
+    asked = [event.seq for event in Decoder(3).feed(data) if isinstance(event, Received)]
+    return b"".join(encode(TelemetryFrame((seq + steps) % 64, seq % 3), 3) for seq in asked)
+
+
 @pytest.mark.parametrize(
     ("answer", "said"),
     [
@@ -217,8 +223,9 @@ def answering(pty, answer):
         (lambda data: bytes(7), "[0-9]+ characters come that are no answer, 00 00 .*9600 baud"),
         (lambda data: b"", "nothing comes; is it switched on"),
         (lambda data: encode(TelemetryFrame(40, 1), 3), "but others answer; is it a network of another"),
+        (lambda data: answer_ahead(data, 3), "but others answer; is it a network of another"),
     ],
-    ids=["echo", "garbage", "silence", "answers to what nobody asked"],
+    ids=["echo", "garbage", "silence", "answers to what nobody asked", "answers to what is asked later"],
 )
 def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     answering(pty, answer)
