@@ -28,8 +28,7 @@ from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import has_header, is_bare_case
-from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
-from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.cases.rerun import CaseVerdict
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import CHECK
@@ -149,10 +148,10 @@ def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
 def _judge(job: Job, timeline: Timeline) -> CaseVerdict:
     assert isinstance(timeline.run, RobotRun)
     world = timeline.run.world
-    checks = Checks(world, expectations_of(job.scenario, job.file))
+    checks = Checks(world, job.expectations_of_case())
     timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
     checks.finish()
-    return verdict_of(job.case.verdict, checks.failures, job.case.changed)
+    return job.verdict_of_case(checks)
 
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:

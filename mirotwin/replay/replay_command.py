@@ -48,25 +48,19 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_path
-from mirotwin.verify.cases.rerun import CaseVerdict, Rerun, verdict_of
-from mirotwin.verify.checks.expect import expectations_of, says_anything
+from mirotwin.verify.cases.rerun import CaseVerdict, Rerun
+from mirotwin.verify.checks.expect import says_anything
 from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
 
 
 def replay_case(job: Job, quiet: bool) -> int:
     """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
-    name = job.case.verdict.partition(":")[0]
-    expected = expectations_of(job.scenario, job.file)
-    if not any(check.name == name for checks in expected.values() for check in checks):
-        what = f"the verdict is of the check {name!r}, which nothing expects"
-        raise BadInput(job.file, "header", what, "put it into [expect], or take the verdict away")
+    job.expectations_of_case()
     end_tick = job.case.end_tick or None
     periods = None if end_tick is None else -(-end_tick // CONTROL_PERIOD_TICKS)
     with ProgressBar("replaying", periods, quiet) as bar:
         again = rerun_job(job, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
-    judged = all(one.name != name or one.verdict != "not judged" for one in again.checks.verdicts())
-    verdict = verdict_of(job.case.verdict, again.failures, job.case.changed, judged)
-    return _told(verdict, debug_line(job.file, foreign_path(job.runs_on)), quiet)
+    return _told(job.verdict_of_case(again.checks), debug_line(job.file, foreign_path(job.runs_on)), quiet)
 
 
 def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:

@@ -38,8 +38,9 @@ from mirotwin.shell.options import choose_engine, plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
 from mirotwin.verify.cases.artifacts import image_beside
-from mirotwin.verify.cases.rerun import Rerun, rerun
+from mirotwin.verify.cases.rerun import CaseVerdict, Rerun, rerun, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.monitors import Checks, Expected
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -265,6 +266,21 @@ class Job(msgspec.Struct, frozen=True):
     def periods(self) -> int:
         """Control periods of its scenario."""
         return max(1, -(-ticks(self.scenario.duration_s) // CONTROL_PERIOD_TICKS))
+
+    def expectations_of_case(self) -> Expected:
+        """What its scenario expects. Raises BadInput where that is not the check that the case is about."""
+        name = self.case.verdict.partition(":")[0]
+        expected = expectations_of(self.scenario, self.file)
+        if not any(check.name == name for checks in expected.values() for check in checks):
+            what = f"the verdict is of the check {name!r}, which nothing expects"
+            raise BadInput(self.file, "header", what, "put it into [expect], or take the verdict away")
+        return expected
+
+    def verdict_of_case(self, checks: Checks) -> CaseVerdict:
+        """What its check says this time; `checks` were there."""
+        name = self.case.verdict.partition(":")[0]
+        judged = all(one.name != name or one.verdict != "not judged" for one in checks.verdicts())
+        return verdict_of(self.case.verdict, checks.failures, self.case.changed, judged)
 
     def world_of(self, image: Image | None = None) -> World:
         """A world that is to do it again, on `image` if one is given; a resumed run begins where that one did."""

@@ -81,8 +81,8 @@ def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(mirotwin, 
     text = "".join(line for line in path.read_text().splitlines(True) if " > " not in line)
     path.write_text(text)
     code, _, err = mirotwin("replay", path, "-q")
-    assert code == 1
-    assert "not judged" in err
+    assert (code, "not judged" in err) == (1, True)
+    assert "not judged" in mirotwin("debug", path, "-x", "where")[1]
 
 
 @needs_sdcc
@@ -171,9 +171,10 @@ def test_a_world_that_has_moved_has_no_trace():
 def test_a_verdict_of_a_check_that_nothing_expects_is_refused(mirotwin, tmp_path):
     path = failing(tmp_path)
     path.write_text(path.read_text().replace("[expect.failsafe_stop_ms]", "[expect.motors_off_ms]"))
-    code, out, err = mirotwin("replay", path, "-q")
-    assert (code, out) == (2, "")
-    assert "the verdict is of the check 'failsafe_stop_ms', which nothing expects" in err
+    for command in (("replay", path, "-q"), ("debug", path, "-x", "where")):
+        code, out, err = mirotwin(*command)
+        assert (code, out) == (2, "")
+        assert "the verdict is of the check 'failsafe_stop_ms', which nothing expects" in err
 
 
 def test_a_case_ends_where_it_failed_whatever_the_duration_of_its_scenario(mirotwin, tmp_path):
