@@ -87,7 +87,7 @@ class Adapter:
         except BadInput as error:
             self._respond(request, refused=str(error))
         except OSError as error:
-            self._respond(request, refused=f"{error.filename}: {error.strerror}")
+            self._respond(request, refused=f"{error.filename or command}: {error.strerror}")
         except _UNUSABLE as error:
             self._respond(request, refused=f"{command}: arguments that cannot be used: {error!r}")
         else:

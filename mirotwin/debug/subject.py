@@ -12,7 +12,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.inputs import read_input
+from miro_exact.inputs import WORLD_BYTES, read_input
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
@@ -164,8 +164,9 @@ def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
 def _resume(run: RobotRun | BareRun | CaseRun, path: str) -> None:
     if not isinstance(run, RobotRun):
         raise BadInput(path, "--resume", "is a world, and SUBJECT is none", "leave it out")
+    saved = read_input(path, WORLD_BYTES)
     try:
-        run.world.load(read_input(path))
+        run.world.load(saved)
     except ValueError as error:
         remedy = "give the scenario, settings, seed and firmware it was saved with"
         raise BadInput(path, "--resume", str(error), remedy) from None

@@ -94,6 +94,8 @@ def test_a_saved_world_is_gone_on_from(mirotwin, tmp_path):
     code, _, err = mirotwin("debug", "fig6", "--seed", 4, "--resume", saved, *commands("where"))
     assert code == 2
     assert "seed" in err
+    code, _, err = mirotwin("debug", "fig6", "--resume", tmp_path, *commands("where"))
+    assert (code, err) == (2, f"mirotwin: error: {tmp_path}: is a folder; name a file in it\n")
 
 
 def test_an_image_without_symbols_has_addresses_and_says_so(mirotwin, bare):
