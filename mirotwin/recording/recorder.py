@@ -167,6 +167,7 @@ class Recorder:
 
     def _write_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
+        self._rows.clear()
         for one in waiting:
             if isinstance(one, tuple):
                 self._rows.message(*one)

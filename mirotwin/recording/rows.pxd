@@ -36,6 +36,7 @@ cdef class Rows:
     cdef list heads, values
 
     cpdef flush(self)
+    cpdef clear(self)
     cpdef message(self, str topic, tick, message)
     cpdef period(self, period)
     cdef _wire(self, sent)

@@ -158,8 +158,12 @@ class Rows:
     def flush(self) -> None:
         """Writes what waits."""
         heads, values = self.heads, self.values
-        self.heads, self.values = [], []
+        self.clear()
         self.write(heads, values)
+
+    def clear(self) -> None:
+        """Drops what waits: of a period that failed there is a part, perhaps heads without values."""
+        self.heads, self.values = [], []
 
     def message(self, topic: str, tick: int, message: msgspec.Struct) -> None:
         """Any message, encoded as one value."""

@@ -145,6 +145,23 @@ def test_a_chunk_reads_no_value_beyond_those_that_it_is_given():
         Chunk().fill([(1, 0, b"[\n,\n]")], 0, b"1\n", 0, 100)
 
 
+def write_all(recorder, written):
+    for period in written:
+        recorder.write(period)
+
+
+def test_a_period_that_cannot_be_written_leaves_a_recording_of_those_before():
+    stream = io.BytesIO()
+    written = [*periods(20)]
+    lost = msgspec.structs.replace(written[11].robots[0], left=None)
+    written[11] = msgspec.structs.replace(written[11], robots=(lost,))
+    with pytest.raises(AttributeError), Recorder(stream, SOURCE) as recorder:
+        write_all(recorder, written)
+    found = parse(stream.getvalue(), "run.mcap")
+    assert len(found.periods) == 10
+    assert found.broken_off
+
+
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4e9)
     monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
