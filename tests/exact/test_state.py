@@ -294,3 +294,7 @@ cdef class Other:
         ],
         "Other": [("k0", "unsigned long long", False)],
     }
+
+
+def test_every_c_type_of_a_layout_has_a_code():
+    assert {*places.C_TYPES} == state.CODES.keys()
