@@ -75,10 +75,10 @@ def info(options: InfoOptions) -> int:
 
 def _engine_line(active: str) -> str:
     finder = engines.install()
-    hot, missing = len(finder.sources), len(finder.missing())
+    compiled = len(finder.compiled())
     if active == "compiled":
-        return f"compiled ({hot} modules), {_dispatch()}"
-    return f"python ({hot - missing} of {hot} modules have a compiled twin)"
+        return f"compiled ({compiled} modules), {_dispatch()}"
+    return f"python ({compiled} of {len(finder.sources)} modules have a compiled twin)"
 
 
 def _dispatch() -> str:

@@ -1,11 +1,15 @@
 """The engine: compiled and source twins are never mixed, and a stale compiled module is refused."""
 
+import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
 from miro_exact import engine, hot_modules
 from tests import children
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_stamp_that_is_not_the_sources_hash_is_refused_with_a_remedy():
@@ -62,6 +66,26 @@ def test_an_engine_that_was_not_built_is_refused_for_that_reason_whatever_is_in_
     monkeypatch.setattr(engine, "install", lambda: finder)
     with pytest.raises(engine.EngineError, match=r"no compiled module for miro_exact\.rng; reinstall with"):
         engine.select("compiled")
+
+
+def test_a_checkout_that_lies_before_the_installed_package_does_not_change_the_engine(tmp_path):
+    """`pip install .`, then a script in the checkout: `mirotwin` is the source, all else is compiled."""
+    if engine.active() != "compiled":
+        pytest.skip("nothing is compiled")
+    shutil.copytree(
+        ROOT / "mirotwin", tmp_path / "mirotwin", ignore=shutil.ignore_patterns("*.so", "__pycache__")
+    )
+    script = (
+        "from mirotwin.recording import rows\n"
+        "from miro_exact import engine, rng\n"
+        "engine.select('compiled')\n"
+        "print(engine.active(), rows.__file__, rng.__file__)\n"
+    )
+    command = [sys.executable, "-c", script]
+    done = children.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    active, source, compiled = done.stdout.split()
+    assert (active, source) == ("compiled", str(tmp_path / "mirotwin" / "recording" / "rows.py"))
+    assert not compiled.endswith(".py")
 
 
 def test_arithmetic_that_rounds_twice_is_refused_in_one_line(monkeypatch):
