@@ -58,21 +58,8 @@ class Camera:
         *("field_sets", "side", "black", "robots", "team_paint", "identity_paint", "x", "y", "cos", "sin"),
         *("spread_um", "drift_um", "near", "near_count", "span_first", "span_end", "seers", "seer_count"),
         *("first", "samples", "cornered", "top_x", "top_y", "low_u", "high_u", "low_v", "high_v"),
-        *(
-            "corner_u",
-            "corner_v",
-            "more_um",
-            "around_um",
-            "middle_u",
-            "middle_v",
-            "fall_u",
-            "fall_v",
-            "sure",
-            "sampled",
-            "u",
-            "v",
-        ),
-        *("seen", "height_um"),
+        *("corner_u", "corner_v", "more_um", "around_um", "middle_u", "middle_v", "fall_u", "fall_v"),
+        *("sure", "sampled", "u", "v", "seen", "height_um"),
     )
 
     def __init__(

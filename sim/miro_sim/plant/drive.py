@@ -113,7 +113,7 @@ class Winding:
         return self._pass(ticks, emf_v)
 
     def _pass(self, ticks: int, emf_v: float) -> float:
-        """The same unchecked; numbers with which nothing can be computed come to NaN."""
+        """The same unchecked; NaN where a result is not finite: the body's next angle raises DomainError."""
         wait = self.wait_ticks
         if wait == 0:
             return self._flow(ticks, emf_v)
