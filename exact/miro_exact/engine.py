@@ -97,7 +97,7 @@ class EngineFinder:
         return {SHARED: installed_dirs()[package] / name, **_installed_sources()}
 
     def missing(self) -> list[str]:
-        """Hot modules that have no compiled twin, but should have."""
+        """Hot modules without a compiled twin, other than those of `MAY_BE_SOURCE`."""
         from miro_exact.hot_modules import compiled_file
 
         needed = [name for name in self.sources if name.partition(".")[0] != MAY_BE_SOURCE]

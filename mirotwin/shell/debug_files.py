@@ -49,7 +49,7 @@ def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
 
 
 def sources_of(image: Image, given: Sequence[str]) -> Sources:
-    """The folders to look in: those given, the image's own, and the robot's firmware's."""
+    """`source_folders` of the folders of --sources. Raises BadInput for one that is not there."""
     return source_folders(image, checked_sources(given))
 
 

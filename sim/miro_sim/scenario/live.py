@@ -1,4 +1,4 @@
-"""A scenario as a live session runs it: somebody else is the host, for as long as a day."""
+"""A scenario for a live session: its hosts send nothing, because a program at a port does; it lasts a day at most."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def live_scenario(source: str, settings: Sequence[str] = (), also: Also = nothin
 
 
 def live_settings(scenario: Scenario) -> list[str]:
-    """What makes a scenario one whose hosts are silent for a day."""
+    """The settings that make a scenario last a day, with hosts that send nothing."""
     found = [f"duration_s={LONGEST_S!r}"]
     for index, network in enumerate(scenario.networks):
         found.append(f'network.{index}.host="silent"')

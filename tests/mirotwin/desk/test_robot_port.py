@@ -225,7 +225,7 @@ def answer_ahead(data, steps):
         (lambda data: encode(TelemetryFrame(40, 1), 3), "but others answer; is it a network of another"),
         (lambda data: answer_ahead(data, 3), "but others answer; is it a network of another"),
     ],
-    ids=["echo", "garbage", "silence", "answers to what nobody asked", "answers to what is asked later"],
+    ids=["echo", "garbage", "silence", "answers without a question", "answers to later questions"],
 )
 def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     answering(pty, answer)
