@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from miro_exact.state import snapshot
 from miro_host.station import Station
 from miro_protocol.decoder import Decoder, Received
-from miro_protocol.frames import ServiceFrame, TeamFrame
+from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.table import FrameType, Opcode
 
 SIZES = st.sampled_from([3, 5])
@@ -28,12 +28,14 @@ def decoded(station, frames):
 
 
 @given(SIZES, st.booleans(), st.data())
-def test_every_frame_decodes_to_what_was_commanded(n, telemetry, data):
+def test_every_frame_is_as_encode_makes_it_and_decodes_to_what_was_commanded(n, telemetry, data):
     station = Station(n, telemetry)
     teams = data.draw(st.lists(st.lists(st.tuples(VALUES, VALUES), min_size=n, max_size=n), max_size=5))
     kind = FrameType.TEAM_ASK if telemetry else FrameType.TEAM
     expected = [TeamFrame(kind, seq, tuple(team)) for seq, team in enumerate(teams)]
-    assert decoded(station, [station.frame(team) for team in teams]) == expected
+    frames = [station.frame(team) for team in teams]
+    assert frames == [encode(message, n) for message in expected]
+    assert decoded(station, frames) == expected
 
 
 @pytest.mark.parametrize("n", [3, 5])
