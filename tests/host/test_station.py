@@ -28,7 +28,7 @@ def decoded(station, frames):
 
 
 @given(SIZES, st.booleans(), st.data())
-def test_every_frame_is_as_encode_makes_it_and_decodes_to_what_was_commanded(n, telemetry, data):
+def test_every_frame_decodes_to_what_was_commanded(n, telemetry, data):
     station = Station(n, telemetry)
     teams = data.draw(st.lists(st.lists(st.tuples(VALUES, VALUES), min_size=n, max_size=n), max_size=5))
     kind = FrameType.TEAM_ASK if telemetry else FrameType.TEAM
