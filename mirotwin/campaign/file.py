@@ -28,7 +28,6 @@ network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path, PurePath
@@ -40,7 +39,7 @@ from msgspec import Meta
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
-from miro_protocol.toml_text import TEXT_KIB, long_key_line, not_finite
+from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign import builtin
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
@@ -126,9 +125,12 @@ class _File:
         raise BadInput(self.path, place, what, remedy)
 
     def campaign(self, text: str) -> CampaignFile:
-        raw = self._tables(text)
         try:
+            raw = tables(text)
+            check_numbers(raw)
             found = msgspec.convert(raw, Document)
+        except TomlError as error:
+            self.refuse(f"{error.place}", error.what, error.remedy)
         except msgspec.ValidationError as error:
             self._refuse_value(str(error))
         settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
@@ -143,23 +145,6 @@ class _File:
             allowed_failed_share=found.allowed_failed_share,
             design=self._design(found),
         )
-
-    def _tables(self, text: str) -> dict[str, Any]:
-        line = long_key_line(text)
-        if line is not None:
-            raise BadInput(
-                self.path, line, "a key with too many parts", "no key of a scenario has more than 6"
-            )
-        try:
-            raw = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            self.refuse("", f"not TOML: {error}")
-        except (ValueError, RecursionError):
-            self.refuse("", "not TOML: a number too long, or tables too deep")
-        found = not_finite(raw)
-        if found is not None:
-            self.refuse(found[0], f"{found[1]} is not a number that can be used", "give a finite number")
-        return raw
 
     def _refuse_value(self, message: str) -> NoReturn:
         """What msgspec found, in the words of the file."""

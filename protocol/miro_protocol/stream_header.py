@@ -9,7 +9,6 @@ One blank after `#:` is not part of the document.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Sequence
 from typing import Annotated, Any, NoReturn
 
@@ -19,10 +18,9 @@ from msgspec import Meta
 from miro_exact.bad_input import did_you_mean
 from miro_exact.domain import MAX_SEED
 from miro_protocol.stream_line import StreamError
-from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
+from miro_protocol.toml_text import TomlError, tables
 
 PREFIX = "#:"
-_PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
 
 
 class Header(msgspec.Struct, frozen=True, kw_only=True):
@@ -80,37 +78,17 @@ class _Document:
 
     def header(self) -> Header:
         text = "\n".join(self.lines)
-        raw = self._loads(text)
+        try:
+            raw = tables(text)
+        except TomlError as error:
+            remedy = error.remedy or "the lines that begin with #: are one TOML document"
+            self._fail(max(error.line - 1, 0), max(error.column - 1, 0), f"the header: {error.what}", remedy)
         for key in raw:
             if key not in KEYS:
                 remedy = did_you_mean(key, KEYS, f"a header has {', '.join(KEYS)}")
                 self._fail(*self._place(key), f"unknown key {key[:40]!r}", remedy)
         found = {key: self._value(key, value) for key, value in raw.items()}
         return Header(text=text, **found)
-
-    def _loads(self, text: str) -> dict[str, Any]:
-        if too_long(text):
-            self._fail(0, 0, f"a header of more than {TEXT_KIB} KiB", "is this a stream file?")
-        long_line = long_key_line(text)
-        if long_line is not None:
-            self._fail(long_line - 1, 0, f"a key of more than {KEY_PARTS} parts", "no key has more than 6")
-        try:
-            return tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            self._not_toml(str(error))
-        except RecursionError:
-            self._fail(0, 0, "the header is nested too deeply", "a scenario has tables in at most 5 levels")
-        except ValueError:  # an integer with more digits than Python converts
-            self._fail(0, 0, "the header holds an integer of thousands of digits", "write a smaller one")
-
-    def _not_toml(self, message: str) -> NoReturn:
-        found = _PLACE.match(message)
-        line, column = len(self.lines) - 1, 0
-        if found is not None:
-            message = found[1]
-            if found[2] is not None:
-                line, column = int(found[2]) - 1, int(found[3]) - 1
-        self._fail(line, column, f"not TOML: {message}", "the lines that begin with #: are one TOML document")
 
     def _value(self, key: str, value: Any) -> Any:
         try:

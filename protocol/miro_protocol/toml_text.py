@@ -1,8 +1,11 @@
-"""TOML where it and our structs part: text that takes `tomllib` minutes, numbers no key takes, keys that are None."""
+"""Reading TOML: a document that cannot be used is one error, whatever `tomllib` makes of it."""
 
 import math
 import re
+import tomllib
 from typing import Any
+
+from miro_exact.bad_input import BadInput
 
 TEXT_KIB = 512
 """Most KiB of a document: a built-in scenario has 4."""
@@ -10,33 +13,63 @@ KEY_PARTS = 16
 """Most parts of a dotted key: the deepest key of a scenario has 6. The time of `tomllib` grows with their square; a
 whole file of such keys takes it 2.5 s.
 """
+LONGEST_BITS = 1024
+"""Beyond it an integer is beyond every float, too. `tomllib` reads longer ones in hex, which Python does not show."""
 
 _KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
+_PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
 
 
-def too_long(text: str) -> bool:
-    """Whether `text` holds more than `TEXT_KIB`."""
-    return len(text) > TEXT_KIB << 10
+class TomlError(BadInput):
+    """A document, which its reader names, that cannot be used. `line`, `column`: where, from 1; 0: not known."""
+
+    def __init__(self, what: str, remedy: str = "", place: str = "", line: int = 0, column: int = 0) -> None:
+        self.line = line
+        self.column = column
+        at = [f"line {line}"] * bool(line) + [f"column {column}"] * bool(column)
+        super().__init__("", place or ", ".join(at), what, remedy)
 
 
-def long_key_line(text: str) -> int | None:
-    """The line, from 1, of the first key with more than `KEY_PARTS` parts; None if there is none."""
+def tables(text: str) -> dict[str, Any]:
+    """The tables of a document. Raises TomlError."""
+    check_size(text)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = _PLACE.match(f"{error}")
+        what, line, column = found.groups() if found else (f"{error}", None, None)
+        end = text.count("\n") + 1
+        raise TomlError(f"not TOML: {what}", line=int(line or end), column=int(column or 0)) from None
+    except RecursionError:
+        raise TomlError("nested too deeply", "a scenario has tables in at most 5 levels") from None
+    except ValueError:  # more digits than Python converts
+        raise TomlError("an integer of thousands of digits", "give a smaller one") from None
+
+
+def check_size(text: str) -> None:
+    """Refuses what would take `tomllib` minutes. Raises TomlError."""
+    if len(text) > TEXT_KIB << 10:
+        raise TomlError(f"holds more than {TEXT_KIB} KiB", "is this the right file?")
     found = _LONG_KEY.search(text)
-    return None if found is None else text.count("\n", 0, found.start()) + 1
+    if found is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        what, remedy = f"a key of more than {KEY_PARTS} parts", "remove it; no key has more than 6"
+        raise TomlError(what, remedy, line=line)
 
 
-def not_finite(value: Any, path: str = "") -> tuple[str, float] | None:
-    """Key path and value of the first NaN or infinity in tables that were read; None if there is none."""
-    if isinstance(value, float):
-        return None if math.isfinite(value) else (path, value)
+def check_numbers(value: Any, path: str = "") -> None:
+    """Refuses NaN, infinities and integers that no key takes. Raises TomlError with the path of the key."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise TomlError(f"{value} is not a number that can be used", "give a finite number", path)
+    if isinstance(value, int) and value.bit_length() > LONGEST_BITS:
+        raise TomlError(f"an integer of {value.bit_length()} bits", "give a smaller one", path)
     if isinstance(value, dict):
-        inner = [(f"{path}.{key}" if path else key, item) for key, item in value.items()]
+        for key, inner in value.items():
+            check_numbers(inner, f"{path}.{key}" if path else key)
     elif isinstance(value, list):
-        inner = [(f"{path}[{index}]", item) for index, item in enumerate(value)]
-    else:
-        return None
-    return next((found for place, item in inner if (found := not_finite(item, place))), None)
+        for index, inner in enumerate(value):
+            check_numbers(inner, f"{path}[{index}]")
 
 
 def without_none(value: Any) -> Any:

@@ -9,7 +9,6 @@ pulled-up bus whose drivers can only pull low.
 from __future__ import annotations
 
 import re
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +18,7 @@ from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import BOARD_BYTES, InputError, read_input
-from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
+from miro_protocol.toml_text import TomlError, tables
 
 SIDES = ("left", "right")
 CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
@@ -139,13 +138,11 @@ def _miro() -> Wiring:
 
 
 def _wiring(text: str, origin: str) -> Wiring:
-    if too_long(text):
-        raise WiringError(origin, "", f"holds more than {TEXT_KIB} KiB", "is this a board file?")
-    if (line := long_key_line(text)) is not None:
-        raise WiringError(origin, line, f"a key of more than {KEY_PARTS} parts", "no key has more than 2")
     try:
-        wiring = msgspec.convert(tomllib.loads(text), Wiring)
-    except (ValueError, RecursionError) as error:
+        wiring = msgspec.convert(tables(text), Wiring)
+    except TomlError as error:
+        raise WiringError(origin, error.place, error.what, error.remedy) from None
+    except msgspec.ValidationError as error:
         raise WiringError(origin, "", f"{error}") from error
     if len(wiring.latch) > MAX_LATCHES:
         raise WiringError(origin, "latch", f"{len(wiring.latch)} latches, at most {MAX_LATCHES} fit")

@@ -153,7 +153,7 @@ REFUSED = [
     (V2 + "#: a" + ".a" * 20 + " = 1", 2, 4, "a key of more than 16 parts", ""),
     (V2 + "#: a = " + "[" * 5000, 2, 4, "nested too deeply", ""),
     (V2 + "#: seed = " + "9" * 5000, 2, 4, "an integer of thousands of digits", ""),
-    (V2 + "#: # " + "x" * (513 << 10), 2, 4, "a header of more than 512 KiB", ""),
+    (V2 + "#: # " + "x" * (513 << 10), 2, 4, "the header: holds more than 512 KiB", "right file?"),
 ]
 
 

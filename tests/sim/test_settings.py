@@ -11,8 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from miro_host.laws.registry import LAWS
-from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse
-from miro_sim.scenario.text import written
+from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse, written
 from tests.naive.tables import scalar_places
 
 TWO_TEAMS = Path(__file__).parents[2] / "examples" / "two_teams.toml"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +10,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import EYE_BYTES, InputError, read_input
-from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, not_finite, too_long, without_none
+from miro_protocol.toml_text import TomlError, check_numbers, tables, without_none
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -39,22 +38,20 @@ def text_of(path: str | Path) -> str:
 
 def parse(text: str, kind: type[T], origin: str) -> T:
     """The struct in TOML text. Raises EyeError with the key for unknown keys, wrong types and values out of range."""
-    _check_size(text, origin)
     try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise EyeError(origin, "", f"not TOML: {error}", "mend the text") from None
+        table = tables(text)
+    except TomlError as error:
+        raise EyeError(origin, error.place, error.what, error.remedy or "mend the text") from None
     return of_table(table, kind, origin)
 
 
 def of_table(table: dict[str, Any], kind: type[T], origin: str) -> T:
     """The struct in a table that TOML text gave. Raises EyeError as `parse` does."""
-    found = not_finite(table)
-    if found is not None:
-        what = f"{found[1]} is not a number that can be used"
-        raise EyeError(origin, found[0], what, "give a finite number")
     try:
+        check_numbers(table)
         return msgspec.convert(table, kind)
+    except TomlError as error:
+        raise EyeError(origin, error.place, error.what, error.remedy) from None
     except msgspec.ValidationError as error:
         raise _explained(f"{error}", kind, origin) from None
 
@@ -64,15 +61,6 @@ def text(struct: msgspec.Struct) -> str:
     import tomli_w  # only who writes a file needs it
 
     return tomli_w.dumps(without_none(msgspec.to_builtins(struct)))
-
-
-def _check_size(text: str, origin: str) -> None:
-    """Refuses what would take `tomllib` minutes."""
-    if too_long(text):
-        raise EyeError(origin, "", f"holds more than {TEXT_KIB} KiB", "is this the right file?")
-    line = long_key_line(text)
-    if line is not None:
-        raise EyeError(origin, f"line {line}", f"a key of more than {KEY_PARTS} parts", "remove it")
 
 
 def _explained(message: str, kind: type[msgspec.Struct], origin: str) -> EyeError:

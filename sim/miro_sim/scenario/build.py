@@ -41,14 +41,14 @@ def dead_s(scenario: sc.Scenario, network: sc.NetworkSpec) -> float:
     return scenario.host.compute_s + keyup_s + radio.latency_s + seconds(DOWNLINK[network.robots].air_ticks)
 
 
-def pilot_for(robot: sc.RobotSpec, reference: Trajectory, host: sc.HostSpec, dead_s: float) -> Pilot:
+def pilot_for(robot: sc.RobotSpec, reference: Trajectory, scenario: sc.Scenario, network: int) -> Pilot:
     """Estimator and law, integrator and wheel split. Raises PluginError when one of the first two cannot be made."""
     chosen, controller = robot.estimator, robot.controller
     assert isinstance(chosen, EstimatorParameters)
     assert isinstance(controller, LawParameters)
     estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator(), chosen.estimator))
     law = _made("law", controller.name(), lambda: _remembering(controller.law(), controller.law))
-    period_s = seconds(CONTROL_PERIOD_TICKS)
+    host, period_s = scenario.host, seconds(CONTROL_PERIOD_TICKS)
     return Pilot(
         reference,
         law,
@@ -56,7 +56,7 @@ def pilot_for(robot: sc.RobotSpec, reference: Trajectory, host: sc.HostSpec, dea
         estimator=estimator,
         period_s=period_s,
         integrator=integrator_of(host.integration, controller, period_s),
-        dead_s=dead_s,
+        dead_s=dead_s(scenario, scenario.networks[network]),
     )
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import did_you_mean
+from miro_exact.bad_input import did_you_mean, one_line
 from miro_exact.inputs import InputError, read_input
-from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
+from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables, without_none
 from miro_sim.scenario.base import with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
@@ -20,7 +20,6 @@ from miro_sim.scenario.places import check_places
 from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
-from miro_sim.scenario.text import check_integers, tables, written
 from miro_sim.scenario.variants import VariantError, with_variant
 
 _BUILTIN = Path(__file__).parent / "builtin"
@@ -132,7 +131,7 @@ def _parsed(
 ) -> tuple[dict[str, Any], Scenario, bool]:
     """The tables with the settings made, the scenario, and whether the text alone says all of it."""
     try:
-        raw = tables(text, origin)
+        raw = _tables(text, origin)
         whole, own = with_base(raw, origin, _base_tables)
         return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
     except RecursionError:
@@ -140,7 +139,16 @@ def _parsed(
 
 
 def _base_tables(source: str) -> dict[str, Any]:
-    return tables(source_text(source), source)
+    return _tables(source_text(source), source)
+
+
+def _tables(text: str, origin: str) -> dict[str, Any]:
+    try:
+        raw = tables(text)
+        check_numbers(raw)
+        return raw
+    except TomlError as error:
+        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
 
 
 def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
@@ -184,11 +192,12 @@ def _checked(
 
 def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
-    _check_finite(raw, origin)
-    check_integers(raw, origin)
     complete = _with_profiles(_with_variant(raw, origin), origin)
     try:
+        check_numbers(raw)
         scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
+    except TomlError as error:
+        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
     except msgspec.ValidationError as error:
         raise value_error(origin, complete, full_message(error)) from cause_of(error)
     check_places(scenario, origin)
@@ -221,9 +230,11 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
     return {**raw, "network": complete}
 
 
-def _check_finite(raw: dict[str, Any], origin: str) -> None:
-    """Refuses NaN and infinities, which TOML has and no key takes."""
-    found = not_finite(raw)
-    if found is not None:
-        what = f"{found[1]} is not a number that can be used"
-        raise ScenarioError(origin, found[0], what, "give a finite number")
+def written(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> str:
+    """A scenario file of these tables; its head says what it was made of."""
+    import tomli_w  # only scenarios with settings need it
+
+    head = [f"# {origin} with these keys set:", *(f"#   {setting}" for setting in settings)]
+    if not settings:
+        head = [f"# {origin} with what the scenario says that it names"]
+    return "\n".join([*map(one_line, head), "", tomli_w.dumps(raw)])

@@ -13,11 +13,11 @@ from typing import Any
 import msgspec
 
 from miro_host.laws.registry import LAWS
+from miro_protocol.toml_text import TomlError, check_size
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec
 from miro_sim.scenario.plugins import REGISTRIES
 from miro_sim.scenario.profiles import ERROR_KEYS
-from miro_sim.scenario.text import check_size
 from miro_sim.scenario.variants import VariantError, impose
 
 Table = dict[str, Any]
@@ -101,7 +101,7 @@ def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION)
 
 def _make(raw: Table, text: str, origin: str, option: str) -> Setting:
     try:
-        keys, value = _read(text, origin)
+        keys, value = _read(text)
         if keys == ["variant"]:
             impose(raw, value)
             return Setting(text, "variant", option=option)
@@ -115,7 +115,7 @@ def _make(raw: Table, text: str, origin: str, option: str) -> Setting:
         raise ScenarioError(origin, _option(text, option), "nested too deeply") from None
 
 
-def _read(text: str, origin: str) -> tuple[list[str], Any]:
+def _read(text: str) -> tuple[list[str], Any]:
     key, equals, value = text.partition("=")
     keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not equals or not all(keys):
@@ -123,8 +123,8 @@ def _read(text: str, origin: str) -> tuple[list[str], Any]:
     if not _is_utf8(text):
         raise _Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
     try:
-        check_size(text, origin)
-    except ScenarioError as error:
+        check_size(text)
+    except TomlError as error:
         raise _Refused(error.what, error.remedy) from None
     try:
         read = tomllib.loads(f"value = {value}")

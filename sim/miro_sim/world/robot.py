@@ -24,7 +24,7 @@ from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import dead_s, drive_for, pilot_for, reference_for
+from miro_sim.scenario.build import drive_for, pilot_for, reference_for
 from miro_sim.world.events import RobotLog
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
@@ -57,8 +57,7 @@ class Robot:
         try:
             self.reference = reference_for(spec, scenario.duration_s)
             start = self.reference.at(0.0).posture
-            delay_s = dead_s(scenario, scenario.networks[network])
-            self.pilot: Pilot = pilot_for(spec, self.reference, scenario.host, delay_s)
+            self.pilot: Pilot = pilot_for(spec, self.reference, scenario, network)
         except PluginError as error:
             raise self._named(error, 0) from error
         wheels = Stream(seed, f"{name}/wheels")

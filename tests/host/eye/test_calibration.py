@@ -146,7 +146,7 @@ def test_a_calibration_reads_back_as_it_was(made, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("x = ", "c.toml: not TOML: "),
+        ("x = ", "c.toml: line 1: not TOML: "),
         ("version = 1", "c.toml: camera: this key is missing; add it"),
         (
             "zoom = 2\n[camera]",

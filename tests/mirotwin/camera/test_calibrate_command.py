@@ -168,7 +168,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
         (("--points", "absent.csv"), "absent.csv: cannot be read: No such file or directory"),
         (("--points", "."), ".: is a folder"),
         (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),
-        (("--points", "p.csv", "--initial", "p.csv"), "p.csv: not TOML: "),
+        (("--points", "p.csv", "--initial", "p.csv"), "p.csv: line 1, column 5: not TOML: "),
         (("--points", "out.toml"), "out.toml: is the input itself; choose another file with --out"),
         (("--scenario", "fig5"), "fig5: no such scenario"),
         (

@@ -200,7 +200,7 @@ def same_colour(text):
     [
         (same_colour, ": colours.violet: cannot be told from magenta: hues too near for the noise"),
         (lambda text: text.replace("magenta", "pink"), ": colours.pink: unknown colour; use yellow, blue,"),
-        (lambda text: text.replace("magenta", "orange", 1), ": not TOML: "),
+        (lambda text: text.replace("magenta", "orange", 1), ": line 46, column 16: not TOML: "),
         (
             lambda text: "[colours.yellow]\ny = 200\ncb = 32\ncr = 147\n",
             ": colours.magenta: no class of this",

@@ -96,7 +96,7 @@ def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
             "random",
         ),
         (("[grid]", "[random]\ncount = 2\n[random.range]\nhost.compute_s = {from = 1}\n[grid]"), "random"),
-        (("[grid]", "[grid"), "not TOML"),
+        (("[grid]", "[grid"), "line 6, column 6: not TOML"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(here, change, place):
