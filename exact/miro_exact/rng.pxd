@@ -16,12 +16,18 @@ cdef class Stream:
     cdef readonly object seed
     cdef readonly str name
     cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
+    cdef long long group
+    cdef unsigned int draws[16]
 
     cdef void load(self, u64_t block) noexcept
-    @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, at='long long', lane='long long', b='long long', _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
+    @cython.locals(four='unsigned int[16]', at='long long', lane=int)
     cdef void blocks(self, u64_t first, int count, unsigned int *words) noexcept
+    @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, lane=int, _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
+    cdef void _four_blocks(self, u64_t first, unsigned int *four) noexcept
+    cdef inline u64_t _draw(self, long long index) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1
+    cpdef u64_t next_below(self, long long index, long long end, u64_t threshold) except? 1
     cpdef u64_t u64(self, long long index) except? 1
     cdef u64_t pair(self, u64_t kind, long long index) except? 1
     @cython.locals(word=u64_t, part=int)

@@ -57,7 +57,21 @@ class Stream:
     Raises ValueError for a seed outside 0 .. 2^63 - 1 and for an index outside its range.
     """
 
-    NOT_STATE = ("block", "k0", "k1", "name", "name0", "name1", "seed", "w0", "w1", "w2", "w3")
+    NOT_STATE = (
+        "block",
+        "draws",
+        "group",
+        "k0",
+        "k1",
+        "name",
+        "name0",
+        "name1",
+        "seed",
+        "w0",
+        "w1",
+        "w2",
+        "w3",
+    )
 
     def __init__(self, seed: int, name: str) -> None:
         if not 0 <= seed <= MAX_SEED:
@@ -71,6 +85,8 @@ class Stream:
         self.name1 = int.from_bytes(tag[4:8], "little")
         self.block = _NO_BLOCK
         self.w0 = self.w1 = self.w2 = self.w3 = 0
+        self.group = -1  # number of the 16 draws of `u32` that are in `draws`
+        self.draws = [0] * 16
 
     def __repr__(self) -> str:
         return f"Stream({self.seed}, {self.name!r})"
@@ -87,46 +103,66 @@ class Stream:
         """Writes up to 112 blocks of kind 0 into `words`, from block number `first` on.
 
         Their first words stand from 0 on, their second words from 112 on, and so on. Four blocks at a time are worked
-        out, as `philox4x32` does, in vectors: up to three more than `count` are written.
+        out: up to three more than `count` are written.
+        """
+        four = [0] * 16
+        for at in range(0, count, 4):
+            self._four_blocks(first + at, four)
+            for lane in range(4):
+                words[at + lane] = four[lane]
+                words[at + lane + 112] = four[lane + 4]
+                words[at + lane + 224] = four[lane + 8]
+                words[at + lane + 336] = four[lane + 12]
+
+    def _four_blocks(self, first: int, four: list[int]) -> None:
+        """Four blocks of kind 0 from block number `first` on, as `philox4x32` gives them, in vectors.
+
+        Their first words stand from 0 on, their second words from 4 on, and so on.
         """
         m0, m1, mask = 0xD2511F53, 0xCD9E8D57, 0xFFFFFFFF  # in locals, compilers know that these are 32 bits
-        for at in range(0, count, 4):
+        for lane in range(4):
+            four[lane] = (first + lane) & mask
+            four[lane + 4] = (first + lane) >> 32
+            four[lane + 8] = self.name0
+            four[lane + 12] = self.name1
+        k0, k1 = self.k0, self.k1
+        for _ in range(10):
             for lane in range(4):
-                b = at + lane
-                words[b] = (first + b) & mask
-                words[b + 112] = (first + b) >> 32
-                words[b + 224] = self.name0
-                words[b + 336] = self.name1
-            k0, k1 = self.k0, self.k1
-            for _ in range(10):
-                for lane in range(4):
-                    b = at + lane
-                    p0 = m0 * words[b]
-                    p1 = m1 * words[b + 224]
-                    words[b] = (p1 >> 32) ^ words[b + 112] ^ k0
-                    words[b + 112] = p1 & mask
-                    words[b + 224] = (p0 >> 32) ^ words[b + 336] ^ k1
-                    words[b + 336] = p0 & mask
-                k0 = (k0 + _W0) & mask
-                k1 = (k1 + _W1) & mask
+                p0 = m0 * four[lane]
+                p1 = m1 * four[lane + 8]
+                four[lane] = (p1 >> 32) ^ four[lane + 4] ^ k0
+                four[lane + 4] = p1 & mask
+                four[lane + 8] = (p0 >> 32) ^ four[lane + 12] ^ k1
+                four[lane + 12] = p0 & mask
+            k0 = (k0 + _W0) & mask
+            k1 = (k1 + _W1) & mask
 
     def u32(self, index: int) -> int:
         """32 random bits."""
         if index < 0 or index >= _INDICES:
             raise ValueError(f"{self!r}: index {index} is outside 0 .. 2^56 - 1")
-        self.load(index >> 2)
-        part = index & 3
-        if part == 0:
-            return self.w0
-        if part == 1:
-            return self.w1
-        if part == 2:
-            return self.w2
-        return self.w3
+        return self._draw(index)
+
+    def _draw(self, index: int) -> int:
+        """`u32`; the sixteen draws that are worked out at once stay there as a cache."""
+        if index >> 4 != self.group:
+            self.group = index >> 4
+            self._four_blocks(self.group << 2, self.draws)
+        return self.draws[(index & 3) << 2 | (index >> 2) & 3]
 
     def below(self, index: int, threshold: int) -> bool:
         """True with probability threshold / 2^32 (threshold 0 .. 2^32); the draw is `u32(index)`."""
         return self.u32(index) < threshold
+
+    def next_below(self, index: int, end: int, threshold: int) -> int:
+        """The first index from `index` on, and before `end`, at which `below` is true; `end` if there is none."""
+        if index < 0 or end > _INDICES:
+            raise ValueError(f"{self!r}: indices {index} .. {end} are outside 0 .. 2^56 - 1")
+        if threshold == 0:
+            return end
+        while index < end and self._draw(index) >= threshold:
+            index += 1
+        return index
 
     def u64(self, index: int) -> int:
         """64 random bits."""

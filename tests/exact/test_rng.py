@@ -97,6 +97,19 @@ def test_below_is_never_true_at_threshold_0_and_always_at_2_to_the_32():
     assert all(stream.below(i, 2**32) for i in range(1000))
 
 
+@given(seeds, st.integers(0, 2**56 - 100), st.integers(0, 99), st.sampled_from((0, 2**28, 2**32)))
+def test_the_next_index_below_a_threshold_is_the_first_that_is(plain, seed, first, count, threshold):
+    hits = [i for i in range(first, first + count) if naive.u32(seed, "errors", i) < threshold]
+    for stream in (Stream(seed, "errors"), plain.Stream(seed, "errors")):
+        assert stream.next_below(first, first + count, threshold) == min(hits, default=first + count)
+
+
+@pytest.mark.parametrize(("first", "end"), [(-1, 5), (0, 2**56 + 1)])
+def test_the_next_index_below_a_threshold_is_looked_for_in_the_range_of_indices(first, end):
+    with pytest.raises(ValueError, match="outside"):
+        Stream(0, "x").next_below(first, end, 1)
+
+
 def test_below_hits_as_often_as_its_threshold_says():
     stream = Stream(12, "rate")
     hits = sum(stream.below(i, 2**32 // 100) for i in range(100_000))

@@ -17,8 +17,10 @@ cdef class Line:
     cdef long long _cursor
     cdef long long _heard
 
+    cpdef int append(self, long long tick, int level) except -1
+    @cython.final
     @cython.locals(last='long long')
-    cpdef append(self, long long tick, int level)
+    cdef int _change_last(self, long long tick, int level) except -1
     @cython.final
     cdef int _make_room(self) except -1
     @cython.final
@@ -26,6 +28,7 @@ cdef class Line:
     cdef int _resize(self, long long size) except -1
     cpdef int level_at(self, long long tick) noexcept
     cpdef long long next_edge(self, long long tick) noexcept
+    cpdef long long edge_at(self, long long tick) noexcept
     cpdef void forget(self, long long tick) noexcept
     cpdef void hear(self, long long tick) noexcept
     cpdef long long full_tick(self) noexcept

@@ -63,25 +63,27 @@ class Line:
         No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before
         the last edge.
         """
-        if self._end > self._first:
-            last = self._ticks[(self._end - 1) & self._mask]
-            if tick < last:
-                raise ValueError(f"edge at tick {tick} comes after one at tick {last}")
-            if tick == last and level != self._last_level():
-                self._end -= 1  # edges alternate, so replacing the last one takes it back
-                if self._cursor > self._end:
-                    self._cursor = self._end
-                if self._heard > self._end:
-                    self._heard = self._end
-                return
-        if level == self._last_level():
-            return
-        if self._end - self._first > self._mask:
-            self._make_room()
-        self._ticks[self._end & self._mask] = tick
-        self._end += 1
-        if self._end - self._heard > _WAITING:
-            self.full = not self.unread
+        if self._end > self._first and tick <= self._ticks[(self._end - 1) & self._mask]:
+            self._change_last(tick, level)
+        elif level != self._last_level():
+            if self._end - self._first > self._mask:
+                self._make_room()
+            self._ticks[self._end & self._mask] = tick
+            self._end += 1
+            if self._end - self._heard > _WAITING:
+                self.full = not self.unread
+
+    def _change_last(self, tick: int, level: int) -> None:
+        """The same on the tick of the last edge. Edges alternate, so replacing that one takes it back."""
+        last = self.last_tick()
+        if tick < last:
+            raise ValueError(f"edge at tick {tick} comes after one at tick {last}")
+        if level != self._last_level():
+            self._end -= 1
+            if self._cursor > self._end:
+                self._cursor = self._end
+            if self._heard > self._end:
+                self._heard = self._end
 
     def _make_room(self) -> None:
         """The ring is full: drops the older half if no listener reads the line, else doubles it."""
@@ -113,6 +115,11 @@ class Line:
         if self._cursor == self._end:
             return _NEVER
         return self._ticks[self._cursor & self._mask]
+
+    def edge_at(self, tick: int) -> int:
+        """Tick of the last edge kept up to `tick`, -1 without one."""
+        self._seek(tick)
+        return self._ticks[(self._cursor - 1) & self._mask] if self._cursor > self._first else -1
 
     def forget(self, tick: int) -> None:
         """Drops the edges that no query at `tick` or later needs."""

@@ -5,9 +5,10 @@ from miro_sim.radio.chain cimport Chain
 from miro_exact.rng cimport Stream
 
 cdef long long _NEVER, _BIT, _HOLD
-cdef int _DOWN, _NOISE
+cdef int _UP, _DOWN, _NOISE
 
 
+@cython.final
 cdef class Transmitter:
     cdef readonly Line line
     cdef Chain bursts, dropouts
@@ -21,19 +22,24 @@ cdef class Band:
     cdef public int link_state
     cdef long long latency
     cdef unsigned long long threshold, burst_threshold
-    cdef bint slotted
+    cdef bint chained
+    cdef Transmitter alone
+    cdef int known
+    cdef long long change
     cdef readonly list transmitters
 
     cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
+    @cython.locals(sent='long long', alone=Transmitter)
+    cdef int level(self, long long tick) except -1
+    @cython.locals(change='long long')
+    cdef long long next_change(self, long long tick) except? -1
     @cython.locals(
-        transmitter=Transmitter, sent='long long', slot='long long', edge='long long', level=int, carrier=int,
-        threshold='unsigned long long',
+        transmitter=Transmitter, line=Line, slot='long long', level=int, keyed=int, carriers=int, wrong=cython.bint,
+        threshold='unsigned long long', change='long long', own_edge='long long',
     )
-    cpdef int level(self, long long tick) except -1
-    @cython.locals(transmitter=Transmitter, sent='long long', change='long long')
-    cpdef long long next_change(self, long long tick) except? -1
+    cdef int _look(self, long long sent) except -1
     @cython.locals(transmitter=Transmitter)
     cpdef hear(self, long long tick)
     @cython.locals(transmitter=Transmitter, tick='long long')

@@ -24,7 +24,7 @@ from miro_sim.radio.params import DOWN, NOISE, UP, Radio
 _NEVER = NEVER_TICK
 _BIT = 2500
 _HOLD = 50_000
-_DOWN, _NOISE = DOWN, NOISE
+_UP, _DOWN, _NOISE = UP, DOWN, NOISE
 assert (HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_BIT, _HOLD)
 
 
@@ -49,14 +49,17 @@ class Band:
 
     STATE = {"link_state": ("i", 0, NOISE), "transmitters": [Transmitter]}
     NOT_STATE = (
+        "alone",
         "burst_threshold",
+        "chained",
+        "change",
         "errors",
+        "known",
         "latency",
         "name",
         "noise",
         "params",
         "seed",
-        "slotted",
         "threshold",
     )
 
@@ -70,9 +73,11 @@ class Band:
         self.latency = params.latency_ticks
         self.threshold = params.error_threshold
         self.burst_threshold = params.burst_threshold
-        chains = (params.bursts, params.dropouts)
-        self.slotted = self.threshold > 0 or any(chain is not None for chain in chains)
+        self.chained = params.bursts is not None or params.dropouts is not None
         self.transmitters: list[Transmitter] = []
+        self.alone: Transmitter | None = None  # on the air with nothing that disturbs it, up to `change`
+        self.known = 1  # the level else
+        self.change = -_NEVER
 
     def add(self, robot: int, line: Line) -> None:
         line.unread = False
@@ -88,52 +93,69 @@ class Band:
     def level(self, tick: int) -> int:
         """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error."""
         sent = tick - self.latency
+        if sent >= self.change:
+            self._look(sent)
+        alone = self.alone
+        if alone is None:
+            return self.known
+        alone.last_edge = max(alone.last_edge, alone.line.edge_at(sent))
+        return alone.line.level_at(sent)
+
+    def next_change(self, tick: int) -> int:
+        """The first tick after `tick`, where the level was just asked for, at which it may be another."""
+        change = self.change
+        if self.alone is not None:
+            change = min(change, self.alone.line.next_edge(tick - self.latency))
+        return change + self.latency
+
+    def _look(self, sent: int) -> None:
+        """Finds what the level is from `sent` up to `change`: that of `alone`, or else `known`."""
         slot = sent // _BIT
         level = 1
-        carrier = 0
+        keyed = carriers = 0
         threshold = self.threshold
+        change = own_edge = _NEVER
         for transmitter in self.transmitters:
-            edge = transmitter.line.next_edge(transmitter.last_edge)
-            while edge <= sent:
-                transmitter.last_edge = edge
-                edge = transmitter.line.next_edge(edge)
+            line = transmitter.line
+            transmitter.last_edge = max(transmitter.last_edge, line.edge_at(sent))
             if transmitter.last_edge < 0 or sent >= transmitter.last_edge + _HOLD:
+                change = min(change, line.next_edge(sent))
                 continue
+            keyed += 1
+            change = min(change, transmitter.last_edge + _HOLD)
+            own_edge = min(own_edge, line.next_edge(sent))
             if transmitter.dropouts is not None and transmitter.dropouts.bad(slot):
                 continue
             if transmitter.bursts is not None and transmitter.bursts.bad(slot):
                 threshold = self.burst_threshold
-            carrier = 1
-            level &= transmitter.line.level_at(sent)
+            carriers += 1
+            level &= line.level_at(sent)
+            self.alone = transmitter
+        wrong = carriers > 0 and self.errors.below(slot, threshold)
+        if keyed and (wrong or self.chained):
+            change = min(change, (slot + 1) * _BIT)
+        elif keyed:
+            change = min(change, self.errors.next_below(slot + 1, change // _BIT + 1, threshold) * _BIT)
+        if keyed != 1 or wrong or self.chained or self.link_state != _UP:
+            self.alone = None
+            change = min(change, own_edge)
+        self.known = (level ^ 1) | 2 if wrong else level
         if self.link_state == _NOISE:
-            return self.noise.bit(tick // _BIT)
-        if self.link_state == _DOWN:
-            return 1
-        if carrier and self.errors.below(slot, threshold):
-            return (level ^ 1) | 2
-        return level
-
-    def next_change(self, tick: int) -> int:
-        """The first tick after `tick`, where the level was just asked for, at which it may be another."""
-        sent = tick - self.latency
-        change = _NEVER
-        for transmitter in self.transmitters:
-            change = min(change, transmitter.line.next_edge(sent))
-            if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
-                change = min(change, transmitter.last_edge + _HOLD)
-                if self.slotted:
-                    change = min(change, (sent // _BIT + 1) * _BIT)
-        if self.link_state == _NOISE:
-            change = min(change, (tick // _BIT + 1) * _BIT - self.latency)
-        if change == _NEVER:
-            return _NEVER
-        return change + self.latency
+            slot = (sent + self.latency) // _BIT
+            self.known = self.noise.bit(slot)
+            change = min(change, (slot + 1) * _BIT - self.latency)
+        elif self.link_state == _DOWN:
+            self.known = 1
+        self.change = change
 
     def hear(self, tick: int) -> None:
         """The receiver has come to `tick`: drops edges from the robots' wires that no later query needs.
 
-        A later query is about `last_edge` or later, so the edges behind it and the level between are enough.
+        What the wires do next is not known: the next query looks again.
+
+        A later one is about `last_edge` or later, so the edges behind it and the level between are enough.
         """
+        self.change = -_NEVER
         for transmitter in self.transmitters:
             transmitter.line.forget(transmitter.last_edge)
             transmitter.line.hear(tick)

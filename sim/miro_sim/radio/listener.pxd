@@ -26,9 +26,9 @@ cdef class Listener:
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
-    @cython.locals(slot='long long')
+    @cython.locals(level=int)
     cdef void hear_nothing(self, long long tick, long long until) except *
-    @cython.locals(slot='long long')
+    @cython.locals(slot='long long', level=int, before=int)
     cdef void hear_noise(self, long long tick, long long until) except *
     cdef int silence(self, long long tick, long long slot) except -1
     @cython.locals(slot='long long')
@@ -36,7 +36,8 @@ cdef class Listener:
     @cython.locals(level=int, chance='unsigned long long')
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
     @cython.locals(
-        sender=Sender, first='long long', number='long long', begin='long long', sent=int, level=int, alone=cython.bint
+        sender=Sender, first='long long', begun='long long', number='long long', count='long long', judged='long long', begin='long long',
+        step='long long', place=int, levels=int, level=int, before=int,
     )
     cdef void hear_data(
         self,
@@ -48,10 +49,13 @@ cdef class Listener:
         list senders,
         Py_ssize_t rank,
     ) except *
+    cdef long long next_judged(
+        self, long long first, long long number, long long count, bytes stops, list senders, Py_ssize_t rank
+    ) except *
     cdef void hear_bad_stop(self, long long tick, long long until, long long begin, long long back) except *
     @cython.locals(level=int, chance='unsigned long long')
     cdef int bit(
-        self, long long begin, int sent, long long draw, bint fresh, list senders, Py_ssize_t rank
+        self, long long begin, int sent, long long first, long long number, bint fresh, list senders, Py_ssize_t rank
     ) except -1
     @cython.locals(sender=Sender, index=Py_ssize_t)
     cdef int mixed(self, int level, long long begin, list senders, Py_ssize_t rank) except -1

@@ -122,19 +122,23 @@ class Listener:
 
     def hear_nothing(self, tick: int, until: int) -> None:
         """No carrier from `tick` to `until`."""
-        slot = tick // _BIT
-        while tick < until:
-            self.line.append(tick, self.silence(tick, slot))
-            if self.squelch:
-                break
-            slot += 1
-            tick = slot * _BIT
+        if tick >= until:
+            return
+        level = self.silence(tick, tick // _BIT)
+        if self.squelch:
+            self.line.append(tick, level)
+        else:
+            self.hear_noise(tick, until)
 
     def hear_noise(self, tick: int, until: int) -> None:
-        """Somebody else's noise on the frequency, stronger than any carrier."""
+        """What no carrier drowns, or somebody else's noise on the frequency, stronger than any carrier."""
         slot = tick // _BIT
+        before = -1
         while tick < until:
-            self.line.append(tick, self.noise.bit(slot))
+            level = self.noise.bit(slot)
+            if level != before:
+                self.line.append(tick, level)
+                before = level
             slot += 1
             tick = slot * _BIT
 
@@ -187,23 +191,40 @@ class Listener:
     ) -> None:
         """Part of a transmission whose first start bit arrives at `start`."""
         sender = senders[rank]
+        count = sender.number(until - 1 - start) + 1
+        begun = sender.number(tick - start)
+        step = sender.numerator if sender.denominator == 1 else 0
         first = (start - sender.latency) // _BIT  # number of the first error draw
-        number = sender.number(tick - start)
-        begin = sender.begin(start, number)
-        alone = self.noise_alone and rank + 1 == len(senders)
-        while begin < until:
-            level = sent = sender.bit(data, stops, number)
-            if not alone or self.errors.below(first + number, self.threshold):
-                level = self.bit(begin, sent, first + number, begin >= tick, senders, rank)
-            if self.lost_threshold:
-                if self.lost.below(first + number - number % _CHARACTER, self.lost_threshold):
-                    level = 1
-            if level == 0 and sender.bad_stop(stops, number):
-                self.hear_bad_stop(tick, until, begin, sender.back(start, number))
-            else:
+        place = begun % _CHARACTER
+        levels = sender.levels(data, stops, begun)
+        before = -1
+        judged = self.next_judged(first, begun, count, stops, senders, rank)
+        for number in range(begun, count):
+            if place == _CHARACTER:
+                place = 0
+                levels = sender.levels(data, stops, number)
+            level = levels >> place & 1
+            place += 1
+            if level == before and number != judged:
+                continue
+            begin = start + number * step if step else sender.begin(start, number)
+            if number == judged:
+                level = self.bit(begin, level, first, number, begin >= tick, senders, rank)
+                judged = self.next_judged(first, number + 1, count, stops, senders, rank)
+                if level == 0 and sender.bad_stop(stops, number):
+                    self.hear_bad_stop(tick, until, begin, sender.back(start, number))
+                    level = before = 1
+            if level != before:
                 self.line.append(max(begin, tick), level)
-            number += 1
-            begin = sender.begin(start, number)
+                before = level
+
+    def next_judged(
+        self, first: int, number: int, count: int, stops: bytes, senders: list[Sender], rank: int
+    ) -> int:
+        """The next bit from `number` on, before `count`, that may not be heard as it was sent."""
+        if not self.noise_alone or self.lost_threshold or len(stops) > 0 or rank + 1 < len(senders):
+            return number
+        return self.errors.next_below(first + number, first + count, self.threshold) - first
 
     def hear_bad_stop(self, tick: int, until: int, begin: int, back: int) -> None:
         """Space from `begin` to `back`, then mark, as far as that lies in `tick` to `until`."""
@@ -212,7 +233,9 @@ class Listener:
         if back < until:
             self.line.append(max(back, tick), 1)
 
-    def bit(self, begin: int, sent: int, draw: int, fresh: bool, senders: list[Sender], rank: int) -> int:
+    def bit(
+        self, begin: int, sent: int, first: int, number: int, fresh: bool, senders: list[Sender], rank: int
+    ) -> int:
         """The level in a bit that begins at `begin`; not `fresh`: it was asked for before, or is cut."""
         level = sent
         if self.dropouts is not None and self.dropouts.bad(begin // _BIT):
@@ -227,10 +250,12 @@ class Listener:
                 chance = self.slicer.threshold(level)
             if self.bursts is not None and self.bursts.bad(begin // _BIT):
                 chance = self.burst_threshold
-            if self.errors.below(draw, chance):
+            if self.errors.below(first + number, chance):
                 level ^= 1
         if level != sent and fresh and rank == 0:
             self.bit_errors += 1
+        if self.lost_threshold and self.lost.below(first + number - number % _CHARACTER, self.lost_threshold):
+            return 1
         return level
 
     def mixed(self, level: int, begin: int, senders: list[Sender], rank: int) -> int:

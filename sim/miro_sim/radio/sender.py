@@ -68,14 +68,11 @@ class Sender:
         """The same of `count` characters from `start` on."""
         return self.begin(start, _CHARACTER * count)
 
-    def bit(self, data: bytes, stops: bytes, number: int) -> int:
-        """The level at the beginning of bit `number` of these characters."""
-        place = number % _CHARACTER
-        if place == 0:
-            return 0
-        if place == _CHARACTER - 1:
-            return 0 if self.bad_stop(stops, number) else 1
-        return (data[number // _CHARACTER] >> (place - 1)) & 1
+    def levels(self, data: bytes, stops: bytes, number: int) -> int:
+        """The levels of the character that bit `number` belongs to, that of its start bit lowest."""
+        index = number // _CHARACTER
+        stop = 0 if len(stops) > 0 and stops[index] else 1
+        return stop << (_CHARACTER - 1) | data[index] << 1
 
     def bad_stop(self, stops: bytes, number: int) -> bool:
         """Whether bit `number` is a bad stop bit."""
@@ -91,7 +88,7 @@ class Sender:
                 number = self.number(tick - start)
                 if self.bad_stop(stops, number) and tick >= self.back(start, number):
                     return 1
-                return self.bit(data, stops, number)
+                return self.levels(data, stops, number) >> number % _CHARACTER & 1
             if start - self.keyup <= tick < start:
                 return 1
         return 1 if self.always_on else -1

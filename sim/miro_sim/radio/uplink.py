@@ -101,23 +101,24 @@ class Uplink:
         self.before = level
 
     def sample(self, until: int, symbols: list[tuple[int, bool, int]]) -> None:
-        """Goes on to the middle of the next bit and takes it."""
-        middle = self.start_tick + (2 * self.bit + 1) * self.numerator // self.denominator
-        if middle >= until:
-            self.now = until
-            return
-        self.now = middle + 1
-        level = self.band.level(middle)
-        self.bit_errors += level >> 1
-        level &= 1
-        if 0 < self.bit < _STOP:
-            self.shift |= level << (self.bit - 1)
-        elif self.bit == _STOP:
-            symbols.append((self.shift, level == 1, self.start_tick))
-        if self.bit == _STOP or (self.bit == 0 and level == 1):
-            self.start_tick = -1
-            self.before = level
-        self.bit += 1
+        """Takes the bits of the character, each in its middle, up to `until`."""
+        while self.start_tick >= 0:
+            middle = self.start_tick + (2 * self.bit + 1) * self.numerator // self.denominator
+            if middle >= until:
+                self.now = until
+                return
+            self.now = middle + 1
+            level = self.band.level(middle)
+            self.bit_errors += level >> 1
+            level &= 1
+            if 0 < self.bit < _STOP:
+                self.shift |= level << (self.bit - 1)
+            elif self.bit == _STOP:
+                symbols.append((self.shift, level == 1, self.start_tick))
+            if self.bit == _STOP or (self.bit == 0 and level == 1):
+                self.start_tick = -1
+                self.before = level
+            self.bit += 1
 
     def after_load(self) -> None:
         """Raises ValueError for a character that would be over already, or has not begun."""

@@ -30,16 +30,17 @@ def naive_level(initial, levels, tick):
 
 
 @given(st.integers(0, 1), EDGES, st.lists(st.integers(-5, 900), max_size=30))
-def test_levels_and_next_edges_are_those_of_a_list(initial, steps, queries):
+def test_levels_and_edges_around_a_tick_are_those_of_a_list(initial, steps, queries):
     line, levels = built(initial, steps)
+    edges = [
+        tick
+        for tick in levels
+        if naive_level(initial, levels, tick) != naive_level(initial, levels, tick - 1)
+    ]
     for query in queries:
         assert line.level_at(query) == naive_level(initial, levels, query)
-        later = [
-            tick
-            for tick in levels
-            if tick > query and naive_level(initial, levels, tick) != naive_level(initial, levels, tick - 1)
-        ]
-        assert line.next_edge(query) == min(later, default=NEVER_TICK)
+        assert line.next_edge(query) == min((tick for tick in edges if tick > query), default=NEVER_TICK)
+        assert line.edge_at(query) == max((tick for tick in edges if tick <= query), default=-1)
 
 
 @given(st.integers(0, 1), EDGES, st.integers(0, 400), st.lists(st.integers(0, 400), max_size=10))
