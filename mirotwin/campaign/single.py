@@ -29,8 +29,7 @@ from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step
-from mirotwin.verify.steps.plan import check_symbols
-from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.player import Player, player_of
 from mirotwin.verify.steps.reading import steps_of
 
 
@@ -65,11 +64,10 @@ def run_single(job: Work) -> RunOutcome:
 def _run(job: Work) -> RunOutcome:
     image = load_firmware(job.firmware.path)
     found = prepared(job.origin, job.text, job.settings)
-    check_symbols(found.steps, image, job.origin)
     scenario = found.text.scenario
     world = World(scenario, job.seed, image)
     checks = Checks(world, found.expected)
-    player = Player(world, found.steps, job.origin) if found.steps else None
+    player = player_of(world, found.steps, job.origin)
     tracks = Tracks(delay_frames=scenario.camera.delay_frames)
     began_s = now_s()
     with _recorder(job.recording, found.text, world) as recorder:

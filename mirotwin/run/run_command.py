@@ -24,8 +24,7 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import as_settings, report_failures, report_steps
-from mirotwin.verify.steps.plan import check_symbols
-from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.player import player_of
 from mirotwin.verify.steps.reading import steps_of
 from mirotwin.verify.steps.running import everything, keep_saved
 
@@ -72,14 +71,13 @@ def run(options: RunOptions) -> int:
     )
     earlier = "" if options.out is not None else digest_in(folder.path)
     image = load_firmware(options.firmware, stack_from=options.stack_from)
-    check_symbols(steps, image, text.origin)
 
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
         stops.begin(world)
     source = source_of(text, world, record, stops.resumed)
     checks = Checks(world, expectations_of(text.scenario, text.origin))
-    player = Player(world, steps, text.origin) if steps else None
+    player = player_of(world, steps, text.origin)
     views: list[View] = []
     if options.frames is not None or options.record_frames:
         from mirotwin.camera.view import views_of  # loads the pictures' library

@@ -1,6 +1,6 @@
 """Does the steps of a scenario in a world, in virtual time, one after the other.
 
-    player = Player(world, steps_of(scenario, origin), origin)
+    player = player_of(world, steps_of(scenario, origin), origin)
     player.play()                          to the first step that fails, or to the last
     player.finish()                        and on to the end of the run
     player.failure                         None, or what was wanted and what was found
@@ -27,6 +27,8 @@ from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.steps.keys import Step
+from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.sender import Host
 
 
@@ -248,3 +250,9 @@ def _meanwhile(seen: Sequence[Event]) -> str:
     counted = Counter(event.what for event in events)
     parts = ", ".join(f"{count} {what}" for what, count in counted.items())
     return f"none of it, but {parts}; the last: {events[-1]}"
+
+
+def player_of(world: World, steps: Sequence[Step], origin: str) -> Player | None:
+    """Who does these steps in the world; None where there are none. Raises ScenarioError for an unknown symbol."""
+    check_symbols(steps, world.image, origin)
+    return Player(world, steps, origin) if steps else None
