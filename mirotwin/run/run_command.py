@@ -25,8 +25,8 @@ from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import as_settings, report_failures, report_steps
 from mirotwin.verify.steps.player import player_of
-from mirotwin.verify.steps.reading import steps_of
-from mirotwin.verify.steps.running import everything, keep_saved
+from mirotwin.verify.steps.reading import everything, steps_of
+from mirotwin.verify.steps.running import keep_saved
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View

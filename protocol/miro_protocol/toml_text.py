@@ -58,6 +58,19 @@ def check_size(text: str) -> None:
         raise TomlError(what, remedy, line=line)
 
 
+def value_of(text: str, path: str) -> Any:
+    """What a text means as the value of the key at `path`: as TOML, or itself if it is none. Raises TomlError."""
+    check_size(f"{path} = {text}")
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except ValueError:  # no TOML, or an integer with more digits than Python converts
+        return text
+    if len(found) > 1:
+        return text
+    check_numbers(found["value"], path)
+    return found["value"]
+
+
 def check_numbers(value: Any, path: str = "") -> None:
     """Refuses NaN, infinities and integers that no key takes. Raises TomlError with the path of the key."""
     if isinstance(value, float) and not math.isfinite(value):

@@ -17,7 +17,7 @@ import msgspec
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Heard, WheelSpeeds
-from mirotwin.verify.checks.expect import checks_of_table
+from mirotwin.verify.checks.expect import checks_of_table, expectations_of
 from mirotwin.verify.steps import plan
 from mirotwin.verify.steps.keys import (
     PLAIN,
@@ -49,6 +49,12 @@ def steps_of(scenario: Scenario, origin: str) -> list[Step]:
     steps = [_Table(scenario, origin, index, table).step() for index, table in enumerate(scenario.step)]
     plan.check_order(steps, scenario, origin)
     return steps
+
+
+def everything(scenario: Scenario, origin: str) -> None:
+    """What a scenario says to checks and in steps: raises ScenarioError for what cannot be meant."""
+    expectations_of(scenario, origin)
+    steps_of(scenario, origin)
 
 
 class _Table:

@@ -14,7 +14,6 @@ from miro_exact.domain import DomainError
 from miro_host.plugins import PluginError
 from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText, load
-from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.program import show_traceback
@@ -29,7 +28,7 @@ from mirotwin.verify.checks.registry import ALWAYS_ON
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player
-from mirotwin.verify.steps.reading import steps_of
+from mirotwin.verify.steps.reading import everything, steps_of
 
 Verdict = Literal["passed", "failed", "fault", "error", "not observable"]
 SCENARIO = "scenario.toml"
@@ -59,12 +58,6 @@ class Outcome(msgspec.Struct, frozen=True):
     left: str = ""
     left_out: tuple[str, ...] = ()
     unseen: int = 0
-
-
-def everything(scenario: Scenario, origin: str) -> None:
-    """What a scenario says to checks and in steps: raises ScenarioError for what cannot be meant."""
-    expectations_of(scenario, origin)
-    steps_of(scenario, origin)
 
 
 def load_test(path: str, settings: Sequence[str] = ()) -> ScenarioText:

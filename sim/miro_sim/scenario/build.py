@@ -8,18 +8,20 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
 from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
 from miro_host.pilot import Pilot
 from miro_host.plugins import PluginError
+from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, raised
 from miro_host.references.checked import CheckedReference
 from miro_host.references.interface import ReferenceParameters, Trajectory
 from miro_host.references.registry import REFERENCES
 from miro_host.wheels import Wheels
 from miro_protocol.table import DOWNLINK
-from miro_sim.plant.params import DriveParams
+from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
 
 
@@ -85,13 +87,24 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
         raise PluginError(what, f"mend the {word} or its parameters") from error
 
 
-def drive_for(robot: sc.RobotSpec, left: float, right: float) -> DriveParams:
-    """The drive with this seed's wheels; `left`, `right` are the draws, uniform in [0, 1)."""
-    spread = robot.wheel_radius_mismatch
+def start_of(robot: sc.RobotSpec, reference: Trajectory) -> Posture:
+    """Where the robot starts: at its reference, but for the errors of its start."""
+    at = reference.at(0.0).posture
+    return Posture(
+        at.x_m + robot.start_error_x_cm / 100.0,
+        at.y_m + robot.start_error_y_cm / 100.0,
+        at.theta_rad + robot.start_error_theta_rad,
+    )
+
+
+def drive_for(robot: sc.RobotSpec, start: Posture, wheels: Stream, noise: Stream) -> DifferentialDrive:
+    """The drive with this seed's wheels, which are drawn from `wheels`; `noise` is the disturbance's."""
+    spread, left, right = robot.wheel_radius_mismatch, wheels.uniform(0), wheels.uniform(1)
     body = robot.drive.chassis
     drawn = msgspec.structs.replace(
         body,
         left_radius_factor=body.left_radius_factor * (1.0 + spread * (2.0 * left - 1.0)),
         right_radius_factor=body.right_radius_factor * (1.0 + spread * (2.0 * right - 1.0)),
     )
-    return msgspec.structs.replace(robot.drive, chassis=drawn)
+    params = msgspec.structs.replace(robot.drive, chassis=drawn)
+    return DifferentialDrive(params, start.x_m, start.y_m, start.theta_rad, noise)

@@ -50,21 +50,16 @@ def check_places(scenario: Scenario, origin: str) -> None:
 
 def _check(robot: RobotSpec, scenario: Scenario, origin: str, path: str) -> None:
     from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
-    from miro_sim.scenario.build import reference_for
+    from miro_sim.scenario.build import reference_for, start_of
     from miro_sim.scenario.drives import limits_problem, origin_problem
 
     duration_s = scenario.duration_s
     reference = reference_for(robot, duration_s)
-    at = reference.at(0.0).posture
-    start = Posture(
-        at.x_m + robot.start_error_x_cm / 100.0,
-        at.y_m + robot.start_error_y_cm / 100.0,
-        at.theta_rad + robot.start_error_theta_rad,
-    )
+    start = start_of(robot, reference)
     off = _off_pitch(start)
     if off is not None:
         axis, what = off
-        of_reference = _off_pitch(at) is not None
+        of_reference = _off_pitch(reference.at(0.0).posture) is not None
         key = "reference" if of_reference else f"start_error_{axis}_cm"
         remedy = "begin the reference elsewhere" if of_reference else "start nearer to the reference"
         raise ScenarioError(origin, f"{path}.{key}", f"the robot starts off the pitch: {what}", remedy)

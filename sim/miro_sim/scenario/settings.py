@@ -6,14 +6,13 @@ replaces a whole table. `variant=NAME` stands for all that the variant changes (
 """
 
 import re
-import tomllib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
 
 from miro_host.laws.registry import LAWS
-from miro_protocol.toml_text import TomlError, check_size
+from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec
 from miro_sim.scenario.plugins import REGISTRIES
@@ -122,15 +121,12 @@ def _read(text: str) -> tuple[list[str], Any]:
         raise _Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
     if not _is_utf8(text):
         raise _Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
+    path = ".".join(keys)
     try:
-        check_size(text)
+        return keys, value_of(value, path)
     except TomlError as error:
-        raise _Refused(error.what, error.remedy) from None
-    try:
-        read = tomllib.loads(f"value = {value}")
-    except ValueError:  # no TOML, or an integer with more digits than Python converts
-        return keys, value
-    return keys, read["value"] if len(read) == 1 else value
+        place = "" if error.place in ("", path) else f"{error.place}: "
+        raise _Refused(f"{place}{error.what}", error.remedy) from None
 
 
 def _is_utf8(text: str) -> bool:

@@ -22,9 +22,8 @@ from miro_robot.lm629.chip import Lm629
 from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
-from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import drive_for, pilot_for, reference_for
+from miro_sim.scenario.build import drive_for, pilot_for, reference_for, start_of
 from miro_sim.world.events import RobotLog
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
@@ -56,19 +55,13 @@ class Robot:
         self.slot = spec.slot
         try:
             self.reference = reference_for(spec, scenario.duration_s)
-            start = self.reference.at(0.0).posture
+            start = start_of(spec, self.reference)
             self.pilot: Pilot = pilot_for(spec, self.reference, scenario, network)
         except PluginError as error:
             raise self._named(error, 0) from error
-        wheels = Stream(seed, f"{name}/wheels")
+        noise = Stream(seed, f"{name}/disturbance")
         try:
-            self.drive = DifferentialDrive(
-                drive_for(spec, wheels.uniform(0), wheels.uniform(1)),
-                start.x_m + spec.start_error_x_cm / 100.0,
-                start.y_m + spec.start_error_y_cm / 100.0,
-                start.theta_rad + spec.start_error_theta_rad,
-                Stream(seed, f"{name}/disturbance"),
-            )
+            self.drive = drive_for(spec, start, Stream(seed, f"{name}/wheels"), noise)
         except ArithmeticError as error:  # what follows from the parameters divides by zero
             raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error
         strap = spec.slot if spec.strap is None else spec.strap

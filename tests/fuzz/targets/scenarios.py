@@ -13,7 +13,7 @@ def _scenario():
     from miro_sim.scenario.file import decode, of_table, parse
     from miro_sim.scenario.keys import without_expectations
     from mirotwin.verify.cases.case import tables_of
-    from mirotwin.verify.steps.running import everything
+    from mirotwin.verify.steps.reading import everything
 
     def run(data):
         try:
@@ -35,7 +35,7 @@ def _scenario():
 def _settings():
     from miro_sim.scenario.errors import ScenarioError
     from miro_sim.scenario.file import parse
-    from mirotwin.verify.steps.running import everything
+    from mirotwin.verify.steps.reading import everything
     from tests.mirotwin.conftest import SHORT
 
     def run(data):
