@@ -1,1 +1,4 @@
-# C layout of miro_exact.fields: none; compiled for its calls.
+# C layout of miro_exact.fields.
+
+cdef class Items:
+    cdef readonly object form, code, room, bounds, ordered, made

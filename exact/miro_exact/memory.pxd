@@ -17,6 +17,8 @@ cdef struct Place:
 cdef class Memory:
     cdef Place *places
     cdef Py_ssize_t number
+    cdef Place *spans  # what is put in one go: fields that are neighbours
+    cdef Py_ssize_t span_count
     cdef Py_ssize_t fixed  # bytes of all that are no queues
     cdef bint queues  # whether there are any
     cdef readonly tuple names
@@ -27,6 +29,7 @@ cdef class Memory:
     cpdef bytes pack(self)
     cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1
     cpdef put(self)
+    cdef int join(self) except -1
     cdef Py_ssize_t size(self) except -1
     cdef int write(self, char *to) except -1
     cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1

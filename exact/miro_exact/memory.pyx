@@ -87,9 +87,31 @@ cdef class Memory:
                 self.queues = True
                 place.end = <char *><size_t>end[0]
                 place.end_size = end[1]
+        self.join()
+
+    cdef int join(self) except -1:
+        """Fields that lie next to each other in their part as they do in the bytes are one span."""
+        cdef Py_ssize_t index
+        cdef Place *place
+        cdef Place *span = NULL
+        self.spans = <Place *>PyMem_Calloc(max(1, self.number), sizeof(Place))
+        if self.spans == NULL:
+            raise MemoryError
+        for index in range(self.number):
+            place = &self.places[index]
+            if LITTLE and span != NULL and span.end == NULL and place.end == NULL:
+                if place.at == span.at + span.size * span.count:
+                    span.count = span.size * span.count + place.size * place.count
+                    span.size = 1
+                    continue
+            span = &self.spans[self.span_count]
+            span[0] = place[0]
+            self.span_count += 1
+        return 0
 
     def __dealloc__(self):
         PyMem_Free(self.places)
+        PyMem_Free(self.spans)
 
     cdef Py_ssize_t size(self) except -1:
         cdef Py_ssize_t index, total = self.fixed
@@ -200,20 +222,20 @@ cdef class Memory:
         cdef const char *source
         cdef Py_ssize_t index, count
         cdef unsigned int written
-        cdef Place *place
+        cdef Place *span
         if self.data is None:
             raise ValueError("nothing was checked")
         source = PyBytes_AS_STRING(self.data) + self.begin
-        for index in range(self.number):
-            place = &self.places[index]
-            count = place.count
-            if place.end != NULL:
+        for index in range(self.span_count):
+            span = &self.spans[index]
+            count = span.count
+            if span.end != NULL:
                 copy(<char *>&written, source, 4, 1)
                 source += 4
                 count = written
-                set_length(place.end, place.end_size, count)
-            copy(place.at, source, place.size, count)
-            source += place.size * count
+                set_length(span.end, span.end_size, count)
+            copy(span.at, source, span.size, count)
+            source += span.size * count
 
 
 NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY = range(6)

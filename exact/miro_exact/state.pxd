@@ -1,1 +1,4 @@
-# C layout of miro_exact.state: none; compiled for its calls.
+# C layout of miro_exact.state.
+
+cdef class One:
+    cdef readonly object field, part, name, kind, fields, value, sibling

@@ -131,6 +131,7 @@ class One:
 
     def __init__(self, field: StateField, before: Block | None) -> None:
         self.field = field
+        self.part, self.name, self.kind, _ = field
         self.fields = [field]
         self.value: Any = None
         self.sibling: One | None = None
@@ -139,15 +140,14 @@ class One:
                 self.sibling = before
 
     def pack(self) -> bytes:
-        part, name, kind, path = self.field
         try:
-            return kind.encode(kind.read(part, name))
+            return self.kind.encode(self.kind.read(self.part, self.name))
         except ValueError as error:
-            raise DomainError(f"{path} {error}") from None
+            raise DomainError(f"{self.field.path} {error}") from None
 
     def check(self, data: bytes, at: int) -> int:
         try:
-            self.value, at = self.field.kind.decode(data, at)
+            self.value, at = self.kind.decode(data, at)
         except ValueError as error:
             raise ValueError(f"{self.field.path} {error}") from None
         if self.sibling is not None and len(self.value) != len(self.sibling.value):
@@ -155,7 +155,7 @@ class One:
         return at
 
     def put(self) -> None:
-        self.field.kind.write(self.field.part, self.field.name, self.value)
+        self.kind.write(self.part, self.name, self.value)
 
 
 class Some:
@@ -213,6 +213,7 @@ class Flat:
         self._close()
         if not self.fields:
             raise TypeError(f"{type(root).__name__} declares no state")
+        self._steps = [*(block.put for block in self._blocks), *self._after]
         self._packed = _together(self._blocks) if self._compiled else self._blocks
         self._hashed = _together(self._hashed) if self._compiled else self._hashed
 
@@ -287,10 +288,8 @@ class Flat:
             raise ValueError(f"the state has {len(data)} bytes, not {at}")
 
     def _put(self) -> None:
-        for block in self._blocks:
-            block.put()
-        for work_out in self._after:
-            work_out()
+        for step in self._steps:
+            step()
 
     # ---- making it: which fields there are, and which of them go together
 

@@ -62,7 +62,7 @@ cdef class Board(Bus):
     cdef int hi_inverted[8]
     cdef int hi_side[8]
 
-    @cython.locals(earliest_tick=cython.longlong)
+    @cython.locals(earliest_tick=cython.longlong, latest_tick=cython.longlong, next_tick=cython.longlong)
     cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
     @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
