@@ -44,6 +44,9 @@ class Plant:
 
         It ends before a tick at which a chip has more to do. Returns 1 if it has done something, 0 if nothing.
         """
+        if self.left is not None and self.right is not None:
+            self.left.rest(tick)
+            self.right.rest(tick)
         return 0
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:

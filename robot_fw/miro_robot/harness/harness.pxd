@@ -24,7 +24,7 @@ cdef class Harness:
     cdef int _forget_records(self, Board board) except -1
     @cython.locals(tick='long long', pause='long long', place=int, flaws=int, waiting=int)
     cpdef int play(self, Program program) except -1
-    @cython.locals(bit='long long', place=int, rxd=Line)
+    @cython.locals(bit='long long', levels=int, place=int, rxd=Line)
     cdef int _character(self, int value, int bad_stop, long long tick) except -1
     cdef int _reset(self, long long tick) except -1
     cdef int _set_reset(self, int level) except -1

@@ -123,14 +123,13 @@ class Harness:
         bit = self.bit_ticks
         rxd = self.cpu.rxd
         rxd.append(tick, 0)
-        for place in range(8):
+        levels = value << 1 | (0 if bad_stop else 0x200)
+        for place in range(1, 10):
             tick += bit
-            rxd.append(tick, value >> place & 1)
-        tick += bit
+            if (levels >> place ^ levels >> place - 1) & 1:
+                rxd.append(tick, levels >> place & 1)
         if bad_stop:
-            rxd.append(tick, 0)
-            tick += 3 * bit // 4
-        rxd.append(tick, 1)
+            rxd.append(tick + 3 * bit // 4, 1)
 
     def _reset(self, tick: int) -> int:
         """The reset pin, a little after `tick`."""

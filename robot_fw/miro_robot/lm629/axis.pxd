@@ -48,6 +48,8 @@ cdef class MotorAxis:
     cdef _end_reset(self, long long now)
     @cython.locals(now=cython.longlong)
     cpdef int advance(self, long long tick) except -1
+    @cython.locals(now=cython.longlong, passed=cython.longlong)
+    cpdef rest(self, long long tick)
     @cython.final
     cdef int _period(self, long long now) except -1
     @cython.final

@@ -215,6 +215,20 @@ class MotorAxis:
             else:
                 self._period(now)
 
+    def rest(self, tick: int) -> None:
+        """Makes a sample of an unplugged motor that is off, and passes those up to `tick` that find what it left.
+
+        The last of them is left, and all where there are fewer than three.
+        """
+        now = self.next_tick
+        if self.pulses or now + 2 * _SAMPLE_TICKS > tick:
+            return
+        self.advance(now)
+        if self.signals.word & _MOTOR_OFF and self.encoder.quadrature.due == _NEVER:
+            passed = (tick - self.next_tick) // _SAMPLE_TICKS * _SAMPLE_TICKS
+            self.next_tick += passed
+            self.sample_tick += passed
+
     def _period(self, now: int) -> None:
         """A PWM period begins, every fourth with a sample."""
         self.period_tick = now

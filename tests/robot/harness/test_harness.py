@@ -3,7 +3,10 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
@@ -17,8 +20,8 @@ BIT_TICKS = 2500
 MS = 24_000
 
 
-def board_with(image, ticks=40 * MS):
-    board = Board(load_wiring(), Plant())
+def board_with(image, ticks=40 * MS, plant=None):
+    board = Board(load_wiring(), plant or Plant())
     board.load(image)
     board.cpu.rxd.settled_tick = 2 * ticks
     board.run(ticks)
@@ -68,6 +71,25 @@ def test_firmware_cannot_tell_whether_the_pulses_for_unplugged_motors_are_drawn(
         seen.append((events, one.cpu.cycles, one.cpu.instructions, bytes(map(one.cpu.peek_iram, range(256)))))
     assert seen[0] == seen[1]
     assert edges[0] == edges[1]
+
+
+class EverySample(Plant):
+    """Lets the board's chips make each sample."""
+
+    def run_pulses(self, tick):
+        return 0
+
+
+@settings(max_examples=25, derandomize=True)
+@given(st.binary(max_size=40))
+def test_chips_without_work_pass_their_samples_with_the_same_state(data):
+    harnesses = [
+        harness_for(board_with(load_hex(image_path()), plant=plant())) for plant in (Plant, EverySample)
+    ]
+    harnesses[1].board.left.pulses = harnesses[1].board.right.pulses = 0
+    ends = {one.play(program(data)) for one in harnesses}
+    assert len(ends) == 1
+    assert snapshot(harnesses[0].board) == snapshot(harnesses[1].board)
 
 
 def test_runs_leave_nothing_behind_that_grows(harness):

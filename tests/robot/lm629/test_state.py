@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from miro_exact import engine
 from miro_exact.state import restore, snapshot
-from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from tests import children
 from tests.example_count import examples
 from tests.robot.lm629.bench import Bench
@@ -33,6 +33,39 @@ def test_compiled_and_uncompiled_chips_see_the_same_session(seed):
     assert compiled.split()[0] == "compiled"
     assert python.split()[0] == "python"
     assert compiled.split()[1] == python.split()[1]
+
+
+def at_rest(state, tick, edges, rests):
+    """A chip with that state, whose motor is unplugged, 90 000 ticks later; whether it passed samples on the way."""
+    chip = Lm629()
+    restore(chip, state)
+    chip.pulses = 0
+    begun = chip.next_tick
+    if edges and tick < begun - 8 < tick + SAMPLE_TICKS:
+        chip.set_encoder(begun - 8, edges & 1, edges >> 1 & 1)
+        chip.set_index(begun - 8, edges >> 2)
+    if rests:
+        chip.rest(tick + 90_000)
+    passed = chip.next_tick > begun + SAMPLE_TICKS
+    chip.advance(tick + 90_000)
+    return snapshot(chip) + bytes([chip.hi]), passed
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_chip_whose_motor_is_unplugged_passes_samples_without_work_as_if_it_made_each(seed):
+    bench, place, passed = Bench(), 0, 0
+    bench.chip.set_encoder(0, 0, 0)
+    bench.reset()
+    for step in steps(seed, 300):
+        if bench.chip.mode == 0:
+            bench.reset()
+        place = play(bench, step, place)
+        bench.chip.rest(bench.tick + 90_000)  # plugged in, it makes each
+        for edges in (0, 1 + step[1] % 7):
+            state, passes = at_rest(snapshot(bench.chip), bench.tick, edges, True)
+            assert (state, False) == at_rest(snapshot(bench.chip), bench.tick, edges, False)
+            passed += passes
+    assert passed > 5
 
 
 @pytest.mark.slow
