@@ -29,6 +29,8 @@ cdef class Line:
     cpdef int level_at(self, long long tick) noexcept
     cpdef long long next_edge(self, long long tick) noexcept
     cpdef long long edge_at(self, long long tick) noexcept
+    @cython.locals(cursor='long long', level=int, edge='long long', levels=int, taken=int)
+    cpdef int samples(self, long long tick, long long step, long long width, long long end, int most) noexcept
     cpdef void forget(self, long long tick) noexcept
     cpdef void hear(self, long long tick) noexcept
     cpdef long long full_tick(self) noexcept

@@ -121,6 +121,28 @@ class Line:
         self._seek(tick)
         return self._ticks[(self._cursor - 1) & self._mask] if self._cursor > self._first else -1
 
+    def samples(self, tick: int, step: int, width: int, end: int, most: int) -> int:
+        """Levels at `tick`, `tick` + `step` .., at most `most` of 10: bit by bit, with their number from bit 16 on.
+
+        Up to the first that does not hold until `width` ticks later, with that before `end`.
+        """
+        self._seek(tick)
+        cursor = self._cursor
+        level = self._before ^ ((cursor - self._first) & 1)
+        edge = self._ticks[cursor & self._mask] if cursor < self._end else _NEVER
+        levels = 0
+        taken = 0
+        while taken < most and tick + width < edge and tick + width < end:
+            levels |= level << taken
+            taken += 1
+            tick += step
+            while edge <= tick:
+                level ^= 1
+                cursor += 1
+                edge = self._ticks[cursor & self._mask] if cursor < self._end else _NEVER
+        self._cursor = cursor
+        return taken << 16 | levels
+
     def forget(self, tick: int) -> None:
         """Drops the edges that no query at `tick` or later needs."""
         self._seek(tick)

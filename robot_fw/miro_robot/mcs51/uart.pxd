@@ -10,7 +10,7 @@ cdef long long _STOPPED_PERIOD
 cdef int _SERIAL
 cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
 cdef int _ROLLOVERS, _COUNTER_BITS
-cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_ACTION
+cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_BIT, _LAST_ACTION
 
 @cython.final
 cdef class Uart:
@@ -65,8 +65,10 @@ cdef class Uart:
     cdef void _search(self, long long tick) noexcept
     @cython.locals(period='long long', level=int, edge='long long', state=int, idle='long long', now='long long')
     cdef void _bit(self, long long tick) noexcept
+    @cython.locals(period='long long', idle=int, first='long long', number=int, most=int, found=int, more=int, level=int)
+    cdef bint _unanimous(self, long long tick) noexcept
     @cython.locals(number=int, bit=int)
-    cdef void _act(self, long long now) noexcept
+    cdef inline void _act(self, long long now) noexcept
     @cython.locals(tick='long long', last=int)
     cdef void _deliver(self) noexcept
     @cython.locals(fall='long long', before='long long')

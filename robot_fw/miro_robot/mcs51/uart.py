@@ -35,7 +35,8 @@ _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI = 0x80, 0x40, 0x20, 0x10, 0x08, 0x0
 _ROLLOVERS = 16
 _COUNTER_BITS = 15  # of the divide-by-16 counter: masks instead of divisions
 _VOTE_FIRST, _VOTE_LAST, _ACTION = 7, 9, 10  # states of the receiver's counter
-_LAST_ACTION = 9 * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of a character
+_LAST_BIT = 9  # the start bit is 0
+_LAST_ACTION = _LAST_BIT * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of a character
 
 
 class Uart:
@@ -268,13 +269,15 @@ class Uart:
         self.rx_next = now
 
     def _bit(self, tick: int) -> None:
-        """16x ticks of one bit below `tick`: only counter states 7 to 10 do anything."""
+        """16x ticks of a character below `tick`: only counter states 7 to 10 of its bits do anything."""
         period = self.rx_period
         level = 0
         edge = 0  # the level holds until then
         while self.rx_next < tick and self.rx_count:
             state = self.rx_count & _COUNTER_BITS
             now = self.rx_next
+            if (state <= _VOTE_FIRST or state > _ACTION) and self._unanimous(tick):
+                continue
             if state < _VOTE_FIRST or state > _ACTION:
                 idle = (_VOTE_FIRST - state) & _COUNTER_BITS
                 if now + (idle - 1) * period >= tick:
@@ -288,18 +291,34 @@ class Uart:
                 level = self.level(now)
                 edge = self.rxd.next_edge(now) if self.latch & 1 else _NEVER
             self.rx_last = level
-            if state == _VOTE_FIRST and now + 3 * period < tick and edge > now + 3 * period:
-                self.rx_votes += 3 * level  # no edge within the three votes: all at once
-                self.rx_count += 4
-                self.rx_next = now + 4 * period
-                self._act(now + 3 * period)
-                continue
             self.rx_next = now + period
             self.rx_count += 1
             if state < _ACTION:
                 self.rx_votes += level
             else:
                 self._act(now)
+
+    def _unanimous(self, tick: int) -> bool:
+        """Bits below `tick` whose three votes are one: the start bit, or all data. False if the next bit is none."""
+        period = self.rx_period
+        idle = (_VOTE_FIRST - self.rx_count) & _COUNTER_BITS
+        first = self.rx_next + idle * period
+        number = (self.rx_count + idle) >> 4
+        most = _LAST_BIT + 1 - number if 1 <= number <= _LAST_BIT else 1
+        if not self.latch & 1:
+            return False
+        found = self.rxd.samples(first, _ROLLOVERS * period, 3 * period, tick, most)
+        more = (found >> 16) - 1  # than one bit
+        if more < 0:
+            return False
+        level = found >> more & 1
+        self.rx_last = level
+        self.rx_votes = 3 * level
+        self.rx_bits |= (found & ((1 << more) - 1)) << number >> 1
+        self.rx_count += idle + 4 + _ROLLOVERS * more
+        self.rx_next = first + (4 + _ROLLOVERS * more) * period
+        self._act(self.rx_next - period)
+        return True
 
     def _act(self, now: int) -> None:
         """State 10 of a bit: take the vote. Bit 0 is the start bit; the last one ends the frame."""
@@ -311,7 +330,7 @@ class Uart:
                 self.rx_count = 0
         elif number <= 8:
             self.rx_bits |= bit << (number - 1)
-        elif number == 9:
+        elif number == _LAST_BIT:
             self.rx_frame = self.rx_bits | (bit << 8)
             self.rx_done = (now + 7) // 12 * 12 + 4
             if not self.nine_bits():
