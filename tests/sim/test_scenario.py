@@ -2,6 +2,7 @@
 
 import math
 import time
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -253,6 +254,22 @@ def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one():
         ScenarioError, match=r"fig5: no such scenario; did you mean fig\d+\? .*: curve, fig6, fig7,"
     ):
         load("fig5")
+
+
+@pytest.mark.parametrize("name", ["gone.stream", "gone.mcap", "fig6.tml"])
+def test_a_name_with_an_ending_is_a_file_that_is_not_there(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        ScenarioError, match=rf"^{name}: no such file; `mirotwin scenarios` lists the built-in"
+    ):
+        load(name)
+    with pytest.raises(ScenarioError, match="no such file"):
+        load(f"{'x' * 300}.{name}")
+    Path(name).touch()
+    with pytest.raises(
+        ScenarioError, match=rf"^{name}: no such scenario; .*; a file needs a path that ends in"
+    ):
+        load(name)
 
 
 def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path):

@@ -3,6 +3,7 @@
 Nothing but `ScenarioError` leaves these functions, whatever the text.
 """
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -58,6 +59,8 @@ def builtin_text(name: str) -> str:
     """The file of a built-in scenario. Raises ScenarioError for a name that is not one."""
     names = builtin_names()
     if name not in names:
+        if Path(name).suffix and not os.path.exists(name):
+            raise _no_such_file(name)
         remedy = f"built-in scenarios: {', '.join(names)}; a file needs a path that ends in .toml"
         raise ScenarioError(name, "", "no such scenario", did_you_mean(name, names, remedy))
     return (_BUILTIN / f"{name}.toml").read_text(encoding="utf-8")
@@ -86,15 +89,17 @@ def source_text(source: str) -> str:
     try:
         raw = read_input(source, TEXT_KIB << 10)
     except FileNotFoundError:
-        raise ScenarioError(
-            source, "", "no such file", "`mirotwin scenarios` lists the built-in ones"
-        ) from None
+        raise _no_such_file(source) from None
     except InputError as error:
         raise ScenarioError(source, "", error.what, error.remedy) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ScenarioError(source, "", f"cannot be read: {reason}") from None
     return decode(raw, source)
+
+
+def _no_such_file(path: str) -> ScenarioError:
+    return ScenarioError(path, "", "no such file", "`mirotwin scenarios` lists the built-in scenarios")
 
 
 def decode(raw: bytes, origin: str) -> str:

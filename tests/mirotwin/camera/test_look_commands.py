@@ -170,7 +170,7 @@ def test_looking_changes_no_bit_of_the_world(short):
         (("fig6", "--until", "main"), "--until does not apply to it"),
         (("fig5",), "no such scenario"),
         (("gone.ihx",), "there is no such file"),
-        (("gone.mcap",), "no such scenario"),
+        (("gone.mcap",), "gone.mcap: no such file"),
     ],
 )
 def test_what_cannot_be_looked_at_is_one_line(mirotwin, arguments, said):
