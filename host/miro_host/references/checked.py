@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import msgspec
 
 from miro_host.plugins import PluginError
+from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Reference, Trajectory
 
@@ -29,6 +30,8 @@ class CheckedReference:
             found = self.trajectory.at(t_s)
             if not isinstance(found, Reference):
                 raise ValueError(f"`at` returned {found!r:.40}, which is no Reference")
+            if not isinstance(found.posture, Posture):
+                raise ValueError(f"its posture is {found.posture!r:.60}, which is no Posture")
             for value in _numbers(found):
                 if type(value) is not float or not math.isfinite(value):
                     raise ValueError(f"it returned {found!r}; all must be finite floats")

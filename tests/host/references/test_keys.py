@@ -69,6 +69,12 @@ class Broken:
 GOOD = StraightLine().at(1.0)
 
 
+class Point(msgspec.Struct):
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+
+
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
@@ -78,6 +84,14 @@ GOOD = StraightLine().at(1.0)
         (
             lambda t_s: msgspec.structs.replace(GOOD, posture=msgspec.structs.replace(GOOD.posture, x_m=0)),
             "it returned Reference.* finite",
+        ),
+        (
+            lambda t_s: msgspec.structs.replace(GOOD, posture=Point()),
+            r"its posture is Point\(x=0.0, y=0.0, theta=0.0\), which is no Posture",
+        ),
+        (
+            lambda t_s: msgspec.structs.replace(GOOD, posture=(0.0, 0.0, 0.0)),
+            r"its posture is \(0.0, 0.0, 0.0\), which is no Posture",
         ),
     ],
 )
