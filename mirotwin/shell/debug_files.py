@@ -43,9 +43,8 @@ def with_debug_files(image: Image) -> Image:
 
 
 def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
-    """The folders to look for C files in: those given, the image's own, and the robot's firmware's."""
-    own = source_folder()
-    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
+    """The folders to look for C files in: those given, the image's own, and for the robot's firmware that one's."""
+    return Sources([*map(Path, given), image.path.parent, *_own_sources(image)])
 
 
 def sources_of(image: Image, given: Sequence[str]) -> Sources:
@@ -76,6 +75,10 @@ def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
 def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, list[Path]]:
     """The image with its debug files, those beside one of `images` or the robot's own, and where C files may be."""
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
+    return known, [*_own_sources(image), *map(Path, sources)]
+
+
+def _own_sources(image: Image) -> list[Path]:
+    """The folder of the robot's firmware if the image is that one: another's files may have the same names."""
     folder = source_folder()
-    own = [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]
-    return known, [*own, *map(Path, sources)]
+    return [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]

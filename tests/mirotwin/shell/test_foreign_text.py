@@ -2,6 +2,7 @@
 
 import pytest
 
+from miro_robot.firmware import source_folder
 from miro_robot.inspect import lcov
 from miro_robot.inspect.lcov import FileRecord
 
@@ -33,6 +34,14 @@ def test_a_listing_shows_names_and_sources_escaped(mirotwin, image):
     assert plain(out)
     assert f"; {SHOWN}:1: for (;;) ;" in " ".join(out.split())
     assert r"\x1b]0;title\x07" in out
+
+
+def test_a_file_of_another_firmware_is_not_taken_for_that_of_the_robots_own(mirotwin, image):
+    image.with_suffix(".cdb").write_text("L:C$main.c$27$0$0:0\nL:G$main$0$0:0\nL:XG$main$0$0:0\n")
+    assert (source_folder() / "main.c").read_text().splitlines()[26].strip()
+    code, out, _ = mirotwin("fw", "disasm", image)
+    assert code == 0
+    assert "; main.c:27\n" in out
 
 
 @pytest.mark.parametrize("command", ["trace", "profile", "coverage"])
