@@ -186,11 +186,24 @@ def test_an_estimator_is_chosen_and_checked_like_a_law():
     [
         (
             "motor.resistance_ohm = -2.0",
-            "motor.resistance_ohm: -2.0 is out of range; must be above 0 and below 1e12",
+            "drive.motor.resistance_ohm: -2.0 is out of range; must be 0.01 to 1000 in ohms",
         ),
         ("chassis.mass_g = 500", "drive.chassis.mass_g: unknown key; use mass_kg, in kilograms"),
-        ("encoder.lines = 1000000", "drive: 7.2 V, 0.00692 Nm/A and 1000000 lines make 6.62e+08 counts/s"),
-        ("motor.torque_constant_nm_a = 11", "torque_constant_nm_a: 11.0 is out of range; must be <= 10"),
+        ("encoder.lines = 100000", "drive: 7.2 V, 0.00692 Nm/A and 100000 lines make 6.62e+07 counts/s"),
+        (
+            "motor.torque_constant_nm_a = 11",
+            "torque_constant_nm_a: 11.0 is out of range; must be 1e-05 to 10",
+        ),
+        (
+            "motor.rotor_inertia_kg_m2 = 1e-10",
+            "drive.motor: 1e-10 kg m2, 2.09 ohm with the battery and 0.00692 Nm/A make a time constant of"
+            " 4.36e-06 s; at least 0.0001 s",
+        ),
+        (
+            "chassis.left_radius_factor = 9.9",
+            "drive.chassis.left_radius_factor: 9.9 is drawn within +- 1.5 % (wheel_radius_mismatch); what is drawn"
+            " must stay within 0.1 to 10",
+        ),
         ("battery.voltage_v = '7.2 V'", "drive.battery.voltage_v: expected a number in volts, got a string"),
     ],
 )

@@ -7,54 +7,41 @@ cube of 7.5 cm and 0.5 kg.
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import msgspec
 
 GRAVITY_M_S2 = 9.81
 
-
-MAY_BE_ZERO = ("friction_nm", "rolling_resistance", "drop_v", "drop_ohm", "diode_v")
-WITHIN = {
-    "grip": (0.01, 10.0),
-    "stiction_ratio": (1.0, 10.0),
-    "friction": (0.0, 10.0),
-    "load_share": (0.0, 0.9),
-    "behind_m": (-0.1, 0.1),
-    "period_s": (0.001, 3600.0),
-    "force_n": (-5.0, 5.0),
-    "torque_nm": (-0.1, 0.1),
-    "sine_force_n": (0.0, 5.0),
-    "sine_torque_nm": (0.0, 0.1),
-    "noise_force_n": (0.0, 5.0),
-    "noise_torque_nm": (0.0, 0.1),
-    "on_delay_s": (0.0, 20e-6),
-    "off_delay_s": (0.0, 20e-6),
-    "gear_backlash_rad": (0.0, 0.2),
-    "gear_load_friction": (0.0, 0.5),
-}
-"""Ranges of the disturbances, and of what a part of a PWM period or of a gear can be. 5 N are the robot's weight."""
+Ranges = dict[str, tuple[float, float]]
+"""Lowest and highest value of each number of a table, far beyond any robot of this size."""
 
 
-class _Positive(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Numbers that must be finite and above zero (those in MAY_BE_ZERO: not below; those in WITHIN: in a range)."""
+class _Bounded(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that lie in their ranges, WITHIN.
+
+    With them what follows is finite, and speeds, currents and places are within those that a saved world may have.
+    """
+
+    WITHIN: ClassVar[Ranges] = {}
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
+        for name, (low, high) in self.WITHIN.items():
             value = getattr(self, name)
-            if value is None or isinstance(value, msgspec.Struct | bool):
-                continue
-            if name in WITHIN:
-                low, high = WITHIN[name]
-                if not low <= value <= high:
-                    raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
-                continue
-            zero_is_fine = name in MAY_BE_ZERO
-            limit = ("0 or above" if zero_is_fine else "above 0") + " and below 1e12"
-            if not (0.0 <= value < 1e12) or (value == 0 and not zero_is_fine):
-                raise ValueError(f"{name} must be {limit}, got {value!r}")
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
 
 
-class Motor(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Motor(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A DC motor with precious-metal commutation: Faulhaber 2224 006 SR."""
+
+    WITHIN: ClassVar[Ranges] = {
+        "resistance_ohm": (0.01, 1e3),
+        "inductance_h": (1e-9, 1.0),
+        "torque_constant_nm_a": (1e-5, 10.0),
+        "rotor_inertia_kg_m2": (1e-13, 1e-2),
+        "friction_nm": (0.0, 1.0),
+    }
 
     resistance_ohm: float = 1.94
     inductance_h: float = 45e-6
@@ -63,7 +50,7 @@ class Motor(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     friction_nm: float = 0.2e-3  # Coulomb, at the motor shaft: torque constant times 29 mA
 
 
-class Bridge(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Bridge(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """L298 with external fast diodes: total drop (source + sink) = drop_v + drop_ohm * |current|.
 
     The line goes through the sheet's typical saturations: source 1.35 V and sink 1.2 V at 1 A, 2.0 V and 1.7 V at 2 A.
@@ -74,6 +61,14 @@ class Bridge(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     within 2.5 % of that of the two switches one by one, from 4/128 on.
     """
 
+    WITHIN: ClassVar[Ranges] = {
+        "drop_v": (0.0, 10.0),
+        "drop_ohm": (0.0, 1e3),
+        "diode_v": (0.0, 10.0),
+        "on_delay_s": (0.0, 20e-6),
+        "off_delay_s": (0.0, 20e-6),
+    }
+
     drop_v: float = 1.4
     drop_ohm: float = 1.15  # 2.55 V at 1 A, 3.7 V at 2 A
     diode_v: float = 1.0  # each of the two that conduct
@@ -81,15 +76,35 @@ class Bridge(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     off_delay_s: float = 2.6e-6
 
 
-class Battery(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Battery(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Six NiCd cells. Each motor sees the internal resistance by itself (no mutual sag)."""
+
+    WITHIN: ClassVar[Ranges] = {
+        "voltage_v": (1e-3, 100.0),
+        "resistance_ohm": (1e-9, 1e3),
+    }
 
     voltage_v: float = 7.2
     resistance_ohm: float = 0.15
 
 
-class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Chassis(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Two driven wheels on one axle through the centre of mass, two low-friction skids."""
+
+    WITHIN: ClassVar[Ranges] = {
+        "mass_kg": (1e-3, 1e3),
+        "yaw_inertia_kg_m2": (1e-6, 1e3),
+        "track_m": (1e-3, 10.0),
+        "wheel_radius_m": (1e-3, 1.0),
+        "left_radius_factor": (0.1, 10.0),
+        "right_radius_factor": (0.1, 10.0),
+        "gear_ratio": (0.1, 1e3),
+        "gear_efficiency": (0.01, 1.0),
+        "rolling_resistance": (0.0, 10.0),
+        "stiction_ratio": (1.0, 10.0),
+        "gear_backlash_rad": (0.0, 0.2),
+        "gear_load_friction": (0.0, 0.5),
+    }
 
     mass_kg: float = 0.5
     yaw_inertia_kg_m2: float = 4.7e-4  # 0.5 kg * (0.075**2 + 0.075**2) / 12
@@ -107,38 +122,62 @@ class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     )
 
 
-class OpticalEncoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class OpticalEncoder(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line.
 
     With `index_pulse` it has a third channel, low for the one count in a turn that begins it (A = B = 0 there).
     """
 
+    WITHIN: ClassVar[Ranges] = {
+        "lines": (16, 100_000),
+    }
+
     lines: int = 512
     index_pulse: bool = False
 
 
-class Tyre(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Tyre(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
+
+    WITHIN: ClassVar[Ranges] = {
+        "grip": (0.01, 10.0),
+    }
 
     grip: float | None = None  # coefficient of friction; rubber on a painted board about 0.8
 
 
-class RollingBall(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RollingBall(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The ball that the robot rests on beside its wheels (paper, section V-A): friction against its way on the ground.
 
     It carries `load_share` of the weight, which the wheels then do not press with. 0.03 m and a fifth: chosen.
     """
+
+    WITHIN: ClassVar[Ranges] = {
+        "friction": (0.0, 10.0),
+        "load_share": (0.0, 0.9),
+        "behind_m": (-0.1, 0.1),
+    }
 
     friction: float = 0.0  # force / load of the ball, whichever way it goes
     load_share: float = 0.2
     behind_m: float = 0.03  # behind the axle, on the middle line; negative: in front
 
 
-class Disturbance(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Disturbance(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A force along the robot's axis (forward) and a yaw torque (counter-clockwise) on its body.
 
     Added up: a constant, a sine from tick 0 on, and noise, which is drawn again every period within +- the bound.
     """
+
+    WITHIN: ClassVar[Ranges] = {
+        "force_n": (-5.0, 5.0),
+        "torque_nm": (-0.1, 0.1),
+        "sine_force_n": (0.0, 5.0),
+        "sine_torque_nm": (0.0, 0.1),
+        "noise_force_n": (0.0, 5.0),
+        "noise_torque_nm": (0.0, 0.1),
+        "period_s": (0.001, 3600.0),
+    }
 
     force_n: float = 0.0
     torque_nm: float = 0.0
@@ -153,7 +192,7 @@ class Disturbance(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return any(getattr(self, name) for name in self.__struct_fields__ if name != "period_s")
 
 
-class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DriveParams(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything `DifferentialDrive` needs to know about a robot."""
 
     motor: Motor = Motor()
@@ -191,6 +230,11 @@ class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """No-load speed of the faster wheel at full battery: no robot drives faster by itself."""
         motor_rad_s = self.battery.voltage_v / self.motor.torque_constant_nm_a
         return motor_rad_s / self.chassis.gear_ratio * max(self.radius_m(0), self.radius_m(1))
+
+    def motor_s(self) -> float:
+        """Mechanical time constant of a motor alone, shorted through battery and diodes: the shortest it has."""
+        motor, ohm = self.motor, self.motor.resistance_ohm + self.battery.resistance_ohm
+        return motor.rotor_inertia_kg_m2 * ohm / (motor.torque_constant_nm_a * motor.torque_constant_nm_a)
 
     def counts_per_radian(self) -> float:
         """Encoder counts per radian of the motor shaft."""

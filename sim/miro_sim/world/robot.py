@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
-from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
 from miro_host.plugins import PluginError
@@ -60,10 +59,7 @@ class Robot:
         except PluginError as error:
             raise self._named(error, 0) from error
         noise = Stream(seed, f"{name}/disturbance")
-        try:
-            self.drive = drive_for(spec, start, Stream(seed, f"{name}/wheels"), noise)
-        except ArithmeticError as error:  # what follows from the parameters divides by zero
-            raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error
+        self.drive = drive_for(spec, start, Stream(seed, f"{name}/wheels"), noise)
         strap = spec.slot if spec.strap is None else spec.strap
         self.board = Board(load_wiring(), self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault)
         self.log = RobotLog(self.board.log, network, spec.slot)

@@ -191,8 +191,8 @@ def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
     code, out, err = mirotwin(*words)
     assert (code, out) == (2, "")
     assert err == (
-        "mirotwin: error: far.toml: cannot be run: net0/robot2: its drive parameters lead to a value that is not"
-        " finite; the parameters are far outside those of a real robot\n"
+        "mirotwin: error: far.toml: network[0].robot[1].drive.chassis.track_m: 1e-200 is out of range; must be 0.001"
+        " to 10 in metres\n"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
 

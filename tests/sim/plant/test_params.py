@@ -1,13 +1,23 @@
 """Drive parameters: figures that must close on themselves, and refusals."""
 
 import math
+from pathlib import Path
 
 import msgspec
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
-from miro_sim.plant.params import Battery, Chassis, DriveParams, Motor, OpticalEncoder
+from miro_sim.plant import params
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor, OpticalEncoder, Tyre
+from miro_sim.scenario.keys import MAX_COUNTS_PER_S, MIN_MOTOR_S
+from tests.sim.plant.runs import pwm
 
 PARAMS = DriveParams()
+TABLES = [
+    Tyre(grip=1.0) if name == "tyre" else getattr(PARAMS, name) for name in DriveParams.__struct_fields__
+]
 
 
 def test_catalogue_figures_follow_from_the_motor_constants():
@@ -38,11 +48,62 @@ def test_each_wheel_has_its_own_radius():
 @pytest.mark.parametrize(
     ("kind", "field", "value"),
     [(Motor, "inductance_h", 0.0), (Battery, "voltage_v", -7.2), (Chassis, "mass_kg", math.nan)]
-    + [(Chassis, "rolling_resistance", -0.1), (OpticalEncoder, "lines", 0)],
+    + [(Chassis, "rolling_resistance", -0.1), (OpticalEncoder, "lines", 0)]
+    + [(Motor, "resistance_ohm", 1e-300), (Chassis, "gear_ratio", 1e300), (Chassis, "wheel_radius_m", 1e9)],
 )
-def test_impossible_figures_are_refused_by_name(kind, field, value):
-    with pytest.raises(ValueError, match=f"{field} must be .* got"):
+def test_impossible_figures_are_refused_by_name_and_range(kind, field, value):
+    with pytest.raises(ValueError, match=f"{field} must be .* to .*, got"):
         kind(**{field: value})
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: type(table).__name__)
+def test_every_number_has_a_range_whose_ends_are_in_it(table):
+    numbers = {name for name in table.__struct_fields__ if not isinstance(getattr(table, name), bool)}
+    assert table.WITHIN.keys() == numbers
+    for name, (low, high) in table.WITHIN.items():
+        for end in (low, high):
+            assert getattr(type(table)(**{name: end}), name) == end
+        for beyond in (low - 0.01 * abs(high), high * 1.01):
+            with pytest.raises(ValueError, match=f"{name} must be"):
+                type(table)(**{name: beyond})
+
+
+def test_the_readme_has_every_range():
+    page = (Path(params.__file__).parent / "README.md").read_text(encoding="utf-8")
+    for table in (Motor, Bridge, Battery, Chassis, OpticalEncoder):
+        for name, (low, high) in table.WITHIN.items():
+            assert f"`{name}` {low:g} to {high:g}" in page
+
+
+@st.composite
+def drives(draw):
+    """A drive with figures anywhere in their ranges, evenly by their logarithm, that a scenario may have."""
+    tables = {}
+    for name, kind in (("motor", Motor), ("battery", Battery), ("chassis", Chassis)):
+        keys = {}
+        for key in draw(st.sets(st.sampled_from(sorted(kind.WITHIN)))):
+            low, high = kind.WITHIN[key]
+            low = low or 1e-6
+            keys[key] = min(low * (high / low) ** draw(st.floats(0.0, 1.0)), high)
+        tables[name] = kind(**keys)
+    drive = DriveParams(**tables)
+    assume(drive.motor_s() >= MIN_MOTOR_S)
+    assume(
+        drive.battery.voltage_v / drive.motor.torque_constant_nm_a * drive.counts_per_radian()
+        <= MAX_COUNTS_PER_S
+    )
+    return drive
+
+
+@given(drives())
+def test_no_shaft_that_is_driven_turns_faster_than_twice_its_speed_without_load(params):
+    """So a step has few encoder edges, whatever the figures. Twice: with a large inductance speed overshoots."""
+    drive = DifferentialDrive(params)
+    most = 2.0 * params.battery.voltage_v / params.motor.torque_constant_nm_a
+    for _ in range(300):
+        pwm(drive, 128, -128, 1)
+        assert abs(drive.body.left_rad_s) <= most
+        assert abs(drive.body.right_rad_s) <= most
 
 
 def test_an_unknown_key_is_refused_with_its_path():
