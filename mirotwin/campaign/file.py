@@ -27,7 +27,6 @@ network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path, PurePath
@@ -39,7 +38,7 @@ from msgspec import Meta
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
-from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables
+from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign import builtin
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
@@ -50,13 +49,6 @@ MOST_RUNS = 1_000_000_000
 SCENARIO, FIRMWARE = "scenario", "firmware"
 NOT_VARIED = ("name", "title", "network", "step", "expect", "seed")
 """Keys of a scenario that are no factor by themselves."""
-_TYPES = {
-    "array": "a list",
-    "object": "a table",
-    "str": "a string",
-    "float": "a number",
-    "int": "a whole number",
-}
 
 
 class Random(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -128,11 +120,9 @@ class _File:
         try:
             raw = tables(text)
             check_numbers(raw)
-            found = msgspec.convert(raw, Document)
+            found = struct_of(raw, Document)
         except TomlError as error:
             self.refuse(f"{error.place}", error.what, error.remedy)
-        except msgspec.ValidationError as error:
-            self._refuse_value(str(error))
         settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
         settings += [
             (f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()
@@ -145,22 +135,6 @@ class _File:
             allowed_failed_share=found.allowed_failed_share,
             design=self._design(found),
         )
-
-    def _refuse_value(self, message: str) -> NoReturn:
-        """What msgspec found, in the words of the file."""
-        what, _, place = message.partition(" - at `$")
-        place = place.strip("`.")
-        unknown = re.fullmatch(r"Object contains unknown field `(.*)`", what)
-        if unknown:
-            self.refuse(".".join(filter(None, (place, unknown[1]))), "unknown key", "remove it")
-        missing = re.fullmatch(r"Object missing required field `(.*)`", what)
-        if missing:
-            self.refuse(".".join(filter(None, (place, missing[1]))), "this key is missing", "add it")
-        wrong = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
-        if wrong:
-            want = " or ".join(_TYPES.get(name, name) for name in wrong[1].split(" | ") if name != "null")
-            what = f"expected {want}, got {_TYPES.get(wrong[2], wrong[2])}"
-        self.refuse(place, what[:1].lower() + what[1:])
 
     def beside(self, name: str) -> str:
         """The path of a scenario that the file names; a name without separator or suffix is a built-in one."""

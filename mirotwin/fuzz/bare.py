@@ -18,6 +18,7 @@ from miro_host.raised import at_place, defined_at, raised, raised_at
 from miro_host.raised import described as described_error
 from miro_protocol.actions import ScriptItem
 from miro_protocol.protocol import Damage, Frame, Protocol
+from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import Transmission
 from miro_robot.bare.machine import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
@@ -56,10 +57,10 @@ def protocol_named(text: str) -> Protocol:
         form = "write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"
         raise BadInput("", OPTION, f"{parameters!r} are no parameters", form) from None
     try:
-        return msgspec.convert(given, found)
-    except msgspec.ValidationError as error:
+        return struct_of(given, found)
+    except TomlError as error:
         keys = ", ".join(field.name for field in msgspec.structs.fields(found)) or "no parameters"
-        raise BadInput("", OPTION, f"{text}: {error}", f"{name} has {keys}") from None
+        raise BadInput("", OPTION, f"{text}: {error.place}: {error.what}", f"{name} has {keys}") from None
     except (Exception, SystemExit) as error:  # from the protocol's own check of its parameters
         what = f"{text}: cannot check its parameters: {raised(error)}"
         raise BadInput("", OPTION, what, "repair the protocol") from error

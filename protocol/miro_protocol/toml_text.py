@@ -3,7 +3,9 @@
 import math
 import re
 import tomllib
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 from miro_exact.bad_input import BadInput
 
@@ -16,6 +18,16 @@ whole file of such keys takes it 2.5 s.
 LONGEST_BITS = 1024
 """Beyond it an integer is beyond every float, too. `tomllib` reads longer ones in hex, which Python does not show."""
 
+T = TypeVar("T")
+TYPE_NAMES = {
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "str": "a string",
+    "array": "a list",
+    "object": "a table",
+}
+"""What msgspec calls types, in the words of TOML."""
 _KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
 _PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
@@ -83,6 +95,36 @@ def check_numbers(value: Any, path: str = "") -> None:
     elif isinstance(value, list):
         for index, inner in enumerate(value):
             check_numbers(inner, f"{path}[{index}]")
+
+
+def struct_of(table: Any, kind: type[T]) -> T:
+    """The struct that a table says. Raises TomlError with the key."""
+    try:
+        return msgspec.convert(table, kind)
+    except msgspec.ValidationError as error:
+        raise _misfit(f"{error}") from None
+
+
+def _misfit(message: str) -> TomlError:
+    """What msgspec found, in the words of the file."""
+    found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
+    assert found is not None
+    what, path = found[1], found[2] or ""
+    field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", what)
+    if field is not None:
+        place = f"{path}.{field[2]}" if path else field[2]
+        if field[1] == "missing required":
+            return TomlError("this key is missing", "add it", place)
+        return TomlError("unknown key", "remove or correct it", place)
+    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
+    if limit is not None:
+        return TomlError("is out of range", f"must be {limit[1]} {limit[2]}", path)
+    wrong = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+    if wrong is not None:
+        wanted = " or ".join(TYPE_NAMES.get(name, name) for name in wrong[1].split(" | ") if name != "null")
+        what = f"expected {wanted}, got {TYPE_NAMES.get(wrong[2], wrong[2])}"
+    what, _, remedy = what.replace("`", "").partition("; ")
+    return TomlError(what[:1].lower() + what[1:], remedy or "mend the value", path)
 
 
 def without_none(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,7 +9,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import EYE_BYTES, InputError, read_input
-from miro_protocol.toml_text import TomlError, check_numbers, tables, without_none
+from miro_protocol.toml_text import TomlError, check_numbers, struct_of, tables, without_none
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -49,11 +48,11 @@ def of_table(table: dict[str, Any], kind: type[T], origin: str) -> T:
     """The struct in a table that TOML text gave. Raises EyeError as `parse` does."""
     try:
         check_numbers(table)
-        return msgspec.convert(table, kind)
+        return struct_of(table, kind)
     except TomlError as error:
-        raise EyeError(origin, error.place, error.what, error.remedy) from None
-    except msgspec.ValidationError as error:
-        raise _explained(f"{error}", kind, origin) from None
+        top = error.what == "unknown key" and "." not in f"{error.place}"
+        keys = f"; the keys are {', '.join(kind.__struct_fields__)}" if top else ""
+        raise EyeError(origin, error.place, error.what, error.remedy + keys) from None
 
 
 def text(struct: msgspec.Struct) -> str:
@@ -61,19 +60,3 @@ def text(struct: msgspec.Struct) -> str:
     import tomli_w  # only who writes a file needs it
 
     return tomli_w.dumps(without_none(msgspec.to_builtins(struct)))
-
-
-def _explained(message: str, kind: type[msgspec.Struct], origin: str) -> EyeError:
-    """What msgspec found, as an error that names key and remedy."""
-    match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
-    assert match is not None
-    what, path = match[1], match[2] or ""
-    inner = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", what)
-    if inner is None:
-        what, _, remedy = what.partition("; ")
-        return EyeError(origin, path, what.replace("`", ""), remedy or "mend the value")
-    place = f"{path}.{inner[2]}" if path else inner[2]
-    if inner[1] == "missing required":
-        return EyeError(origin, place, "this key is missing", "add it")
-    keys = "" if path else f"; the keys are {', '.join(kind.__struct_fields__)}"
-    return EyeError(origin, place, "unknown key", f"remove or correct it{keys}")

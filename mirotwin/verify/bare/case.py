@@ -30,6 +30,7 @@ import tomli_w
 from miro_exact.bad_input import BadInput, one_line
 from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
+from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.shell.firmware_image import load_firmware
@@ -178,10 +179,9 @@ def _line(case: stream.StreamFile) -> BareLine:
         remedy = "`mirotwin replay` plays what is for the robot"
         raise BadInput(case.source, "header", "says nothing of a bare processor", remedy)
     try:
-        line = msgspec.convert(case.header.bare, BareLine)
-    except (msgspec.ValidationError, ValueError) as error:
-        remedy = "give crystal_hz and bit_ticks as whole numbers"
-        raise BadInput(case.source, "header: bare", str(error), remedy) from None
+        line = struct_of(case.header.bare, BareLine)
+    except TomlError as error:
+        raise BadInput(case.source, f"header: bare.{error.place}", error.what, error.remedy) from None
     if not line.bit_ticks:
         raise BadInput(case.source, "header: bare", "says no bit_ticks", "give the length of a bit")
     return line

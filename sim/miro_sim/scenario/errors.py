@@ -8,6 +8,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.plugins import PluginError
+from miro_protocol import toml_text
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.plugins import REGISTRIES, struct_of
 
@@ -52,16 +53,7 @@ MORE_UNITS = (
     "uh",
     "mnm",
 )
-TYPE_NAMES = {
-    "float": "a number",
-    "int": "a whole number",
-    "bool": "true or false",
-    "str": "a string",
-    "array": "an array of tables",
-    "object": "a table",
-}
-
-
+TYPE_NAMES = {**toml_text.TYPE_NAMES, "array": "an array of tables"}
 PARTS_OF_A_ROBOT = ("reference", "controller")
 """Tables that every robot of a scenario needs."""
 FILE_KEYS = ("scenario", "set", "variant")

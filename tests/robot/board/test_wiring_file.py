@@ -21,18 +21,20 @@ def made(folder, text):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
+    ("key", "value", "limit"),
     [
-        ("address", "0x10000"),
-        ("address", "-1"),
-        ("address", "9" * 30),
-        ("mask", "0x10000"),
-        ("initial", "256"),
+        ("address", "0x10000", "<= 65535"),
+        ("address", "-1", ">= 0"),
+        ("address", "9" * 30, "<= 65535"),
+        ("mask", "0x10000", "<= 65535"),
+        ("initial", "256", "<= 255"),
     ],
 )
-def test_a_number_that_no_bus_has_is_refused(tmp_path, key, value):
+def test_a_number_that_no_bus_has_is_refused(tmp_path, key, value, limit):
     made(tmp_path, MIRO + LATCH.format(**SOUND))
-    with pytest.raises(WiringError, match=r"board\.toml: Expected `int`|too large|not in range|int. out of"):
+    with pytest.raises(
+        WiringError, match=rf"board\.toml: latch\[0\].{key}: is out of range; must be {limit}"
+    ):
         made(tmp_path, MIRO + LATCH.format(**{**SOUND, key: value}))
 
 

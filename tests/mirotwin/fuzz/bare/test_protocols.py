@@ -31,7 +31,7 @@ def test_ours_by_name_with_parameters():
     ("text", "said"),
     [
         ("mire", "'mire' is not one of the choices; did you mean miro?"),
-        ("miro:robots=4", "miro:robots=4: Invalid enum value 4 - at `$.robots`; miro has robots"),
+        ("miro:robots=4", "miro:robots=4: robots: invalid enum value 4; miro has robots"),
         ("miro:robots", "'robots' are no parameters; write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"),
         ("miro:rate=1", "miro:rate=1: Object contains unknown field `rate`"),
         ("", "'' is not one of the choices"),

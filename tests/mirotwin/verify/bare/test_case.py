@@ -106,7 +106,11 @@ def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
         ("#: [bare]", "#: [set]", "says nothing of a bare processor"),
         ("bit_ticks = 1152", "bit_ticks = 1", "a bit of 1 ticks is outside 32..24000000"),
         ("bit_ticks = 1152", "", "says no bit_ticks; give the length of a bit"),
-        ("bit_ticks = 1152", 'bit_ticks = "x"', "Expected `int`, got `str`"),
+        (
+            "bit_ticks = 1152",
+            'bit_ticks = "x"',
+            "header: bare.bit_ticks: expected a whole number, got a string; mend the value",
+        ),
         ("crystal_hz = 24000000", "crystal_hz = 5", "crystal 5 Hz is outside"),
         ("begin_tick = ", "begin_tick = -1", "begin_tick -1"),
         ("no_fault = true", "no_fault = true\n#: never_sleeps = true", "a case has one check"),
