@@ -22,7 +22,7 @@ cdef class Core:
     cdef public int bank
     cdef readonly long long cycles
     cdef readonly long long start
-    cdef readonly int at
+    cdef readonly long long at
     cdef long long limit
     cdef long long until
     cdef int stop

@@ -59,7 +59,7 @@ class Core:
         self.lines = [0] * 65536  # per address: `line_at`, or a special line
         self.line_of = list(LINE)
         self.iram = bytearray(256)
-        self.pc = 0
+        self.pc = 0  # while instructions are executed: as of the last `boundary`
         self.a = 0
         self.b = 0
         self.sp = 7
@@ -75,7 +75,7 @@ class Core:
         self.limit = 0  # cycle at which the loop has to look up
         self.until = 0
         self.stop = 0
-        self.instructions = 0
+        self.instructions = 0  # as of the last run
         self.idle_cycles = 0
         self.faults = 0
         self.edges = memoryview(bytearray(1))
@@ -138,9 +138,9 @@ class Core:
                 self.edge_before = self.edge_outer[self.edge_depth]
 
     def line_at(self, address: int) -> int:
-        """`LINE` of the opcode at `address` and, in the upper half, the address after its instruction."""
+        """Row and cycles of the opcode at `address` and, in the upper half, the address after its instruction."""
         line = self.line_of[self.rom[address]]
-        return line | ((address + (line >> 13)) & 0xFFFF) << 16
+        return line & 0x07FF | ((address + (line >> 13)) & 0xFFFF) << 16
 
     # Hooks: what `Cpu` adds to the bare instructions
 

@@ -9,7 +9,7 @@ cdef int _OUTSIDE
 cdef int _MARK
 cdef int _STOP_REQUESTED, _REPLAN
 cdef int _WIRE_FULL
-cdef int _P0, _SP, _PCON, _IE, _IP, _PSW
+cdef int _P0, _PCON, _IE, _IP
 cdef int _SMOD, _PD, _IDL
 cdef int _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES
@@ -80,13 +80,9 @@ cdef class Cpu(Executor):
     @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1
     @cython.final
-    cdef int _other_register(self, int address, long long cycle) except -1
+    cdef inline int _other_register(self, int address, long long cycle) except -1
     @cython.locals(value=int, port=int)
     cdef int write_sfr_bit(self, int address, int mask, int level) except -1
-    @cython.locals(folded=int, parity=int)
-    cpdef int psw(self) noexcept
-    @cython.final
-    cdef int write_psw(self, int value) except -1
     @cython.final
     cdef int write_pcon(self, int value) except -1
     @cython.final

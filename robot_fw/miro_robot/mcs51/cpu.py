@@ -51,7 +51,7 @@ _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark ou
 _MARK = 0x1000
 _STOP_REQUESTED = 1
 _WIRE_FULL = WIRE_FULL
-_P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
+_P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
@@ -360,7 +360,7 @@ class Cpu(Executor):
         self.start = self.cycles
         self.at = self.pc
         self.cycles += 2
-        self.call(8 * source + 3)
+        self.pc = self.call(self.pc, 8 * source + 3)
         self._expect(self.cycles)
 
     def end_of_interrupt(self) -> None:
@@ -382,17 +382,11 @@ class Cpu(Executor):
 
     def register(self, address: int, cycle: int) -> int:
         """A register, ports at their latches, with everything below `cycle` done."""
-        value = self.working_register(address)
+        value = self.core_register(address)
         return value if value >= 0 else self._other_register(address, cycle)
 
     def _other_register(self, address: int, cycle: int) -> int:
-        if address == _PSW:
-            return self.psw()
-        if address == _SP:
-            return self.sp
-        if address == _PCON:
-            return self.pcon
-        return self.peripherals.read(address, cycle)
+        return self.pcon if address == _PCON else self.peripherals.read(address, cycle)
 
     def read_sfr(self, address: int) -> int:
         if address & 0xCF == 0x80:
@@ -409,15 +403,11 @@ class Cpu(Executor):
             value = self.peripherals.ports.latches[port]
             self.write_port(port, value | mask if level else value & (0xFF ^ mask))
         else:
-            value = self.register(address, self.cycles)
-            self.write(address, value | mask if level else value & (0xFF ^ mask))
+            value = self._other_register(address, self.cycles)
+            self.write_sfr(address, value | mask if level else value & (0xFF ^ mask))
 
     def write_sfr(self, address: int, value: int) -> None:
-        if address == _PSW:
-            self.write_psw(value)
-        elif address == _SP:
-            self.set_sp(value)
-        elif address == _PCON:
+        if address == _PCON:
             self.write_pcon(value)
         elif address & 0xCF == 0x80:
             self.write_port((address - _P0) >> 4, value)
@@ -428,19 +418,6 @@ class Cpu(Executor):
                 self._block()
             elif sooner:
                 self._expect(self.cycles)
-
-    def psw(self) -> int:
-        """P is the parity of ACC, whatever was written."""
-        folded = self.a ^ (self.a >> 4)
-        parity = (0x6996 >> (folded & 0x0F)) & 1
-        return (self.cy << 7) | (self.ac << 6) | self.user_flags | self.bank | (self.ov << 2) | parity
-
-    def write_psw(self, value: int) -> None:
-        self.cy = value >> 7
-        self.ac = (value >> 6) & 1
-        self.ov = (value >> 2) & 1
-        self.bank = value & 0x18
-        self.user_flags = value & 0x22
 
     def write_pcon(self, value: int) -> None:
         """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""

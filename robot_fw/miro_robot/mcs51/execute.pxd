@@ -13,7 +13,7 @@ cdef class Executor(Core):
     @cython.locals(stopped=int)
     cpdef int run(self, long long until_cycle) except -1
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
-                   pc=Py_ssize_t, line='unsigned int', row=int, op=int, first=int, second=int, address=int, value=int)
+                   pc='long long', line='unsigned int', row=int, op=int, first=int, second=int, address=int, value=int)
     cpdef int go_on(self, long long until_cycle) except -1
 
     @cython.final
@@ -22,9 +22,13 @@ cdef class Executor(Core):
     @cython.locals(value=int)
     cdef int read_register(self, int address) except -1
     @cython.final
-    cdef inline int working_register(self, int address) noexcept
+    cdef inline int core_register(self, int address) noexcept
     @cython.final
     cdef int write_register(self, int address, int value) except -1
+    @cython.locals(folded=int, parity=int)
+    cpdef int psw(self) noexcept
+    @cython.final
+    cdef void write_psw(self, int value) noexcept
     @cython.final
     cdef inline int read_latched(self, int address) except -1
     @cython.final
@@ -39,13 +43,14 @@ cdef class Executor(Core):
     @cython.locals(address=int, kept=int)
     cdef inline int write_bit(self, int bit, int level) except -1
     @cython.final
-    cdef inline int jump(self, int target) noexcept
+    @cython.locals(value=int)
+    cdef int write_register_bit(self, int address, int mask, int level) except -1
     @cython.final
-    cdef inline int branch(self, int offset) noexcept
+    cdef inline int branch(self, int pc, int offset) noexcept
     @cython.final
     cdef inline int fork(self, int target) noexcept
     @cython.final
-    cdef inline int call(self, int target) except -1
+    cdef inline int call(self, int pc, int target) except -1
     @cython.final
     cdef inline int claim(self) except -1
     @cython.final
@@ -61,7 +66,7 @@ cdef class Executor(Core):
     @cython.locals(a=int, total=int)
     cdef inline void subtract(self, int operand) noexcept
     @cython.final
-    cdef inline int compare(self, int left, int right, int offset) noexcept
+    cdef inline int compare(self, int pc, int left, int right, int offset) noexcept
     @cython.final
     @cython.locals(quotient=int)
     cdef inline void divide(self) noexcept

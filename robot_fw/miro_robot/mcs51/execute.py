@@ -53,6 +53,7 @@ class Executor(Core):
         count = self.instructions
         while True:
             if now >= self.limit:
+                self.pc = pc
                 if self.boundary():
                     break
                 now = self.cycles
@@ -70,19 +71,17 @@ class Executor(Core):
                 self.fault(_OUTSIDE_IMAGE)
                 line = self.line_at(pc)
             pc = line >> 16
-            self.pc = pc
             self.start = now
-            now += (line >> 8) & 7
+            now += (line >> 8) & 0xFF
             self.cycles = now
             count += 1
-            self.instructions = count
             row = line & 0xFF
             if row == 0x00:  # NOP
                 pass
             elif row == 0x01:  # AJMP addr11
-                pc = self.jump((pc & 0xF800) | ((op & 0xE0) << 3) | first)
+                pc = (pc & 0xF800) | ((op & 0xE0) << 3) | first
             elif row == 0x02:  # LJMP addr16
-                pc = self.jump((first << 8) | second)
+                pc = (first << 8) | second
             elif row == 0x03:  # RR A
                 self.a = (self.a >> 1) | ((self.a & 1) << 7)
             elif row == 0x04:  # INC A
@@ -97,11 +96,11 @@ class Executor(Core):
             elif row == 0x10:  # JBC bit,rel
                 if self.latched_bit(first):
                     self.write_bit(first, 0)
-                    pc = self.branch(second)
+                    pc = self.branch(pc, second)
             elif row == 0x11:  # ACALL addr11
-                pc = self.call((pc & 0xF800) | ((op & 0xE0) << 3) | first)
+                pc = self.call(pc, (pc & 0xF800) | ((op & 0xE0) << 3) | first)
             elif row == 0x12:  # LCALL addr16
-                pc = self.call((first << 8) | second)
+                pc = self.call(pc, (first << 8) | second)
             elif row == 0x13:  # RRC A
                 value = self.a
                 self.a = (value >> 1) | (self.cy << 7)
@@ -117,10 +116,10 @@ class Executor(Core):
                 iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] - 1) & 0xFF
             elif row == 0x20:  # JB bit,rel
                 if self.read_bit(first):
-                    pc = self.branch(second)
+                    pc = self.branch(pc, second)
             elif row == 0x22:  # RET
                 value = self.pop() << 8
-                pc = self.jump(value | self.pop())
+                pc = value | self.pop()
             elif row == 0x23:  # RL A
                 self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
             elif row == 0x24:  # ADD A,#imm
@@ -133,10 +132,10 @@ class Executor(Core):
                 self.add(iram[self.bank + (op & 7)], 0)
             elif row == 0x30:  # JNB bit,rel
                 if not self.read_bit(first):
-                    pc = self.branch(second)
+                    pc = self.branch(pc, second)
             elif row == 0x32:  # RETI
                 value = self.pop() << 8
-                pc = self.jump(value | self.pop())
+                pc = value | self.pop()
                 self.end_of_interrupt()
             elif row == 0x33:  # RLC A
                 value = self.a
@@ -153,7 +152,7 @@ class Executor(Core):
                 self.add(iram[self.bank + (op & 7)], self.cy)
             elif row == 0x40:  # JC rel
                 if self.cy:
-                    pc = self.branch(first)
+                    pc = self.branch(pc, first)
             elif row == 0x42:  # ORL dir,A
                 self.write(first, self.read_latched(first) | self.a)
             elif row == 0x43:  # ORL dir,#imm
@@ -168,7 +167,7 @@ class Executor(Core):
                 self.a |= iram[self.bank + (op & 7)]
             elif row == 0x50:  # JNC rel
                 if not self.cy:
-                    pc = self.branch(first)
+                    pc = self.branch(pc, first)
             elif row == 0x52:  # ANL dir,A
                 self.write(first, self.read_latched(first) & self.a)
             elif row == 0x53:  # ANL dir,#imm
@@ -183,7 +182,7 @@ class Executor(Core):
                 self.a &= iram[self.bank + (op & 7)]
             elif row == 0x60:  # JZ rel
                 if self.a == 0:
-                    pc = self.branch(first)
+                    pc = self.branch(pc, first)
             elif row == 0x62:  # XRL dir,A
                 self.write(first, self.read_latched(first) ^ self.a)
             elif row == 0x63:  # XRL dir,#imm
@@ -198,7 +197,7 @@ class Executor(Core):
                 self.a ^= iram[self.bank + (op & 7)]
             elif row == 0x70:  # JNZ rel
                 if self.a != 0:
-                    pc = self.branch(first)
+                    pc = self.branch(pc, first)
             elif row == 0x72:  # ORL C,bit
                 self.cy |= self.read_bit(first)
             elif row == 0x73:  # JMP @A+DPTR
@@ -212,7 +211,7 @@ class Executor(Core):
             elif row == 0x78:  # MOV Rn,#imm
                 iram[self.bank + (op & 7)] = first
             elif row == 0x80:  # SJMP rel
-                pc = self.branch(first)
+                pc = self.branch(pc, first)
             elif row == 0x82:  # ANL C,bit
                 self.cy &= self.read_bit(first)
             elif row == 0x83:  # MOVC A,@A+PC
@@ -266,14 +265,14 @@ class Executor(Core):
             elif row == 0xB3:  # CPL C
                 self.cy ^= 1
             elif row == 0xB4:  # CJNE A,#imm,rel
-                pc = self.compare(self.a, first, second)
+                pc = self.compare(pc, self.a, first, second)
             elif row == 0xB5:  # CJNE A,dir,rel
                 value = self.read(first)
-                pc = self.compare(self.a, value, second)
+                pc = self.compare(pc, self.a, value, second)
             elif row == 0xB6:  # CJNE @Ri,#imm,rel
-                pc = self.compare(iram[iram[self.bank + (op & 1)]], first, second)
+                pc = self.compare(pc, iram[iram[self.bank + (op & 1)]], first, second)
             elif row == 0xB8:  # CJNE Rn,#imm,rel
-                pc = self.compare(iram[self.bank + (op & 7)], first, second)
+                pc = self.compare(pc, iram[self.bank + (op & 7)], first, second)
             elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one (C4)
                 self.claim()
                 value = self.read(first)
@@ -311,7 +310,7 @@ class Executor(Core):
                 value = (self.read_latched(first) - 1) & 0xFF
                 self.write(first, value)
                 if value:
-                    pc = self.branch(second)
+                    pc = self.branch(pc, second)
             elif row == 0xD6:  # XCHD A,@Ri
                 address = iram[self.bank + (op & 1)]
                 value = iram[address]
@@ -321,7 +320,7 @@ class Executor(Core):
                 value = (iram[self.bank + (op & 7)] - 1) & 0xFF
                 iram[self.bank + (op & 7)] = value
                 if value:
-                    pc = self.branch(first)
+                    pc = self.branch(pc, first)
             elif row == 0xE0:  # MOVX A,@DPTR
                 self.a = self.movx_read(self.dptr)
             elif row == 0xE2:  # MOVX A,@Ri
@@ -346,6 +345,8 @@ class Executor(Core):
                 iram[iram[self.bank + (op & 1)]] = self.a
             elif row == 0xF8:  # MOV Rn,A
                 iram[self.bank + (op & 7)] = self.a
+        self.pc = pc
+        self.instructions = count
         return self.stop
 
     # Addressing
@@ -355,19 +356,23 @@ class Executor(Core):
         return self.iram[address] if address < 0x80 else self.read_register(address)
 
     def read_register(self, address: int) -> int:
-        value = self.working_register(address)
+        value = self.core_register(address)
         return value if value >= 0 else self.read_sfr(address)
 
-    def working_register(self, address: int) -> int:
-        """One of the registers that code uses most, -1 if it is another."""
+    def core_register(self, address: int) -> int:
+        """A register of the core itself, -1 if it is another."""
         if address == 0xE0:
             return self.a
-        if address == 0xF0:
-            return self.b
-        if address == 0x82:
+        elif address == 0xD0:
+            return self.psw()
+        elif address == 0x82:
             return self.dptr & 0xFF
-        if address == 0x83:
+        elif address == 0x83:
             return self.dptr >> 8
+        elif address == 0xF0:
+            return self.b
+        elif address == 0x81:
+            return self.sp
         return -1
 
     def read_latched(self, address: int) -> int:
@@ -383,14 +388,31 @@ class Executor(Core):
     def write_register(self, address: int, value: int) -> None:
         if address == 0xE0:
             self.a = value
-        elif address == 0xF0:
-            self.b = value
+        elif address == 0xD0:
+            self.write_psw(value)
         elif address == 0x82:
             self.dptr = (self.dptr & 0xFF00) | value
         elif address == 0x83:
             self.dptr = (self.dptr & 0x00FF) | (value << 8)
+        elif address == 0xF0:
+            self.b = value
+        elif address == 0x81:
+            self.set_sp(value)
         else:
             self.write_sfr(address, value)
+
+    def psw(self) -> int:
+        """P is the parity of ACC, whatever was written."""
+        folded = self.a ^ (self.a >> 4)
+        parity = (0x6996 >> (folded & 0x0F)) & 1
+        return (self.cy << 7) | (self.ac << 6) | self.user_flags | self.bank | (self.ov << 2) | parity
+
+    def write_psw(self, value: int) -> None:
+        self.cy = value >> 7
+        self.ac = (value >> 6) & 1
+        self.ov = (value >> 2) & 1
+        self.bank = value & 0x18
+        self.user_flags = value & 0x22
 
     def read_bit(self, bit: int) -> int:
         byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read(bit & 0xF8)
@@ -406,31 +428,36 @@ class Executor(Core):
             kept = self.iram[address] & (0xFF ^ (1 << (bit & 7)))
             self.iram[address] = kept | (level << (bit & 7))
         else:
-            self.write_sfr_bit(bit & 0xF8, 1 << (bit & 7), level)
+            self.write_register_bit(bit & 0xF8, 1 << (bit & 7), level)
+
+    def write_register_bit(self, address: int, mask: int, level: int) -> None:
+        """Only the one bit changes."""
+        value = self.core_register(address)
+        if value < 0:
+            self.write_sfr_bit(address, mask, level)
+        else:
+            self.write_register(address, value | mask if level else value & (0xFF ^ mask))
 
     # Flow
 
-    def jump(self, target: int) -> int:
-        """The new PC, which the loop keeps in a variable of its own; so do the others here."""
-        self.pc = target
-        return target
+    # The loop keeps PC in a variable of its own: these take the address after the instruction and give the new one.
 
-    def branch(self, offset: int) -> int:
-        return self.fork((self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
+    def branch(self, pc: int, offset: int) -> int:
+        return self.fork((pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
 
     def fork(self, target: int) -> int:
         """A jump that was a choice, or is as short as one."""
         if self.edge_mask:
             self.count_edge(target)
-        return self.jump(target)
+        return target
 
-    def call(self, target: int) -> int:
+    def call(self, pc: int, target: int) -> int:
         """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
         self.claim()
-        self.iram[self.sp] = self.pc & 0xFF
+        self.iram[self.sp] = pc & 0xFF
         self.claim()
-        self.iram[self.sp] = self.pc >> 8
-        return self.jump(target)
+        self.iram[self.sp] = pc >> 8
+        return target
 
     def claim(self) -> None:
         """SP counts up; a byte is about to be stored there."""
@@ -483,10 +510,10 @@ class Executor(Core):
         self.cy = total >> 8
         self.a = total & 0xFF
 
-    def compare(self, left: int, right: int, offset: int) -> int:
+    def compare(self, pc: int, left: int, right: int, offset: int) -> int:
         """CJNE: the new PC."""
         self.cy = 1 if left < right else 0
-        return self.pc if left == right else self.branch(offset)
+        return pc if left == right else self.branch(pc, offset)
 
     def divide(self) -> None:
         """Dividing by zero leaves A and B as they were (undefined on silicon: C3) and sets OV."""

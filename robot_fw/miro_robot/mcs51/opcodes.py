@@ -145,7 +145,7 @@ LENGTH = _by_opcode(5)
 CYCLES = _by_opcode(6)
 LINE = tuple(ROW[opcode] | CYCLES[opcode] << 8 | LENGTH[opcode] << 13 for opcode in range(256))
 """The same in one word, for the loop that executes them: bits 7:0 row, 10:8 cycles, 15:13 length. Bits 12:11 mark what
-is no opcode; in bits 31:16 the core puts the address after the instruction, so that the next fetch need not add."""
+is no opcode. The core keeps bits 12:0 for each address, and in bits 31:16 the address after the instruction."""
 _AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
 _SJMP = 0x80
 _LEAVING = (_LJMP, 0x22, 0x32, 0x73, _SJMP)  # and RET, RETI, JMP @A+DPTR
