@@ -50,13 +50,25 @@ _DECLARED = re.compile(r"^static (int|PY_LONG_LONG|double|[\w ]*__pyx_t_\w+) (__
 def constants(c: str) -> str:
     """C in which a `static int NAME;` that is set once, to a number, is `static int const NAME = NUMBER;`.
 
-    Cython makes variables of a module's typed names, which a compiler must load again and again. Text that is not as
-    Cython 3 writes it stays as it is: slower, the same bits.
+    Cython makes variables of a module's typed names, which a compiler must load again and again. Those that are set
+    together (`A, B = 1, 2`) go through temporaries. Text that is not as Cython 3 writes it stays as it is: slower, the
+    same bits.
     """
     for c_type, name in _DECLARED.findall(c):
-        settings = re.findall(rf"^  {name} = ({_NUMBER});\n", c, re.M)
+        settings = list(re.finditer(rf"^  {name} = ({_NUMBER}|__pyx_t_\d+);\n", c, re.M))
         if len(settings) != 1 or len(re.findall(rf"\b{name} = ", c)) != 1:
             continue
-        c = c.replace(f"static {c_type} {name};\n", f"static {c_type} const {name} = {settings[0]};\n")
-        c = c.replace(f"  {name} = {settings[0]};\n", "")
+        setting = settings[0]
+        number = _number(c[: setting.start()], setting[1])
+        if number:
+            c = c[: setting.start()] + c[setting.end() :]
+            c = c.replace(f"static {c_type} {name};\n", f"static {c_type} const {name} = {number};\n")
     return c
+
+
+def _number(before: str, value: str) -> str:
+    """The number that `value` is; that of a temporary was set last, within the statement. "" if it is none."""
+    if not value.startswith("__pyx_t_"):
+        return value
+    last = before.rpartition(f"  {value} = ")[2].partition(";")[0]
+    return last if re.fullmatch(_NUMBER, last) else ""
