@@ -11,6 +11,7 @@ cdef int _STOP_REQUESTED, _REPLAN
 cdef int _WIRE_FULL
 cdef int _P0, _PCON, _IE, _IP
 cdef int _SMOD, _PD, _IDL
+cdef int _HIGH
 cdef int _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES
 cdef int _FLOATING
@@ -75,7 +76,14 @@ cdef class Cpu(Executor):
     @cython.final
     cdef int _block(self) except -1
     @cython.final
+    @cython.locals(peripherals=Peripherals)
     cdef int _expect(self, long long earliest) except -1
+    @cython.final
+    @cython.locals(event='long long')
+    cdef inline long long _next_look(self) noexcept
+    @cython.final
+    @cython.locals(sooner=int)
+    cdef inline int _write_peripheral(self, int address, int value) except -1
     @cython.final
     @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1

@@ -53,6 +53,7 @@ _STOP_REQUESTED = 1
 _WIRE_FULL = WIRE_FULL
 _P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
+_HIGH = 2  # in `in_service`: a routine that nothing interrupts
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
 _FLOATING = 0xFF  # what an undriven external bus reads as (X4)
@@ -273,7 +274,7 @@ class Cpu(Executor):
 
     def begin_run(self) -> None:
         self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _NEVER
-        self.peripherals.serial_wait = -1  # more may have been put on RXD since the last run
+        self.peripherals.look_again()  # more may have been put on RXD since the last run
         self.next_event = 0
 
     def end_run(self) -> None:
@@ -297,9 +298,7 @@ class Cpu(Executor):
             return 1
         if now >= self.next_event and self._attend(now):
             return 0
-        event = self.next_event if self.next_event < self.until else self.until
-        if self.next_mark < event:
-            event = self.next_mark
+        event = self._next_look()
         if (self.idle or self.powered_down) and now < event:
             if self.stop_asleep and (self.powered_down or self.next_event >= _NEVER):
                 self.stop = ASLEEP
@@ -308,6 +307,11 @@ class Cpu(Executor):
             self.cycles = event
         self.limit = event
         return 0
+
+    def _next_look(self) -> int:
+        """The cycle in which a run that nobody stops looks up again."""
+        event = self.next_event if self.next_event < self.until else self.until
+        return event if event < self.next_mark else self.next_mark
 
     def _attend(self, now: int) -> int:
         """Everything due at the start of cycle `now`: 1 if that was an interrupt."""
@@ -375,8 +379,12 @@ class Cpu(Executor):
 
     def _expect(self, earliest: int) -> None:
         """What is due next may have changed; nothing that the pins ask for has."""
-        self.next_event = self.peripherals.next_event(earliest)
-        self.limit = 0
+        peripherals = self.peripherals
+        if peripherals.interrupts.in_service & _HIGH and not self.idle:
+            self.next_event = peripherals.ports.next_cycle  # no interrupt before RETI, which looks again
+        else:
+            self.next_event = peripherals.next_event(earliest)
+        self.limit = 0 if self.stop or self.txd.full else self._next_look()
 
     # Special function registers
 
@@ -403,8 +411,8 @@ class Cpu(Executor):
             value = self.peripherals.ports.latches[port]
             self.write_port(port, value | mask if level else value & (0xFF ^ mask))
         else:
-            value = self._other_register(address, self.cycles)
-            self.write_sfr(address, value | mask if level else value & (0xFF ^ mask))
+            value = self.peripherals.read(address, self.cycles)
+            self._write_peripheral(address, value | mask if level else value & (0xFF ^ mask))
 
     def write_sfr(self, address: int, value: int) -> None:
         if address == _PCON:
@@ -412,12 +420,15 @@ class Cpu(Executor):
         elif address & 0xCF == 0x80:
             self.write_port((address - _P0) >> 4, value)
         else:
-            sooner = self.peripherals.write(address, value, self.cycles)
-            if address in (_IE, _IP):
-                self.marks = self.marks if self.peripherals.interrupts.in_service else 0
-                self._block()
-            elif sooner:
-                self._expect(self.cycles)
+            self._write_peripheral(address, value)
+
+    def _write_peripheral(self, address: int, value: int) -> None:
+        sooner = self.peripherals.write(address, value, self.cycles)
+        if address in (_IE, _IP):
+            self.marks = self.marks if self.peripherals.interrupts.in_service else 0
+            self._block()
+        elif sooner:
+            self._expect(self.cycles)
 
     def write_pcon(self, value: int) -> None:
         """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""
@@ -468,6 +479,7 @@ class Cpu(Executor):
         """Brings the peripherals up to where the core is. Marks count only while interrupts hold the CPU."""
         self.peripherals.sync(self.cycles)
         self.peripherals.settle()
+        self.peripherals.timers.store()
         if not self._taken_over():
             self.marks = 0
 

@@ -17,7 +17,6 @@ cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
 cdef int _TF2, _RCLK, _TCLK
 cdef int _S5P2
 cdef int _SERIAL, _TIMER2, _BOTH_TIMERS
-cdef int _TR, _TF, _OF_TIMER0, _OF_TIMER1
 cdef int _REN, _SETTINGS, _RI_TI
 cdef long long _NO_PERIOD
 cdef long long _STOPPED
@@ -40,6 +39,8 @@ cdef class Peripherals:
     cdef readonly long long now
     cdef long long timer_wait
     cdef long long serial_wait
+    cdef long long quiet
+    cdef int timer1_free
     cdef readonly long long p3_reads
 
     cpdef int clear(self, long long cycle) except -1
@@ -48,13 +49,16 @@ cdef class Peripherals:
     cpdef int freeze(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
     cdef int _catch_up(self, long long cycle) except -1
+    @cython.locals(serial='long long')
+    cdef inline void _note_quiet(self) noexcept
+    cpdef void look_again(self) noexcept
     cpdef int settle(self) except -1
     cdef int _settle_serial(self) except -1
     @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
-    @cython.locals(event='long long', enabled=int, timer=int, flag='long long')
+    @cython.locals(event='long long', enabled=int, flag='long long')
     cpdef long long next_event(self, long long now) except *  # Cython 3.2 writes -1 wrongly in a final class
     @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
@@ -74,14 +78,15 @@ cdef class Peripherals:
     @cython.locals(levels=int, tick='long long')
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
-    @cython.locals(sooner=int, hastened=int)
+    cdef int _read_rarely(self, int address, long long cycle) noexcept
+    @cython.locals(sooner=int)
     cpdef int write(self, int address, int value, long long cycle) except -1
-    @cython.locals(timers=Timers, timer=int, started=int)
-    cdef int hastens(self, int address, int value) noexcept
-    cdef int writes_flags(self, int value) noexcept
+    @cython.locals(timers=Timers, sooner=int, hastened=int)
+    cdef inline int _write_timer(self, int address, int value, long long cycle) except -1
+    cdef inline void _note_timers(self) noexcept
+    cdef inline int writes_flags(self, int value) noexcept
     @cython.locals(both=int)
-    cdef int timer1_is_idle_clock(self) noexcept
-    cdef int write_timer(self, int address, int value, long long cycle) except -1
+    cdef void _note_timer1(self, int mode) noexcept
     cdef int write_serial(self, int address, int value, long long cycle) except -1
     @cython.locals(period='long long')
     cpdef long long bit_ticks(self) noexcept

@@ -11,8 +11,8 @@
 
 Registers of the core itself (ACC, PSW, PCON ...) are in `Cpu`.
 
-Timers and serial port are not stepped until one of them could raise a flag (`timer_wait`, `serial_wait`) or one of
-their registers is read or written (`settle`). Letters are rules in README.md.
+Timers and serial port are not stepped until one of them could raise a flag (`quiet`) or one of their registers is read
+or written (`settle`). Letters are rules in README.md.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xC
 _TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
 _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2, _BOTH_TIMERS = 0x10, 0x20, 0x0A  # in IE
-_TR, _TF, _OF_TIMER0, _OF_TIMER1 = 0x50, 0xA0, 0x30, 0xC0  # in TCON
 _REN, _SETTINGS, _RI_TI = 0x10, 0xF0, 0x03  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
 _STOPPED = STOPPED_TICK
@@ -65,6 +64,8 @@ class Peripherals:
         "now",
         "timer_wait",
         "serial_wait",
+        "quiet",
+        "timer1_free",
     )  # all but the first follow from the registers
 
     def __init__(self, bus: Bus) -> None:
@@ -84,6 +85,10 @@ class Peripherals:
         self.now = 0  # cycle below which everything has been done that can be noticed
         self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag; -1: to be worked out
         self.serial_wait = -1  # tick before which the serial port raises no flag; -1: to be worked out
+        self.quiet = -1  # cycle up to which nothing is due
+        self.timer1_free = (
+            0  # timer 1 clocks neither direction of the serial port: writing timers does not touch it
+        )
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
 
     def clear(self, cycle: int) -> None:
@@ -102,7 +107,7 @@ class Peripherals:
         self.shift.abort()
         self.timers.set_gates(self.external.levels)
         self.timer2.up = (self.p1 >> 1) & 1
-        self.timer_wait = -1
+        self.look_again()
         self._set_serial_clock()
 
     def freeze(self, cycle: int) -> None:
@@ -117,12 +122,7 @@ class Peripherals:
         """Does everything that happens in cycles below `cycle` and that the core can notice."""
         if not self.frozen:
             self.now = cycle
-            if (
-                cycle > self.timer_wait
-                or 12 * cycle > self.serial_wait
-                or not self.timer2.sleeps
-                or self.pulsed
-            ):
+            if cycle > self.quiet:
                 self._catch_up(cycle)
 
     def _catch_up(self, cycle: int) -> None:
@@ -132,11 +132,25 @@ class Peripherals:
         else:
             if cycle > self.timer_wait:
                 self.timers.sync(cycle)
-                self.timer_wait = self.timers.quiet_until()
+                self.timer_wait = self.timers.next_flag(_BOTH_TIMERS)
             if not self.timer2.sleeps:
                 self.timer2.sync(cycle)
             if 12 * cycle > self.serial_wait:
                 self._settle_serial()
+            self._note_quiet()
+
+    def _note_quiet(self) -> None:
+        """`timer_wait` or `serial_wait` is new, or timer 2 sleeps or wakes."""
+        self.quiet = -1
+        if self.timer2.sleeps and not self.pulsed:
+            serial = self.serial_wait // 12
+            self.quiet = serial if serial < self.timer_wait else self.timer_wait
+
+    def look_again(self) -> None:
+        """What timers and serial port wait for has to be worked out."""
+        self.timer_wait = -1
+        self.serial_wait = -1
+        self.quiet = -1
 
     def settle(self) -> None:
         """Brings timers and serial port up to where the rest is."""
@@ -146,6 +160,7 @@ class Peripherals:
             self._settle_serial()
         else:
             self.serial_wait = self.serial_tick()
+        self._note_quiet()
 
     def _settle_serial(self) -> None:
         """The serial port alone, whose 16x ticks do not ask for the timers."""
@@ -167,8 +182,7 @@ class Peripherals:
         if second < cycle and second != first:
             self._pulse(second == pulse1, second == pulse2, second)
         self.uart.sync(12 * cycle)
-        self.timer_wait = -1
-        self.serial_wait = -1
+        self.look_again()
 
     def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
         """One overflow of timer 1 and/or timer 2 in `cycle`."""
@@ -186,11 +200,10 @@ class Peripherals:
         enabled = self.interrupts.ie
         if self.frozen or not enabled & 0x80:
             return event
-        for timer in range(2):
-            if enabled & (2 << (2 * timer)):
-                flag = self.timers.next_flag(timer) + 2
-                if flag < event:
-                    event = flag
+        if enabled & _BOTH_TIMERS:
+            flag = self.timers.next_flag(enabled) + 2
+            if flag < event:
+                event = flag
         if enabled & _TIMER2:
             flag = self.timer2.next_flag() + 2
             if flag < event:
@@ -220,9 +233,10 @@ class Peripherals:
 
     def _set_serial_clock(self) -> None:
         """With all parts at the same cycle."""
-        self.serial_wait = -1
+        self.look_again()
         mode = self.uart.mode()
         self.pulsed = 0
+        self._note_timer1(mode)
         if mode == 0:
             self.uart.set_clock(_NEVER, 0, _NEVER, 0)
             return
@@ -232,7 +246,7 @@ class Peripherals:
         period2 = period1
         if mode != 2:
             next1 = self._timer1_tick()
-            period1 = 12 * (self.timers.top(1) - self.timers.reload(1)) * (1 if self.smod else 2)
+            period1 = 12 * self.timers.span(1) * (1 if self.smod else 2)
             next2 = self.timer2.next_overflow_tick()
             period2 = 2 * self.timer2.span()
             self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
@@ -245,13 +259,17 @@ class Peripherals:
             period2 if tx2 else period1,
         )
 
+    def _note_timer1(self, mode: int) -> None:
+        both = _RCLK | _TCLK
+        self.timer1_free = 1 if self.timer2.control & both == both and mode & 1 else 0
+
     def _timer1_tick(self) -> int:
         """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one since reset (U1)."""
         if self.timers.counts_pin(1):
             return _NEVER
         cycle = self.timers.next_overflow(1)
         if cycle < _NEVER and not self.smod and not self.timers.overflows1 & 1:
-            cycle += self.timers.top(1) - self.timers.reload(1)
+            cycle += self.timers.span(1)
         return 12 * cycle + _S5P2 if cycle < _NEVER else _NEVER
 
     # Pins
@@ -291,7 +309,6 @@ class Peripherals:
             self.sync(cycle + 1)
             self.settle()
             self.timer2.sample_external((p1 >> 1) & 1)
-        self.timer_wait = -1
         self.clock_serial()
 
     def _external_pin(self, number: int, level: int, cycle: int) -> None:
@@ -324,25 +341,27 @@ class Peripherals:
         """A register (port: its latch) with everything below `cycle` done."""
         if address & 0xCF == 0x80:
             return self.ports.latches[(address - _P0) >> 4]
-        if address == _IE:
-            return self.interrupts.ie
-        if address == _IP:
-            return self.interrupts.ip
         self.sync(cycle)
         if address == _TCON:
             return self.timers.control | self.external.control
         if address == _SCON:
             return self.uart.scon  # up to date: its flags never wait
+        if _TL0 <= address <= _TH1:
+            if not self.frozen:
+                self.timers.sync(cycle)
+            return self.timers.read(address - _TL0)
         if address == _SBUF:
             return self.uart.received
+        return self._read_rarely(address, cycle)
+
+    def _read_rarely(self, address: int, cycle: int) -> int:
+        """The registers that programs read less often."""
+        if address == _IE:
+            return self.interrupts.ie
+        if address == _IP:
+            return self.interrupts.ip
         if address == _TMOD:
             return self.timers.tmod
-        if address in (_TL0, _TL1, _TH0, _TH1) and not self.frozen:
-            self.timers.sync(cycle)
-        if address in (_TL0, _TL1):
-            return self.timers.tl[address - _TL0]
-        if address in (_TH0, _TH1):
-            return self.timers.th[address - _TH0]
         if address == _T2CON:
             return self.timer2.control
         if address == _T2MOD:
@@ -358,68 +377,53 @@ class Peripherals:
     def write(self, address: int, value: int, cycle: int) -> int:
         """A register that is no port; `cycle` is the first to see it. 0 if no event comes sooner by it."""
         self.sync(cycle)
-        sooner = 1
+        if _TCON <= address <= _TH1:
+            return self._write_timer(address, value, cycle)
+        if address == _SCON and self.writes_flags(value):
+            sooner = 1 if value & ~self.uart.scon & _RI_TI else 0
+            self.uart.write_scon(value, cycle)
+            return sooner
         if address == _IE:
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
-        elif address == _SCON and self.writes_flags(value):
-            sooner = 1 if value & ~self.uart.scon & _RI_TI else 0
-            self.uart.write_scon(value, cycle)
-        elif _TCON <= address <= _TH1 and self.timer1_is_idle_clock():
-            hastened = self.hastens(address, value)
-            sooner = hastened & self.interrupts.ie
-            if address == _TCON and (value ^ self.external.control) & 0x0F:
-                sooner = 1
-            if hastened:
-                self.timer_wait = -1
-            self.write_timer(address, value, cycle)
         else:
             self.settle()
-            self.timer_wait = -1
-            if not self.write_timer(address, value, cycle):
-                self.write_serial(address, value, cycle)
+            self.write_serial(address, value, cycle)
             self.clock_serial()
-        return sooner
+        return 1
 
-    def hastens(self, address: int, value: int) -> int:
-        """The timers, as bits of IE, whose flag may go up or be seen sooner by a write to a register of timers 0 and 1.
-        A timer that stands, or that the write stops, is none of them.
-        """
+    def _write_timer(self, address: int, value: int, cycle: int) -> int:
+        """A register of timers 0 and 1. 0 if no event comes sooner by it."""
+        if not self.timer1_free:
+            self.settle()
         timers = self.timers
-        if address == _TMOD or timers.tmod & 3 == 3:
-            return _BOTH_TIMERS
-        if address != _TCON:
-            timer = (address - _TL0) & 1
-            return 2 << (2 * timer) if timers.counting >> timer & 1 else 0
-        started = value & ~timers.control & _TR | (value ^ timers.control) & _TF
-        return (started & _OF_TIMER0 and 2) | (started & _OF_TIMER1 and 8)
+        timers.sync(cycle)
+        sooner = 0
+        if address == _TCON:
+            hastened = timers.write_control(value, cycle)
+            if (value ^ self.external.control) & 0x0F:
+                self.external.write(value, cycle)
+                sooner = 1
+        elif address == _TMOD:
+            hastened = timers.write_mode(value)
+        else:
+            hastened = timers.write(address - _TL0, value)
+        if hastened:
+            self._note_timers()
+        if not self.timer1_free:
+            self.clock_serial()
+            return 1
+        return sooner | hastened & self.interrupts.ie
+
+    def _note_timers(self) -> None:
+        """A flag of timers 0 and 1 may come at another time."""
+        self.timer_wait = self.timers.next_flag(_BOTH_TIMERS)
+        self._note_quiet()
 
     def writes_flags(self, value: int) -> int:
         """SCON keeps mode, SM2 and REN: the serial port goes on as it was, and waits for what it waited for."""
         return 1 if self.uart.mode() != 0 and (value ^ self.uart.scon) & _SETTINGS == 0 else 0
-
-    def timer1_is_idle_clock(self) -> int:
-        """Timer 1 clocks neither direction of the serial port, so that writing timers does not touch it."""
-        both = _RCLK | _TCLK
-        return 1 if self.timer2.control & both == both and self.uart.mode() & 1 else 0
-
-    def write_timer(self, address: int, value: int, cycle: int) -> int:
-        """A register of timers 0 and 1; 0 if the address is none of them."""
-        self.timers.sync(cycle)
-        if address == _TCON:
-            self.timers.write_control(value, cycle)
-            if (value ^ self.external.control) & 0x0F:
-                self.external.write(value, cycle)
-        elif address == _TMOD:
-            self.timers.write_mode(value)
-        elif address in (_TL0, _TL1):
-            self.timers.tl[address - _TL0] = value
-        elif address in (_TH0, _TH1):
-            self.timers.th[address - _TH0] = value
-        else:
-            return 0
-        return 1
 
     def write_serial(self, address: int, value: int, cycle: int) -> None:
         """A register of the serial port or of timer 2, with both settled."""
@@ -466,7 +470,7 @@ class Peripherals:
             self.sync(cycle)
             self.settle()
             self.uart.write_latch(value & 3, 12 * cycle)
-            self.serial_wait = -1
+            self.look_again()
         self.ports.latches[port] = value
 
     def taken(self, source: int, cycle: int) -> None:
@@ -477,13 +481,13 @@ class Peripherals:
         elif source == 1 or source == 3:
             self.timers.sync(cycle)
             self.timers.taken(source >> 1, cycle)
-            self.timer_wait = -1
+            self._note_timers()
 
     def after_load(self) -> None:
         """Time is where timer 0 is; whether a pin clocks the serial port follows from the modes."""
         self.now = self.timers.synced
-        self.timer_wait = -1
-        self.serial_wait = -1
+        self.look_again()
+        self._note_timer1(self.uart.mode())
         self.pulsed = 0
         if self.uart.mode() & 1:
             self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)

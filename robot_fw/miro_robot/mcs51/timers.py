@@ -19,10 +19,17 @@ from miro_robot.mcs51.interrupts import Interrupts
 
 _NEVER = NEVER_TICK
 _NONE = -1  # no counter edge waiting
+_TIMER0, _TIMER1 = 0x02, 0x08  # in IE
+_TF0, _TF1 = 0x20, 0x80  # in TCON
+_TR0, _TR1 = 0x10, 0x40
 
 
 class Timers:
-    """Timers 0 and 1. Index 0 and 1 are the timers, 2 is TH0 when mode 3 splits it off."""
+    """Timers 0 and 1. Index 0 and 1 are the timers, 2 is TH0 when mode 3 splits it off.
+
+    A part that counts cycles is not stepped: it stands at `synced` - `start`, until it overflows. TL and TH follow when
+    they are read, written or saved (`store`).
+    """
 
     STATE = {
         "tmod": ("i", 0, 0xFF),
@@ -34,7 +41,11 @@ class Timers:
         "synced": TICK,
         "overflows1": TICK,
     }
-    NOT_STATE = ("interrupts", "counting")  # the latter follows from TMOD, TCON and the gates
+    NOT_STATE = (
+        "interrupts",
+        *("counts_always", "counts_by_tr0", "counts_by_tr1", "counting", "on_pins", "steady"),
+        *("start", "count", "top", "due"),
+    )  # all but the first follow from TMOD, TCON, the gates, TL and TH
 
     def __init__(self, interrupts: Interrupts) -> None:
         self.interrupts = interrupts
@@ -46,11 +57,21 @@ class Timers:
         self.edge_cycle = [-1] * 2  # cycle in which a fall of T0, T1 counts
         self.synced = 0  # everything below this cycle is done
         self.overflows1 = 0  # of timer 1 since reset: the serial port halves them
-        self.counting = 0  # bit per part: whether it counts, on cycles or on a pin
+        # A bit per part: whether it counts, on cycles or on a pin.
+        self.counts_always = 0
+        self.counts_by_tr0 = 0
+        self.counts_by_tr1 = 0
+        self.counting = 0  # as TR0 and TR1 are
+        self.on_pins = 0  # a bit per part that counts falls of a pin
+        self.steady = 0  # a bit per part that counts cycles
+        self.start = [0] * 3  # cycle in which a part that counts cycles would have stood at 0
+        self.count = [0] * 3  # of the others, as wide as the mode makes it
+        self.top = [0] * 3  # the count that overflows
+        self.due = _NEVER  # no overflow and no fall that counts comes before this cycle
+        self._set_mode(0)
 
     def clear(self, cycle: int) -> None:
         """As after reset in `cycle`."""
-        self.tmod = 0
         self.control = 0
         self.synced = cycle
         self.overflows1 = 0
@@ -59,156 +80,235 @@ class Timers:
             self.th[timer] = 0
             self.edge_cycle[timer] = _NONE
             self.interrupts.withdraw(1 + 2 * timer, cycle)
-        self._note_counting()
+        self._set_mode(0)
 
     def sync(self, cycle: int) -> None:
         """Counts through all cycles below `cycle`."""
-        if cycle <= self.synced:
-            return
-        counting = self.counting
-        if counting & 1:
-            self._pass(0, cycle)
-        if counting & 2:
-            self._pass(1, cycle)
-        if counting & 4:
-            self._pass(2, cycle)
-        self.synced = cycle
+        if cycle > self.synced:
+            if cycle > self.due:
+                self._pass(cycle)
+            self.synced = cycle
+
+    def _set_mode(self, tmod: int) -> None:
+        """TMOD, with all counts in TL and TH."""
+        self.tmod = tmod
+        self.steady = 0
+        self.due = _NEVER
+        self.on_pins = self.counts_pin(0) | self.counts_pin(1) << 1
+        self._fetch(0)
+        self._fetch(1)
+        self._note_gates()
+
+    def _note_gates(self) -> None:
+        """TMOD or the gates are new: works out what counts."""
+        split = self.mode(0) == 3
+        stands = self.mode(1) == 3
+        open0 = not self.tmod & 0x08 or self.gates & 1
+        open1 = not self.tmod & 0x80 or self.gates & 2
+        self.counts_always = 2 if split and not stands else 0
+        self.counts_by_tr0 = 1 if open0 else 0
+        self.counts_by_tr1 = 4 if split else 2 if open1 and not stands else 0
+        self._note_counting()
 
     def _note_counting(self) -> None:
-        self.counting = self.enabled(0) | self.enabled(1) << 1 | self.enabled(2) << 2
+        """TR0, TR1 or what follows them is new: starts and stops the parts."""
+        counting = self.counts_always
+        if self.control & _TR0:
+            counting |= self.counts_by_tr0
+        if self.control & _TR1:
+            counting |= self.counts_by_tr1
+        self.counting = counting
+        if counting & self.on_pins:
+            self.due = self.synced  # a fall may wait
+        steady = counting & ~self.on_pins
+        changed = steady ^ self.steady
+        for part in range(3 if changed else 0):
+            if changed >> part & 1:
+                if steady >> part & 1:
+                    self._begin(part)
+                else:
+                    self.count[part] = self.synced - self.start[part]
+        self.steady = steady
 
-    def enabled(self, part: int) -> int:
-        """Whether it counts, on cycles or on a pin."""
-        split = self.mode(0) == 3
-        if part == 2:
-            return 1 if split and self.control & 0x40 else 0
-        if part == 1:
-            if self.mode(1) == 3:
-                return 0
-            if split:
-                return 1
-        if not self.control & (0x10 << (2 * part)):
-            return 0
-        gated = (self.tmod >> (4 * part)) & 8
-        return 0 if gated and not (self.gates >> part) & 1 else 1
+    def _begin(self, part: int) -> None:
+        """From now on it counts cycles."""
+        self.start[part] = self.synced - self.count[part]
+        overflow = self.start[part] + self.top[part] - 1
+        if overflow < self.due:
+            self.due = overflow
 
     def mode(self, timer: int) -> int:
         return (self.tmod >> (4 * timer)) & 3
 
-    def counts_pin(self, part: int) -> int:
-        return 1 if part < 2 and (self.tmod >> (4 * part)) & 4 else 0
-
-    def value(self, part: int) -> int:
-        """The count, as wide as its mode makes it."""
-        if part == 2:
-            return self.th[0]
-        mode = self.mode(part)
-        if mode == 0:
-            return (self.th[part] << 5) | (self.tl[part] & 0x1F)
-        if mode == 1 or (mode == 3 and part == 1):
-            return (self.th[part] << 8) | self.tl[part]
-        return self.tl[part]
-
-    def top(self, part: int) -> int:
-        """The count that overflows."""
-        mode = 2 if part == 2 else self.mode(part)
-        if mode == 0:
-            return 0x2000
-        return 0x10000 if mode == 1 else 0x100
+    def counts_pin(self, timer: int) -> int:
+        return (self.tmod >> (4 * timer + 2)) & 1
 
     def reload(self, part: int) -> int:
         """The count that an overflow leaves."""
         return self.th[part] if part < 2 and self.mode(part) == 2 else 0
 
+    def span(self, part: int) -> int:
+        """Counts from one overflow to the next."""
+        return self.top[part] - self.reload(part)
+
     def next_overflow(self, part: int) -> int:
         """Cycle of the next overflow if nothing changes, or NEVER_TICK. A counter is known one edge ahead only."""
-        if not self.counting >> part & 1:
-            return _NEVER
-        left = self.top(part) - self.value(part)
-        if self.counts_pin(part):
-            return self.edge_cycle[part] if left == 1 and self.edge_cycle[part] >= self.synced else _NEVER
-        return self.synced + left - 1
+        if self.steady >> part & 1:
+            return self.start[part] + self.top[part] - 1
+        if self.counting >> part & 1 and self.top[part] - self.count[part] == 1:
+            return self.next_fall(part)
+        return _NEVER
 
-    def quiet_until(self) -> int:
-        """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK."""
-        if not self.counting:
-            return _NEVER
-        first = self.next_flag(0)
-        second = self.next_flag(1)
-        return first if first < second else second
+    def next_fall(self, timer: int) -> int:
+        """Cycle in which a fall of T0, T1 that was seen already counts, or NEVER_TICK."""
+        return self.edge_cycle[timer] if self.edge_cycle[timer] >= self.synced else _NEVER
 
-    def next_flag(self, timer: int) -> int:
-        """Cycle in which TF0, TF1 will be seen set, or NEVER_TICK if it is up already or not in sight."""
-        if self.control & (0x20 << (2 * timer)):
-            return _NEVER
-        if timer == 1 and self.mode(0) == 3:
-            return self.next_overflow(2)
-        return self.next_overflow(timer)
+    def next_flag(self, timers: int) -> int:
+        """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK. `timers`: which, as in IE."""
+        first = _NEVER
+        if timers & _TIMER0 and not self.control & _TF0:
+            first = self.next_overflow(0)
+        if timers & _TIMER1 and not self.control & _TF1:
+            second = self.next_overflow(2 if self.mode(0) == 3 else 1)
+            if second < first:
+                return second
+        return first
 
     def fall(self, timer: int, cycle: int) -> None:
         """T0, T1 was high in one sample and low in the next, that of `cycle`."""
         self.edge_cycle[timer] = cycle + 1
-
-    def write_control(self, value: int, cycle: int) -> None:
-        """TCON.7:4 is written; `cycle` is the first to see it."""
-        changed = value ^ self.control
-        self.control = value & 0xF0
-        self._note_counting()
-        for timer in range(2 if changed & 0xA0 else 0):
-            if value & (0x20 << (2 * timer)):
-                self.interrupts.ask(1 + 2 * timer, cycle)
-            else:
-                self.interrupts.withdraw(1 + 2 * timer, cycle)
-
-    def write_mode(self, value: int) -> None:
-        """TMOD is written, with everything below its cycle done."""
-        self.tmod = value
-        self._note_counting()
+        self.due = self.synced
 
     def set_gates(self, levels: int) -> None:
         """The pins INT1, INT0 as sampled, with everything below the cycle that they act on done."""
         self.gates = levels
-        self._note_counting()
+        self._note_gates()
+
+    # Registers, with everything below the cycle that sees them done.
+
+    def read(self, number: int) -> int:
+        """0 TL0, 1 TL1, 2 TH0, 3 TH1."""
+        self._store(number & 1)
+        return self.th[number & 1] if number & 2 else self.tl[number & 1]
+
+    def write(self, number: int, value: int) -> int:
+        """The same. Returns the timers, as bits of IE, whose flag may come sooner by it: none that stands."""
+        timer = number & 1
+        self._store(timer)
+        if number & 2:
+            self.th[timer] = value
+        else:
+            self.tl[timer] = value
+        self._fetch(timer)
+        if self.mode(0) == 3:
+            return _TIMER0 | _TIMER1
+        return _TIMER0 << (2 * timer) if self.counting >> timer & 1 else 0
+
+    def write_mode(self, value: int) -> int:
+        """TMOD. Returns what `write` does."""
+        self.store()
+        self._set_mode(value)
+        return _TIMER0 | _TIMER1
+
+    def write_control(self, value: int, cycle: int) -> int:
+        """TCON.7:4; `cycle` is the first to see it. Returns what `write` does: none that the write stops."""
+        changed = value ^ self.control
+        started = changed & value & (_TR0 | _TR1)
+        self.control = value & 0xF0
+        if changed & (_TR0 | _TR1):
+            self._note_counting()
+        if changed & (_TF0 | _TF1):
+            started |= changed & (_TF0 | _TF1)
+            self._note_flags(value, cycle)
+        if self.mode(0) == 3:
+            return _TIMER0 | _TIMER1
+        return (_TIMER0 if started & (_TR0 | _TF0) else 0) | (_TIMER1 if started & (_TR1 | _TF1) else 0)
+
+    def _note_flags(self, value: int, cycle: int) -> None:
+        for timer in range(2):
+            if value & (_TF0 << (2 * timer)):
+                self.interrupts.ask(1 + 2 * timer, cycle)
+            else:
+                self.interrupts.withdraw(1 + 2 * timer, cycle)
 
     def taken(self, timer: int, cycle: int) -> None:
         """The CPU vectors: TF is cleared."""
         self.control &= 0xF0 ^ (0x20 << (2 * timer))
         self.interrupts.withdraw(1 + 2 * timer, cycle)
 
-    def _pass(self, part: int, cycle: int) -> None:
-        """The counts of one part in the cycles `synced` .. `cycle` - 1."""
-        first = self.synced
-        counts = cycle - first
-        if self.counts_pin(part):
-            first = self.edge_cycle[part]
-            if not self.synced <= first < cycle:
-                return
-            counts = 1
-        value = self.value(part)
-        left = self.top(part) - value
-        if counts < left:
-            self._store(part, value + counts)
-            return
-        reload = self.reload(part)
-        span = self.top(part) - reload
-        overflows = (counts - left) // span + 1
-        self._store(part, reload + (counts - left) - (overflows - 1) * span)
-        self._overflowed(part, overflows, first + left - 1)
+    def _pass(self, cycle: int) -> None:
+        """The overflows and the falls that count in the cycles `synced` .. `cycle` - 1."""
+        self.due = _NEVER
+        for part in range(3):
+            if not self.counting >> part & 1:
+                continue
+            if self.steady >> part & 1:
+                self._pass_cycles(part, cycle)
+                coming = self.next_overflow(part)
+            else:
+                self._pass_fall(part, cycle)
+                coming = self.edge_cycle[part]
+            if cycle <= coming < self.due:
+                self.due = coming
 
-    def _store(self, part: int, value: int) -> None:
-        """TL.7:5 are indeterminate in mode 0 (4316E section 2.9); chosen: they keep what was written there."""
-        if part == 2:
-            self.th[0] = value
-            return
-        mode = self.mode(part)
+    def _pass_cycles(self, part: int, cycle: int) -> None:
+        beyond = cycle - self.start[part] - self.top[part]
+        if beyond >= 0:
+            span = self.span(part)
+            overflows = beyond // span + 1
+            self.start[part] += overflows * span
+            self._overflowed(part, overflows, cycle - 1 - beyond)
+
+    def _pass_fall(self, part: int, cycle: int) -> None:
+        fall = self.edge_cycle[part]
+        if self.synced <= fall < cycle:
+            self.count[part] += 1
+            if self.count[part] == self.top[part]:
+                self.count[part] = self.reload(part)
+                self._overflowed(part, 1, fall)
+
+    def _fetch(self, timer: int) -> None:
+        """The count from TL and TH."""
+        mode = self.mode(timer)
         if mode == 0:
-            self.tl[part] = (self.tl[part] & 0xE0) | (value & 0x1F)
-            self.th[part] = value >> 5
+            self.top[timer] = 0x2000
+            self.count[timer] = (self.th[timer] << 5) | (self.tl[timer] & 0x1F)
         elif mode == 1:
-            self.tl[part] = value & 0xFF
-            self.th[part] = value >> 8
+            self.top[timer] = 0x10000
+            self.count[timer] = (self.th[timer] << 8) | self.tl[timer]
         else:
-            self.tl[part] = value
+            self.top[timer] = 0x100
+            self.count[timer] = self.tl[timer]
+            if timer == 0:
+                self.top[2] = 0x100
+                self.count[2] = self.th[0]
+        if self.steady >> timer & 1:
+            self._begin(timer)
+        if timer == 0 and self.steady & 4:
+            self._begin(2)
+
+    def _store(self, timer: int) -> None:
+        """TL.7:5 are indeterminate in mode 0 (4316E section 2.9); chosen: they keep what was written there."""
+        mode = self.mode(timer)
+        count = self._count(timer)
+        if mode == 0:
+            self.tl[timer] = (self.tl[timer] & 0xE0) | (count & 0x1F)
+            self.th[timer] = count >> 5
+        elif mode == 1:
+            self.tl[timer] = count & 0xFF
+            self.th[timer] = count >> 8
+        else:
+            self.tl[timer] = count
+            if timer == 0 and mode == 3:
+                self.th[0] = self._count(2)
+
+    def _count(self, part: int) -> int:
+        return self.synced - self.start[part] if self.steady >> part & 1 else self.count[part]
+
+    def store(self) -> None:
+        """Brings TL and TH up to where the counts are."""
+        self._store(0)
+        self._store(1)
 
     def _overflowed(self, part: int, overflows: int, cycle: int) -> None:
         """TF1 belongs to TH0 while timer 0 is split; timer 1 then only clocks the serial port."""
@@ -223,4 +323,4 @@ class Timers:
     def after_load(self) -> None:
         if self.control & 0x0F:
             raise ValueError(f"TCON.3:0 is {self.control & 0x0F}, which belongs to the external interrupts")
-        self._note_counting()
+        self._set_mode(self.tmod)
