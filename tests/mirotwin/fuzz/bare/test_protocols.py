@@ -33,7 +33,7 @@ def test_ours_by_name_with_parameters():
         ("mire", "'mire' is not one of the choices; did you mean miro?"),
         ("miro:robots=4", "miro:robots=4: robots: invalid enum value 4; miro has robots"),
         ("miro:robots", "'robots' are no parameters; write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"),
-        ("miro:rate=1", "miro:rate=1: Object contains unknown field `rate`"),
+        ("miro:rate=1", "miro:rate=1: rate: unknown key; miro has robots"),
         ("", "'' is not one of the choices"),
     ],
 )
