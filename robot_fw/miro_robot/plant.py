@@ -42,7 +42,7 @@ class Plant:
     def run_pulses(self, tick: int) -> int:
         """May do what the board would do up to and including `tick`: advance, edges of PWM at both chips, bridge.
 
-        It ends before a tick at which a chip has more to do. Returns 1 if it has done something, 0 if nothing.
+        Where a chip has more to do it ends, with an advance to that tick or before. Returns 1 if it has done something.
         """
         if self.left is not None and self.right is not None:
             self.left.rest(tick)

@@ -37,13 +37,13 @@ class InputFilter:
         self.direct = 1 if clocks == 0 else 0
         self.take(level)
 
-    def take(self, level: int) -> None:
-        """Sets the level without a change: the filter does not see an edge."""
+    def take(self, level: int, tick: int = 0) -> None:
+        """Sets the level without a change: the filter does not see an edge. It has been there since `tick`."""
         self.level = level
         self.run_level = level
-        self.run_tick = 0
+        self.run_tick = tick
         self.pin = level
-        self.pin_tick = 0
+        self.pin_tick = tick
         self.due = _NEVER
 
     def set(self, tick: int, level: int) -> None:
@@ -89,11 +89,12 @@ class Encoder:
         "caught": FLAG,
         "caught_counts": _COUNTS,
     }
-    NOT_STATE = ("double_step",)
+    NOT_STATE = ("steps", "spacing")
 
     def __init__(self, filter_clocks: int, double_step: int = 0) -> None:
-        self.double_step = double_step
+        self.steps = [0, 1, double_step, -1]  # counts, by how far the place has gone forward
         self.quadrature = InputFilter(filter_clocks, 0)
+        self.spacing = self.quadrature.wait + 7  # of edges that all count
         self.index = InputFilter(filter_clocks, 1)
         self.seen = 0
         self.armed = 0
@@ -128,6 +129,26 @@ class Encoder:
             self._count()
         self.quadrature.set(tick, place)
 
+    def set_run(
+        self, first_tick: int, before_tick: int, last_tick: int, edges: int, step: int, count: int
+    ) -> int:
+        """`set_place` for edges one way (`step`) to the place of `count`, each `spacing` or more ticks after another.
+
+        The first, the last but one and the last come at these ticks. Where that does not suffice nothing is done: 0.
+        """
+        quadrature = self.quadrature
+        clock = first_tick & -4
+        waits = clock < quadrature.due != _NEVER or clock < quadrature.pin_tick
+        if not self.seen or quadrature.direct or self.armed or self.index.due <= last_tick or waits:
+            return 0
+        if quadrature.due <= clock:
+            self._count()
+        if edges > 1:
+            self.counts += step * (edges - 1)
+            quadrature.take((count - step) & 3, (before_tick & -4) + 4)
+        quadrature.set(last_tick, count & 3)
+        return 1
+
     def set_index(self, tick: int, level: int) -> None:
         """Level of /IN from `tick` on."""
         self.settle(tick & -4)
@@ -154,15 +175,8 @@ class Encoder:
                 self._watch()
 
     def _count(self) -> None:
-        before = self.quadrature.level
+        self.counts += self.steps[(self.quadrature.pin - self.quadrature.level) & 3]
         self.quadrature.accept()
-        step = (self.quadrature.level - before) & 3
-        if step == 1:
-            self.counts += 1
-        elif step == 3:
-            self.counts -= 1
-        elif step == 2:
-            self.counts += self.double_step
 
     def _watch(self) -> None:
         if self.quadrature.level == 0 and self.index.level == 0:

@@ -2,7 +2,7 @@
 cimport cython
 from miro_exact cimport dmath
 
-cdef double TICK_S
+cdef double TICK_S, _ANGLES
 cdef int SWEEPS
 
 cdef class Body:
@@ -13,10 +13,10 @@ cdef class Body:
 
     @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
                    left_rub=double, right_rub=double, new_left=double, new_right=double)
-    cpdef push(self, double left_nms, double right_nms, int ticks)
+    cpdef int push(self, double left_nms, double right_nms, int ticks) except -1
     @cython.final
     @cython.locals(left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double left, double right, double most) noexcept
     @cython.final
-    @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
+    @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
     cdef inline int _roll(self) except -1

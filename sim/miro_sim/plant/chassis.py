@@ -16,6 +16,7 @@ from miro_sim.plant.params import DriveParams
 
 TICK_S = 1.0 / 24e6
 SWEEPS = 8
+_ANGLES = 1.6e6  # `dmath.ANGLE_LIMIT`
 _SPEED = ("d", -1e6, 1e6)  # far more than a robot's
 _PLACE = ("d", -1e9, 1e9)
 
@@ -71,29 +72,28 @@ class Body:
 
     def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
         """Applies motor impulses and friction over `ticks`; moves on at the mean of old and new speed."""
-        half_s = 0.5 * TICK_S * ticks
         old_left = self.left_rad_s
         old_right = self.right_rad_s
-        if old_left == 0.0 and old_right == 0.0 and left_nms == 0.0 and right_nms == 0.0:
-            self.turned_left_rad = 0.0
-            self.turned_right_rad = 0.0
-            return
-        left = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
-        right = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
-        most = 2.0 * half_s * self.friction_nm
-        left_rub = most if left < 0.0 else -most
-        right_rub = most if right < 0.0 else -most
-        new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
-        new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
-        if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
-            self.left_rad_s = new_left
-            self.right_rad_s = new_right
-        else:
-            self._rub(left, right, most)
-        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
-        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
-        if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
-            self._roll()
+        self.turned_left_rad = 0.0
+        self.turned_right_rad = 0.0
+        if old_left != 0.0 or old_right != 0.0 or left_nms != 0.0 or right_nms != 0.0:
+            half_s = 0.5 * TICK_S * ticks
+            left = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
+            right = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
+            most = 2.0 * half_s * self.friction_nm
+            left_rub = most if left < 0.0 else -most
+            right_rub = most if right < 0.0 else -most
+            new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
+            new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
+            if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
+                self.left_rad_s = new_left
+                self.right_rad_s = new_right
+            else:
+                self._rub(left, right, most)
+            self.turned_left_rad = half_s * (old_left + self.left_rad_s)
+            self.turned_right_rad = half_s * (old_right + self.right_rad_s)
+            if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
+                self._roll()
 
     def _rub(self, left: float, right: float, most: float) -> None:
         """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
@@ -127,7 +127,10 @@ class Body:
         right_m = self.right_m_rad * self.turned_right_rad
         half = 0.5 * (right_m - left_m) / self.track_m
         chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
-        sine, cosine = dmath.sincos(self.theta_rad + half)
+        angle = self.theta_rad + half
+        if not -_ANGLES < angle < _ANGLES:
+            dmath.sincos(angle)  # raises DomainError
+        sine, cosine = dmath.sincos_within(angle)
         self.x_m = self.x_m + chord_m * cosine
         self.y_m = self.y_m + chord_m * sine
         self.theta_rad = self.theta_rad + 2.0 * half

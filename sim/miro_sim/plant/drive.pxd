@@ -6,30 +6,33 @@ from miro_robot.plant cimport Plant
 from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.rough cimport RoughBody
 
-cdef long long LONGEST_STEP
-cdef double TICK_S, _LARGEST, _ANGLES
+cdef long long LONGEST_STEP, _NEVER
+cdef double TICK_S, _LARGEST
+cdef int _MOST_CROSSINGS
 
 @cython.final
 cdef class Winding:
     cdef public double current_a
     cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
-    cdef readonly double drive_v, diode_v, up_v, down_v
-    cdef double ohm[2]
-    cdef double tau[2]
+    cdef double volt[6]
+    cdef double ohm[6]
+    cdef double tau[6]
+    cdef long long row[6]
     cdef double decay[4098]
 
     @cython.locals(longest=int)
     cpdef int after_load(self) except -1
-    @cython.locals(wanted=int)
     cpdef void set_bridge(self, int enable, int forward) noexcept
-    cdef inline void _switch(self, int drive) noexcept
+    cdef inline void _ask(self, int wanted) noexcept
+    cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(wait=int, charge=double)
-    cdef double _pass(self, int ticks, double emf_v) noexcept
-    @cython.locals(start=double, positive=cython.bint, driven=cython.bint, voltage=double, tau=double, final=double,
-                   end=double, ratio=double, crossing=double)
-    cdef double _flow(self, int ticks, double emf_v) noexcept
-    @cython.locals(voltage=double, driven=cython.bint, tau=double, final=double)
+    @cython.locals(wait=int, first=int, charge=double)
+    cdef inline double _pass(self, int ticks, double emf_v) noexcept
+    @cython.locals(start=double, kind=cython.longlong, final=double, end=double, goes_on=cython.bint)
+    cdef inline double _flow(self, int ticks, double emf_v) noexcept
+    @cython.locals(start=double, ratio=double, crossing=double)
+    cdef double _through_zero(self, int ticks, double emf_v, double final, double tau) noexcept
+    @cython.locals(kind=cython.longlong, final=double)
     cdef inline double _onward(self, double ticks, double emf_v) noexcept
 
 @cython.final
@@ -39,11 +42,29 @@ cdef class Quadrature:
     cdef readonly double position
     cdef readonly long long count
 
-    @cython.locals(moved=double, start=double, position=double, last=cython.longlong)
-    cpdef inline void turn(self, double radians, long long start_tick, int ticks, Lm629 chip) noexcept
-    @cython.locals(count=cython.longlong, forward=cython.bint, boundary=cython.longlong, exact=double, after=cython.longlong)
-    cdef void _cross(self, double start, long long last, double ticks_per_count, long long start_tick, int ticks,
-                     Lm629 chip) noexcept
+    cdef public Lm629 chip
+    cdef long long told
+    cdef int crossings
+    cdef long long cross_tick[16]
+    cdef int cross_ticks[16]
+    cdef double cross_start[16]
+    cdef double cross_moved[16]
+    cdef long long cross_count[16]
+
+    @cython.locals(moved=double, start=double, position=double, last=cython.longlong, crossing=cython.int)
+    cpdef inline void turn(self, double radians, long long start_tick, int ticks) noexcept
+    @cython.locals(chip=Lm629)
+    cpdef void tell(self) noexcept
+    @cython.locals(limit=double, step=cython.longlong, crossing=cython.int, last=cython.int, ticks=cython.int, moved=double,
+                   start=double, end=double, start_tick=cython.longlong, end_tick=cython.longlong, edges=cython.longlong, first_tick=cython.longlong,
+                   before_tick=cython.longlong, last_tick=cython.longlong, before=cython.longlong)
+    cdef int _tell_run(self, Lm629 chip) noexcept
+    @cython.locals(crossing=cython.int, tick=cython.longlong)
+    cdef void _tell_each(self, Lm629 chip) noexcept
+    @cython.locals(ticks=cython.int, moved=double, forward=cython.bint, exact=double, after=cython.longlong)
+    cdef long long _edge_tick(self, int crossing, long long count) noexcept
+    cpdef void attach(self, long long tick, Lm629 chip) noexcept
+    cdef void _show(self, long long tick, Lm629 chip) noexcept
     cpdef int after_load(self) except -1
     cpdef inline int a(self) noexcept
     cpdef inline int b(self) noexcept
@@ -51,7 +72,6 @@ cdef class Quadrature:
 
 @cython.locals(pulsing=cython.bint)
 cdef inline long long _other_tick(Lm629 chip) noexcept
-cdef inline void _pass_edge(Lm629 chip, Winding winding) noexcept
 
 cdef class DifferentialDrive(Plant):
     cdef readonly object params
@@ -66,20 +86,9 @@ cdef class DifferentialDrive(Plant):
     cpdef int after_load(self) except -1
     cpdef advance(self, long long tick)
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
-    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, until=cython.longlong, now=cython.longlong)
+    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, other=cython.longlong)
     cpdef int run_pulses(self, long long tick) except -1
     @cython.final
-    @cython.locals(
-        body=Body, left_winding=Winding, right_winding=Winding, left_encoder=Quadrature, right_encoder=Quadrature,
-        constant=double, impulse=double, inverse_ll=double, inverse_lr=double, inverse_rr=double,
-        left_rad_s=double, right_rad_s=double, x_m=double, y_m=double, theta_rad=double,
-        begin=cython.longlong, now=cython.longlong, next_tick=cython.longlong, ticks=cython.int,
-        left_nms=double, right_nms=double, half_s=double, most=double, free_left=double, free_right=double,
-        left_rub=double, right_rub=double, new_left=double, new_right=double, turned_left=double,
-        turned_right=double, left_m=double, right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
-    cdef int _roll(self, long long until, Lm629 left, Lm629 right) except -1
-    @cython.final
-    @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
-    cdef inline int _step(self, int ticks, Lm629 left, Lm629 right) except -1
-    @cython.final
-    cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick) noexcept
+    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int, constant=double,
+                   impulse=double, left_charge=double, right_charge=double)
+    cdef int _run(self, long long until, long long last, long long left_tick, long long right_tick) except -1

@@ -17,6 +17,7 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 from __future__ import annotations
 
 from miro_exact import dmath
+from miro_exact.clock import NEVER_TICK
 from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
@@ -27,8 +28,9 @@ from miro_sim.plant.rough import RoughBody
 
 LONGEST_STEP = 2048  # one PWM period
 TICK_S = 1.0 / 24e6
+_NEVER = NEVER_TICK
 _LARGEST = 1.7976931348623157e308
-_ANGLES = 1.6e6  # `dmath.ANGLE_LIMIT`
+_MOST_CROSSINGS = 16
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
 
@@ -59,38 +61,35 @@ class Winding:
         "wanted": ("i", -1, 1),
         "wait_ticks": ("i", 0, LONGEST_STEP),
     }
-    NOT_STATE = (
-        "on_ticks",
-        "off_ticks",
-        "drive_v",
-        "diode_v",
-        "ohm",
-        "tau",
-        "decay",
-        "up_v",
-        "down_v",
-    )
+    NOT_STATE = ("on_ticks", "off_ticks", "decay", "volt", "ohm", "tau", "row")
 
     def __init__(self, params: DriveParams) -> None:
         motor = params.motor
-        self.drive_v = params.battery.voltage_v - params.bridge.drop_v
-        self.diode_v = params.battery.voltage_v + 2.0 * params.bridge.diode_v
-        diode_ohm = motor.resistance_ohm + params.battery.resistance_ohm
-        self.ohm = [diode_ohm, diode_ohm + params.bridge.drop_ohm]  # through diodes, through transistors
-        self.tau = [motor.inductance_h / (ohm * TICK_S) for ohm in self.ohm]  # in ticks
-        self.decay = [dmath.exp(-ticks / tau) for tau in self.tau for ticks in range(LONGEST_STEP + 1)]
+        driven = params.battery.voltage_v - params.bridge.drop_v
+        diodes = params.battery.voltage_v + 2.0 * params.bridge.diode_v
+        through_diodes = motor.resistance_ohm + params.battery.resistance_ohm
+        through_transistors = through_diodes + params.bridge.drop_ohm
+        ohms = (through_diodes, through_transistors)
+        taus = [motor.inductance_h / (ohm * TICK_S) for ohm in ohms]  # in ticks
+        self.decay = [dmath.exp(-ticks / tau) for tau in taus for ticks in range(LONGEST_STEP + 1)]
+        # Driving backward, off, driving forward; for each a current below zero, then one above it.
+        self.volt = [-driven, -diodes, diodes, -diodes, diodes, driven]
+        self.ohm = [through_transistors, *[through_diodes] * 4, through_transistors]
+        self.tau = [taus[1], taus[0], taus[0], taus[0], taus[0], taus[1]]
+        self.row = [LONGEST_STEP + 1, 0, 0, 0, 0, LONGEST_STEP + 1]  # of `decay`
         self.on_ticks = int(params.bridge.on_delay_s / TICK_S + 0.5)
         self.off_ticks = int(params.bridge.off_delay_s / TICK_S + 0.5)
         self.current_a = 0.0
+        self.drive = 0
         self.wanted = 0  # by the inputs
         self.wait_ticks = 0  # until the bridge does it; 0: it does
-        self._switch(0)
 
     def set_bridge(self, enable: int, forward: int) -> None:
         """Inputs of the L298 half: enable pin and direction (1 forward, 0 backward), from now on."""
-        wanted = 0
-        if enable:
-            wanted = 1 if forward else -1
+        self._ask((1 if forward else -1) if enable else 0)
+
+    def _ask(self, wanted: int) -> None:
+        """The inputs ask the transistors to drive forward (1), backward (-1) or not (0)."""
         if wanted == self.wanted:
             return
         self.wanted = wanted
@@ -98,13 +97,20 @@ class Winding:
         if wanted != self.drive:
             self.wait_ticks = self.off_ticks if self.drive != 0 else self.on_ticks
             if self.wait_ticks == 0:
-                self._switch(wanted)
+                self.drive = wanted
 
-    def _switch(self, drive: int) -> None:
-        """Makes the transistors drive forward (1) or backward (-1), or turns them off (0)."""
-        self.drive = drive
-        self.up_v = self.drive_v if self.drive > 0 else -self.diode_v
-        self.down_v = -self.drive_v if self.drive < 0 else self.diode_v
+    def pass_edge(self, chip: Lm629) -> int:
+        """What `MotorAxis.advance` does at an edge, and the bridge's input after it. Returns the tick of the next."""
+        if chip.pwm:
+            chip.pwm = 0
+            chip.next_tick = chip.period_tick + LONGEST_STEP
+            self._ask(0)
+        else:
+            chip.pwm = 1
+            chip.period_tick = chip.next_tick
+            chip.next_tick += 16 * chip.pwm_magnitude
+            self._ask(-1 if chip.sign else 1)
+        return chip.next_tick
 
     def step(self, ticks: int, emf_v: float) -> float:
         """Advances by 1..2048 ticks with the back-EMF held; returns the charge that passed, in A * ticks."""
@@ -115,35 +121,39 @@ class Winding:
     def _pass(self, ticks: int, emf_v: float) -> float:
         """The same unchecked; NaN where a result is not finite: the body's next angle raises DomainError."""
         wait = self.wait_ticks
+        first = ticks if wait == 0 or wait > ticks else wait
+        charge = self._flow(first, emf_v)
         if wait == 0:
-            return self._flow(ticks, emf_v)
-        if wait > ticks:
-            self.wait_ticks = wait - ticks
-            return self._flow(ticks, emf_v)
-        charge = self._flow(wait, emf_v)
-        self.wait_ticks = 0
-        self._switch(self.wanted)
-        return charge if wait == ticks else charge + self._flow(ticks - wait, emf_v)
+            return charge
+        self.wait_ticks = wait - first
+        if wait == first:
+            self.drive = self.wanted
+            if first < ticks:
+                charge = charge + self._flow(ticks - first, emf_v)
+        return charge
 
     def _flow(self, ticks: int, emf_v: float) -> float:
         """The charge of an interval in which the bridge does not switch."""
         start = self.current_a
-        if start > 0.0 or (start == 0.0 and emf_v < self.up_v):
-            positive = True
-            voltage = self.up_v
-            driven = self.drive > 0
-        elif start < 0.0 or emf_v > self.down_v:
-            positive = False
-            voltage = self.down_v
-            driven = self.drive < 0
-        else:
-            return 0.0  # blocked
-        tau = self.tau[driven]
-        final = (voltage - emf_v) / self.ohm[driven]
-        end = final + (start - final) * self.decay[driven * (LONGEST_STEP + 1) + ticks]
-        if (end >= 0.0) == positive or end == 0.0:
+        kind = 2 * self.drive + 3
+        if start < 0.0:
+            kind -= 1
+        elif start == 0.0:
+            if emf_v > self.volt[kind - 1]:
+                kind -= 1
+            elif not emf_v < self.volt[kind]:
+                return 0.0  # blocked
+        final = (self.volt[kind] - emf_v) / self.ohm[kind]
+        end = final + (start - final) * self.decay[self.row[kind] + ticks]
+        goes_on = end >= 0.0 if kind & 1 else not end > 0.0
+        if goes_on:
             self.current_a = end
-            return final * ticks + tau * (start - end)
+            return final * ticks + self.tau[kind] * (start - end)
+        return self._through_zero(ticks, emf_v, final, self.tau[kind])
+
+    def _through_zero(self, ticks: int, emf_v: float, final: float, tau: float) -> float:
+        """The charge of an interval in which the current comes to zero on its way to `final`."""
+        start = self.current_a
         ratio = 1.0 - start / final
         if not ratio <= _LARGEST:
             return ratio - ratio
@@ -155,25 +165,20 @@ class Winding:
         """The rest of an interval in which the current came to zero: blocked, or on with the other sign."""
         if ticks <= 0.0:
             return 0.0
-        if emf_v < self.up_v:
-            voltage = self.up_v
-            driven = self.drive > 0
-        elif emf_v > self.down_v:
-            voltage = self.down_v
-            driven = self.drive < 0
-        else:
+        kind = 2 * self.drive + 3
+        if emf_v > self.volt[kind - 1]:
+            kind -= 1
+        elif not emf_v < self.volt[kind]:
             return 0.0
-        tau = self.tau[driven]
-        final = (voltage - emf_v) / self.ohm[driven]
-        self.current_a = final * (1.0 - dmath.exp_within(-ticks / tau))
-        return final * ticks - tau * self.current_a
+        final = (self.volt[kind] - emf_v) / self.ohm[kind]
+        self.current_a = final * (1.0 - dmath.exp_within(-ticks / self.tau[kind]))
+        return final * ticks - self.tau[kind] * self.current_a
 
     def after_load(self) -> None:
         """Raises ValueError unless the bridge waits exactly while it does not do what its inputs ask for."""
         longest = self.off_ticks if self.drive != 0 else self.on_ticks
         if (self.wait_ticks == 0) != (self.drive == self.wanted) or self.wait_ticks > longest:
             raise ValueError(f"a bridge at {self.drive} waits {self.wait_ticks} ticks for {self.wanted}")
-        self._switch(self.drive)
 
     def __repr__(self) -> str:
         mode = "forward" if self.drive > 0 else "backward" if self.drive < 0 else "off"
@@ -191,16 +196,29 @@ class Quadrature:
         "position": ("d", -_MOST_COUNTS, _MOST_COUNTS),
         "count": ("q", -_MOST_COUNTS, _MOST_COUNTS),
     }
-    NOT_STATE = ("counts_per_radian", "counts_per_turn")
+    NOT_STATE = (
+        "counts_per_radian", "counts_per_turn", "chip", "told",
+        "crossings", "cross_tick", "cross_ticks", "cross_start", "cross_moved", "cross_count",
+    )  # fmt: skip
 
     def __init__(self, counts_per_radian: float, counts_per_turn: int = 0) -> None:
         self.counts_per_radian = counts_per_radian
         self.counts_per_turn = counts_per_turn  # 0: there is no index channel
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
+        self.chip: Lm629 | None = None
+        self.told = 0  # the count that the chip has seen
+        self.crossings = (
+            0  # steps since then with edges in them: begin, length, position, way, count at its end
+        )
+        self.cross_tick = [0] * 16
+        self.cross_ticks = [0] * 16
+        self.cross_start = [0.0] * 16
+        self.cross_moved = [0.0] * 16
+        self.cross_count = [0] * 16
 
-    def turn(self, radians: float, start_tick: int, ticks: int, chip: Lm629 | None) -> None:
-        """Turns the shaft evenly from `start_tick` on for `ticks`, and tells the LM629 of its edges in order."""
+    def turn(self, radians: float, start_tick: int, ticks: int) -> None:
+        """Turns the shaft evenly from `start_tick` on for `ticks`; `tell` tells the LM629 of the edges."""
         moved = radians * self.counts_per_radian
         start = self.position
         position = start + moved
@@ -209,31 +227,86 @@ class Quadrature:
         if last > position:
             last -= 1
         if last != self.count:
-            self._cross(start, last, ticks / moved, start_tick, ticks, chip)
+            if self.crossings == _MOST_CROSSINGS:
+                self.tell()
+            crossing = self.crossings
+            self.cross_tick[crossing] = start_tick
+            self.cross_ticks[crossing] = ticks
+            self.cross_start[crossing] = start
+            self.cross_moved[crossing] = moved
+            self.cross_count[crossing] = last
+            self.count = last
+            self.crossings = crossing + 1
 
-    def _cross(
-        self, start: float, last: int, ticks_per_count: float, start_tick: int, ticks: int, chip: Lm629 | None
-    ) -> None:
-        """The edges from `count` to `last`. The index channel changes with A and B."""
-        count = self.count
-        while count != last:
-            forward = last > count
-            boundary = count + 1 if forward else count
-            exact = (boundary - start) * ticks_per_count
-            after = int(exact)
-            if not forward or after < exact:
-                after += 1  # forward the first tick at or after the crossing, backward the first beyond it
-            after = min(max(after, 1), ticks)
-            count += 1 if forward else -1
-            self.count = count
-            if chip is None:
-                continue
-            if chip.encoder_edges is None:
-                chip.encoder.set_place(start_tick + after, count & 3)
-            else:
-                chip.set_encoder(start_tick + after, self.a(), self.b())
-            if self.counts_per_turn:
-                chip.set_index(start_tick + after, self.index())
+    def tell(self) -> None:
+        """Tells the LM629 of the edges since the last time."""
+        if self.crossings == 0:
+            return
+        chip = self.chip
+        if chip is not None and not self._tell_run(chip):
+            self._tell_each(chip)
+        self.crossings = 0
+        self.told = self.count
+
+    def _tell_run(self, chip: Lm629) -> int:
+        """Tells of them all at once, if they go one way and so slowly that the decoder counts each. Returns whether."""
+        if chip.encoder_edges is not None or self.counts_per_turn:
+            return 0
+        limit = chip.encoder.spacing + 4.0  # ticks a count
+        step = 1 if self.count > self.told else -1
+        end_tick = self.cross_tick[0]
+        end = self.cross_start[0]
+        for crossing in range(self.crossings):
+            start_tick = self.cross_tick[crossing]
+            start = self.cross_start[crossing]
+            moved = step * self.cross_moved[crossing]
+            ticks = self.cross_ticks[crossing]
+            if moved < 0.0 or moved * limit > ticks or step * (start - end) * limit > start_tick - end_tick:
+                return 0
+            end_tick = start_tick + ticks
+            end = start + self.cross_moved[crossing]
+        edges = step * (self.count - self.told)
+        first_tick = self._edge_tick(0, self.told)
+        last = self.crossings - 1
+        before = self.count - step
+        last_tick = self._edge_tick(last, before)
+        before_tick = first_tick
+        if edges > 2:
+            if last > 0 and self.cross_count[last - 1] == before:
+                last -= 1
+            before_tick = self._edge_tick(last, before - step)
+        return chip.encoder.set_run(first_tick, before_tick, last_tick, edges, step, self.count)
+
+    def _tell_each(self, chip: Lm629) -> None:
+        """Tells of one after the other."""
+        self.count = self.told
+        for crossing in range(self.crossings):
+            while self.count != self.cross_count[crossing]:
+                tick = self._edge_tick(crossing, self.count)
+                self.count += 1 if self.cross_moved[crossing] > 0.0 else -1
+                self._show(tick, chip)
+
+    def _edge_tick(self, crossing: int, count: int) -> int:
+        """The tick of the edge that leads away from a count."""
+        ticks = self.cross_ticks[crossing]
+        moved = self.cross_moved[crossing]
+        forward = moved > 0.0
+        exact = ((count + 1 if forward else count) - self.cross_start[crossing]) * (ticks / moved)
+        after = int(exact)
+        if not forward or after < exact:
+            after += 1  # forward the first tick at or after the crossing, backward the first beyond it
+        return self.cross_tick[crossing] + min(max(after, 1), ticks)
+
+    def attach(self, tick: int, chip: Lm629) -> None:
+        """Wires the outputs to the LM629 and shows it the levels of now."""
+        self.chip = chip
+        self._show(tick, chip)
+
+    def _show(self, tick: int, chip: Lm629) -> None:
+        """Shows the LM629 the levels of A and B, and of the index channel if there is one: it changes with them."""
+        chip.set_encoder(tick, self.a(), self.b())
+        if self.counts_per_turn:
+            chip.set_index(tick, self.index())
 
     def a(self) -> int:
         """Level of channel A."""
@@ -249,6 +322,8 @@ class Quadrature:
 
     def after_load(self) -> None:
         """Raises ValueError unless A and B show the position."""
+        self.crossings = 0
+        self.told = self.count
         if not self.count <= self.position < self.count + 1:
             raise ValueError(f"count is {self.count} at position {self.position}")
 
@@ -260,18 +335,6 @@ def _other_tick(chip: Lm629) -> int:
     """The next tick at which the chip has more to do than to begin or end a pulse of PWM."""
     pulsing = chip.pwm_magnitude != 0 and chip.pulses != 0 and not chip.pulse_late
     return chip.sample_tick if pulsing else chip.next_tick
-
-
-def _pass_edge(chip: Lm629, winding: Winding) -> None:
-    """What `MotorAxis.advance` does at an edge, and the bridge's input after it."""
-    if chip.pwm:
-        chip.pwm = 0
-        chip.next_tick = chip.period_tick + LONGEST_STEP
-    else:
-        chip.pwm = 1
-        chip.period_tick = chip.next_tick
-        chip.next_tick += 16 * chip.pwm_magnitude
-    winding.set_bridge(chip.pwm, 1 - chip.sign)
 
 
 class DifferentialDrive(Plant):
@@ -315,113 +378,58 @@ class DifferentialDrive(Plant):
         """Wires the encoder outputs to the two LM629 and shows these the levels of now."""
         self.left = left
         self.right = right
-        left.set_encoder(self.tick, self.left_encoder.a(), self.left_encoder.b())
-        right.set_encoder(self.tick, self.right_encoder.a(), self.right_encoder.b())
-        self._show_index(left, self.left_encoder, self.tick)
-        self._show_index(right, self.right_encoder, self.tick)
+        self.left_encoder.attach(self.tick, left)
+        self.right_encoder.attach(self.tick, right)
 
     def advance(self, tick: int) -> None:
         """Integrates to `tick` (a tick that is past already: nothing)."""
-        while self.tick < tick:
-            self._step(min(tick - self.tick, LONGEST_STEP), self.left, self.right)
-        self.next_tick = self.tick + LONGEST_STEP
+        if self.tick < tick:
+            self._run(tick, tick, _NEVER, _NEVER)
 
     def run_pulses(self, tick: int) -> int:
-        """Steps and PWM edges one after the other, as the board does them by `advance`, the chips' and `set_bridge`."""
+        """Steps and PWM edges one after the other, as the board does them by `advance`, the chips' and `set_bridge`.
+
+        Where a chip has more to do by `tick`, the last step ends there.
+        """
         left = self.left
         right = self.right
         if left is None or right is None:
             return 0
-        begin = self.next_tick
-        until = min(tick, _other_tick(left) - 1, _other_tick(right) - 1)
-        if self.rough is None and min(begin, left.next_tick, right.next_tick) <= until:
-            self._roll(until, left, right)
-        while True:
-            now = min(self.next_tick, left.next_tick, right.next_tick)
-            if now > until:
-                return self.next_tick != begin
-            if self.tick < now:
-                self._step(now - self.tick, left, right)
-            self.next_tick = now + LONGEST_STEP
-            if left.next_tick == now:
-                _pass_edge(left, self.left_winding)
-            if right.next_tick == now:
-                _pass_edge(right, self.right_winding)
+        begin = self.tick
+        other = min(_other_tick(left), _other_tick(right))
+        self._run(tick, other, left.next_tick, right.next_tick)
+        return self.tick != begin
 
-    def _roll(self, until: int, left: Lm629, right: Lm629) -> None:
-        """The same up to and including `until` for wheels that only roll: `Body.push` in one loop over locals."""
-        body = self.body
-        left_winding, right_winding = self.left_winding, self.right_winding
-        left_encoder, right_encoder = self.left_encoder, self.right_encoder
+    def _run(self, until: int, last: int, left_tick: int, right_tick: int) -> None:
+        """Steps that end by `until`, until one has ended at `last`; edges of PWM from these two ticks on."""
+        left = self.left
+        right = self.right
         constant = self.torque_constant_nm_a
         impulse = constant * TICK_S
-        inverse_ll, inverse_lr, inverse_rr = body.inverse_ll, body.inverse_lr, body.inverse_rr
-        left_rad_s, right_rad_s = body.left_rad_s, body.right_rad_s
-        x_m, y_m, theta_rad = body.x_m, body.y_m, body.theta_rad
         begin = self.tick
-        now = min(self.next_tick, left.next_tick, right.next_tick)
+        now = min(begin + LONGEST_STEP, last, left_tick, right_tick)
         while now <= until:
-            ticks = now - begin
-            if ticks > 0:
-                left_nms = impulse * left_winding._pass(ticks, constant * left_rad_s)
-                right_nms = impulse * right_winding._pass(ticks, constant * right_rad_s)
-                if left_rad_s != 0.0 or right_rad_s != 0.0 or left_nms != 0.0 or right_nms != 0.0:
-                    half_s = 0.5 * TICK_S * ticks
-                    most = 2.0 * half_s * body.friction_nm
-                    free_left = left_rad_s + inverse_ll * left_nms + inverse_lr * right_nms
-                    free_right = right_rad_s + inverse_lr * left_nms + inverse_rr * right_nms
-                    left_rub = most if free_left < 0.0 else -most
-                    right_rub = most if free_right < 0.0 else -most
-                    new_left = free_left + inverse_ll * left_rub + inverse_lr * right_rub
-                    new_right = free_right + inverse_lr * left_rub + inverse_rr * right_rub
-                    if not (new_left * free_left > 0.0 and new_right * free_right > 0.0):
-                        body._rub(free_left, free_right, most)
-                        new_left, new_right = body.left_rad_s, body.right_rad_s
-                    turned_left = half_s * (left_rad_s + new_left)
-                    turned_right = half_s * (right_rad_s + new_right)
-                    left_rad_s, right_rad_s = new_left, new_right
-                    if turned_left != 0.0 or turned_right != 0.0:
-                        left_m = body.left_m_rad * turned_left
-                        right_m = body.right_m_rad * turned_right
-                        half = 0.5 * (right_m - left_m) / body.track_m
-                        chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
-                        angle = theta_rad + half
-                        if not -_ANGLES < angle < _ANGLES:
-                            dmath.sincos(angle)  # raises DomainError
-                        sine, cosine = dmath.sincos_within(angle)
-                        x_m = x_m + chord_m * cosine
-                        y_m = y_m + chord_m * sine
-                        theta_rad = theta_rad + 2.0 * half
-                        left_encoder.turn(turned_left, begin, ticks, left)
-                        right_encoder.turn(turned_right, begin, ticks, right)
+            if begin < now:
+                ticks = now - begin
+                if self.rough is not None:
+                    self.rough.feel(begin + (ticks >> 1))
+                left_charge = self.left_winding._pass(ticks, constant * self.body.left_rad_s)
+                right_charge = self.right_winding._pass(ticks, constant * self.body.right_rad_s)
+                self.body.push(impulse * left_charge, impulse * right_charge, ticks)
+                self.left_encoder.turn(self.body.turned_left_rad, begin, ticks)
+                self.right_encoder.turn(self.body.turned_right_rad, begin, ticks)
                 begin = now
-            if left.next_tick == now:
-                _pass_edge(left, left_winding)
-            if right.next_tick == now:
-                _pass_edge(right, right_winding)
-            next_tick = now + LONGEST_STEP
-            now = min(next_tick, left.next_tick, right.next_tick)
-            self.next_tick = next_tick
-        self.tick = begin
-        body.left_rad_s, body.right_rad_s = left_rad_s, right_rad_s
-        body.x_m, body.y_m, body.theta_rad = x_m, y_m, theta_rad
-
-    def _step(self, ticks: int, left: Lm629 | None, right: Lm629 | None) -> None:
-        constant = self.torque_constant_nm_a
-        start_tick = self.tick
-        if self.rough is not None:
-            self.rough.feel(start_tick + (ticks >> 1))
-        left_charge = self.left_winding.step(ticks, constant * self.body.left_rad_s)
-        right_charge = self.right_winding.step(ticks, constant * self.body.right_rad_s)
-        self.body.push(constant * TICK_S * left_charge, constant * TICK_S * right_charge, ticks)
-        self.tick = start_tick + ticks
-        self.left_encoder.turn(self.body.turned_left_rad, start_tick, ticks, left)
-        self.right_encoder.turn(self.body.turned_right_rad, start_tick, ticks, right)
-
-    def _show_index(self, chip: Lm629, encoder: Quadrature, tick: int) -> None:
-        """The index channel changes with A and B."""
-        if encoder.counts_per_turn:
-            chip.set_index(tick, encoder.index())
+                self.tick = now
+            if now == last:
+                break
+            if now == left_tick and left is not None:
+                left_tick = self.left_winding.pass_edge(left)
+            if now == right_tick and right is not None:
+                right_tick = self.right_winding.pass_edge(right)
+            now = min(begin + LONGEST_STEP, last, left_tick, right_tick)
+        self.next_tick = begin + LONGEST_STEP
+        self.left_encoder.tell()
+        self.right_encoder.tell()
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
