@@ -18,4 +18,6 @@ cdef class EventLog:
     cpdef void note(self, int kind, long long tick, long long code, long long value) noexcept
     @cython.locals(place=cython.longlong)
     cpdef void note_long(self, int kind, long long tick, long long code, int size, long long high, long long low) noexcept
+    @cython.locals(place=cython.longlong, kind=cython.int, tick=cython.longlong, code=cython.longlong)
+    cpdef void copy(self, EventLog other, long long serial) noexcept
     cpdef cut(self, long long serial)

@@ -53,6 +53,12 @@ class EventLog:
         if self.end - self.first > CAPACITY:
             self.first = self.end - CAPACITY
 
+    def copy(self, other: EventLog, serial: int) -> None:
+        """Adds an event of another log once more."""
+        place = serial & _MASK
+        kind, tick, code = other._kinds[place], other._ticks[place], other._codes[place]
+        self.note_long(kind, tick, code, other._sizes[place], other._high[place], other._low[place])
+
     def event(self, serial: int) -> tuple[int, int, int, int, int]:
         """(tick, kind, code, size, value). Raises IndexError for an event that is not kept."""
         if not self.first <= serial < self.end:

@@ -1,6 +1,7 @@
 cimport cython
 
 from miro_robot.board cimport Board
+from miro_robot.event_log cimport EventLog
 from miro_robot.harness.oracle cimport LiveOracle
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
@@ -8,6 +9,25 @@ from miro_robot.mcs51.line cimport Line
 
 cdef long long _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD, _RESET_TICKS, _LOOK, _WAIT
 cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET
+
+
+cdef bytes _OPENING
+
+
+cdef class Opening:
+    cdef int usable, mask
+    cdef long long tick
+    cdef object flat
+    cdef bytes state
+    cdef EventLog events
+    cdef int[::1] passed
+    cdef int edge_before, edge_depth, highest_sp
+    cdef int edge_outer[8]
+
+    @cython.locals(serial='long long', depth=int)
+    cdef int keep(self, Cpu cpu, EventLog log, long long begun) except -1
+    @cython.locals(serial='long long', place='Py_ssize_t', count=int, depth=int)
+    cdef int put(self, Cpu cpu, EventLog log) except -1
 
 
 cdef class Harness:
@@ -19,10 +39,16 @@ cdef class Harness:
     cdef readonly int sleeps
     cdef object _flat
     cdef bytes _state
+    cdef Opening _opening
 
     cpdef back(self)
     cdef int _forget_records(self, Board board) except -1
-    @cython.locals(tick='long long', pause='long long', place=int, flaws=int, waiting=int)
+    @cython.locals(board=Board)
+    cdef int _begin(self, Program program) except -1
+    cdef bint _opens(self, Board board, Program program) except -1
+    @cython.locals(opening=Opening, begun='long long', tick='long long', value=int)
+    cdef int _open(self, Board board) except -1
+    @cython.locals(first=int, tick='long long', pause='long long', place=int, flaws=int, waiting=int)
     cpdef int play(self, Program program) except -1
     @cython.locals(bit='long long', levels=int, place=int, rxd=Line)
     cdef int _character(self, int value, int bad_stop, long long tick) except -1

@@ -4,17 +4,22 @@
                         |
                         +--> edges between branches, stack, event log --> oracle
 
+Most inputs begin with a frame, and all frames begin alike: that moment is kept too, with what was seen on the way.
+
 A character begins with the end of the one before it or after a pause, and a bad stop bit is space for three quarters of
 a bit, as on the air (`miro_sim.radio.sender`): the same characters at the same ticks in a world give the same levels.
 """
 
 from __future__ import annotations
 
+from array import array
 from typing import Any
 
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_exact.state import Flat
+from miro_protocol.table import downlink
 from miro_robot.board import Board
+from miro_robot.event_log import EventLog
 from miro_robot.harness.oracle import LiveOracle
 from miro_robot.harness.program import RESET_TICKS, Program
 from miro_robot.mcs51.cpu import Cpu
@@ -38,6 +43,60 @@ _LOOK = TICKS_PER_SECOND // 10_000  # how often it is looked at whether firmware
 _WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the oracle waits for came
 _BURST = 64  # characters on RXD that are not heard yet
 _BAD_STOP, _RESET = 1, 2
+_OPENING = downlink(3).lead + downlink(3).sync  # of any number of robots
+
+
+class Opening:
+    """The moment right before the first character after `_OPENING`, and what was seen on the way to it.
+
+    `usable`: no mistake was found on the way. `mask`: of the map in which edges were counted; -1 before the first time.
+    """
+
+    NOT_STATE = (
+        "usable", "mask", "tick", "flat", "state", "events", "passed", "edge_before", "edge_depth", "edge_outer",
+        "highest_sp",
+    )  # fmt: skip
+
+    def __init__(self, machine: Any) -> None:
+        self.usable = 0
+        self.mask = -1
+        self.tick = 0
+        self.flat = Flat(machine)
+        self.state = b""
+        self.events = EventLog()
+        self.passed = array("i")  # index in the map, how often, index, ..
+        self.edge_before = 0
+        self.edge_depth = 0
+        self.edge_outer = [0] * 8
+        self.highest_sp = 0
+
+    def keep(self, cpu: Cpu, log: EventLog, begun: int) -> None:
+        """This is the moment; events of the log count from `begun` on, and edges in a map that was empty."""
+        self.state = self.flat.save()
+        self.events = EventLog()
+        for serial in range(begun, log.end):
+            self.events.copy(log, serial)
+        counts = bytes(cpu.edges)
+        self.passed = array("i", [n for index, count in enumerate(counts) if count for n in (index, count)])
+        self.edge_before = cpu.edge_before
+        self.edge_depth = cpu.edge_depth
+        for depth in range(8):
+            self.edge_outer[depth] = cpu.edge_outer[depth]
+        self.highest_sp = cpu.highest_sp
+
+    def put(self, cpu: Cpu, log: EventLog) -> None:
+        """Back to it."""
+        self.flat.load(self.state)
+        for serial in range(self.events.end):
+            log.copy(self.events, serial)
+        for place in range(0, len(self.passed), 2):
+            count = cpu.edges[self.passed[place]] + self.passed[place + 1]
+            cpu.edges[self.passed[place]] = (count & 0xFF) + (count >> 8)
+        cpu.edge_before = self.edge_before
+        cpu.edge_depth = self.edge_depth
+        for depth in range(8):
+            cpu.edge_outer[depth] = self.edge_outer[depth]
+        cpu.highest_sp = self.highest_sp
 
 
 class Harness:
@@ -49,7 +108,7 @@ class Harness:
 
     NOT_STATE = (
         *("machine", "board", "cpu", "oracle", "bit_ticks", "begin_tick", "sleeps", "now_tick", "end_tick"),
-        *("_flat", "_state"),
+        *("_flat", "_state", "_opening"),
     )
 
     def __init__(
@@ -72,6 +131,7 @@ class Harness:
         self._flat = Flat(machine)
         self._state = self._flat.save()
         self._flat.load(self._state)
+        self._opening = Opening(machine)
         self.sleeps = 1 if self._falls_asleep(self.begin_tick + _SETTLE) else 0
         self.back()
 
@@ -92,10 +152,10 @@ class Harness:
 
     def play(self, program: Program) -> int:
         """Puts the machine back and sends what the program has read. Returns DONE, STOPPED or AWAKE."""
-        self.back()
-        tick = self.begin_tick + _LEAD
+        first = self._begin(program)
+        tick = self.begin_tick + _LEAD + first * 10 * self.bit_ticks
         waiting = 0
-        for place in range(program.count):
+        for place in range(first, program.count):
             flaws = program.flaws[place]
             pause = program.pauses[place]
             if pause or flaws & _RESET:
@@ -118,6 +178,44 @@ class Harness:
         if self._run(tick + program.trailing_ticks()):
             return _STOPPED
         return self._settle(tick + program.trailing_ticks())
+
+    def _begin(self, program: Program) -> int:
+        """Puts the machine back to before a character of the program; which one."""
+        board = self.board
+        if board is None or not self._opens(board, program):
+            self.back()
+            return 0
+        self.oracle.begin(self.begin_tick)
+        self._opening.put(self.cpu, board.log)
+        self._forget_records(board)
+        self.now_tick = self._opening.tick
+        return len(_OPENING)
+
+    def _opens(self, board: Board, program: Program) -> bool:
+        """Whether the program begins as all frames do, and nobody looks into the board meanwhile."""
+        if board.probe is not None or self.cpu.inspector is not None or not program.opens_with(_OPENING):
+            return False
+        if self._opening.mask != self.cpu.edge_mask:
+            self._open(board)
+        return self._opening.usable != 0
+
+    def _open(self, board: Board) -> None:
+        """Sends what all frames begin with, and keeps the moment after it."""
+        opening = self._opening
+        edges = self.cpu.edges
+        self.cpu.watch_edges(memoryview(bytearray(self.cpu.edge_mask + 1)))
+        self.back()
+        begun = board.log.end
+        tick = self.begin_tick + _LEAD
+        for value in _OPENING:
+            self._character(value, 0, tick)
+            tick += 10 * self.bit_ticks
+        opening.mask = self.cpu.edge_mask
+        opening.tick = tick - _AHEAD
+        opening.usable = 0 if self._run(opening.tick) else 1
+        opening.keep(self.cpu, board.log, begun)
+        board.log.cut(begun)
+        self.cpu.watch_edges(edges)
 
     def _character(self, value: int, bad_stop: int, tick: int) -> None:
         bit = self.bit_ticks

@@ -29,6 +29,8 @@ cdef class Program:
     cpdef int read(self, data) except -1
     cpdef long long trailing_ticks(self) noexcept
     cpdef bint ends_with_reset(self) noexcept
+    @cython.locals(size=int, place=int)
+    cpdef bint opens_with(self, bytes characters) noexcept
     cdef bint _has_room(self) noexcept
     @cython.locals(value=int)
     cdef int _next(self) noexcept

@@ -187,6 +187,16 @@ class Program:
         """Whether the reset pin goes up after the last character."""
         return self._flags & _RESET != 0
 
+    def opens_with(self, characters: bytes) -> bool:
+        """Whether these come first, without a pause, a bad stop bit or a reset."""
+        size = len(characters)
+        if self.count < size:
+            return False
+        for place in range(size):
+            if self.characters[place] != characters[place] or self.flaws[place] or self.pauses[place]:
+                return False
+        return True
+
     def character(self, place: int) -> tuple[int, bool, bool, int]:
         """Value, whether its stop bit is bad, whether a reset comes before it, and the pause before it in ticks."""
         flaws = self.flaws[place]

@@ -3,25 +3,26 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
+from miro_robot.harness.fast_oracle import FastOracle
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
-from miro_robot.harness.oracle import LiveOracle
-from miro_robot.harness.program import BYTES, SESSION, Program
+from miro_robot.harness.program import BYTES, FRAMES, SESSION, Program
 from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.plant import Plant
+from miro_robot.probe import Probe
 from miro_robot.wiring import load_wiring
 
 BIT_TICKS = 2500
 MS = 24_000
 
 
-def board_with(image, ticks=40 * MS, plant=None):
-    board = Board(load_wiring(), plant or Plant())
+def board_with(image, ticks=40 * MS):
+    board = Board(load_wiring(), Plant())
     board.load(image)
     board.cpu.rxd.settled_tick = 2 * ticks
     board.run(ticks)
@@ -29,7 +30,7 @@ def board_with(image, ticks=40 * MS, plant=None):
 
 
 def harness_for(board):
-    return Harness(board, board.cpu, LiveOracle(), BIT_TICKS, board)
+    return Harness(board, board.cpu, FastOracle(board, 0, 3), BIT_TICKS, board)
 
 
 def program(data, how=SESSION):
@@ -73,23 +74,51 @@ def test_firmware_cannot_tell_whether_the_pulses_for_unplugged_motors_are_drawn(
     assert edges[0] == edges[1]
 
 
-class EverySample(Plant):
-    """Lets the board's chips make each sample."""
+@pytest.fixture(scope="module")
+def step_by_step():
+    """A harness whose board has a probe: it passes no sample, and begins with the first character."""
+    harness = harness_for(board_with(load_hex(image_path())))
+    harness.board.probe = Probe()
+    return harness
 
-    def run_pulses(self, tick):
-        return 0
+
+def played(harness, data, edges, how):
+    """All that a run of a harness shows; edges are counted on top of those in the map."""
+    counted = bytearray(edges * (8192 // len(edges)))
+    harness.cpu.watch_edges(memoryview(counted))
+    begun = harness.board.log.end
+    ended = harness.play(program(data, how))
+    log = harness.board.log
+    events = [log.event(serial) for serial in range(max(begun, log.first), log.end)]
+    oracle = harness.oracle
+    verdict = ended, oracle.code, oracle.tick, oracle.accepted
+    return verdict, harness.now_tick, harness.cpu.highest_sp, events, bytes(counted), snapshot(harness.board)
 
 
-@settings(max_examples=25, derandomize=True)
-@given(st.binary(max_size=40))
-def test_chips_without_work_pass_their_samples_with_the_same_state(data):
-    harnesses = [
-        harness_for(board_with(load_hex(image_path()), plant=plant())) for plant in (Plant, EverySample)
-    ]
-    harnesses[1].board.left.pulses = harnesses[1].board.right.pulses = 0
-    ends = {one.play(program(data)) for one in harnesses}
-    assert len(ends) == 1
-    assert snapshot(harnesses[0].board) == snapshot(harnesses[1].board)
+@settings(max_examples=60, derandomize=True)
+@given(
+    data=st.binary(max_size=40) | st.binary(max_size=40).map(lambda data: b"\x00" + data),
+    edges=st.binary(min_size=1, max_size=1) | st.just(bytes(range(256))),
+    how=st.sampled_from((BYTES, FRAMES, SESSION)),
+)
+@example(data=b"\x55\x55\x55\x55\x55\xff\x2d\xd4", edges=b"\xff", how=BYTES)
+@example(data=b"\x55\x55\x55\x55\x55\xff\x2d\xd4\x00", edges=b"\xfe", how=BYTES)
+@example(data=b"\x0d\x08\x00", edges=b"\x00", how=SESSION)
+@example(data=b"\x0e\x07\x00", edges=b"\x00", how=SESSION)
+@example(data=b"\x0f\x00", edges=b"\x00", how=SESSION)
+@example(data=b"\x0a\x00\x00", edges=b"\x00", how=SESSION)
+def test_short_cuts_of_a_harness_change_nothing_that_a_run_shows(harness, step_by_step, data, edges, how):
+    assert played(harness, data, edges, how) == played(step_by_step, data, edges, how)
+
+
+def test_other_maps_get_the_edges_of_the_opening_too(harness, step_by_step):
+    for size in (64, 1, 8192, 256):
+        maps = []
+        for one in (harness, step_by_step):
+            maps.append(bytearray(size))
+            one.cpu.watch_edges(memoryview(maps[-1]))
+            one.play(program(b"\x00\x10\x00\x20\x00"))
+        assert maps[0] == maps[1]
 
 
 def test_runs_leave_nothing_behind_that_grows(harness):
@@ -180,7 +209,8 @@ def test_a_fault_ends_the_run():
     broken = bytearray(image.code[:64])
     broken[0x23] = 0xA5
     harness = harness_for(board_with(image_of(bytes(broken))))
-    assert harness.play(program(b"\x55", BYTES)) == STOPPED
-    assert harness.board.faults[0].pc == 0x23
+    for _ in range(2):
+        assert harness.play(program(bytes(5), FRAMES)) == STOPPED
+        assert [fault.pc for fault in harness.board.faults] == [0x23]
     harness.back()
     assert not harness.board.faults

@@ -24,6 +24,19 @@ def test_bytes_are_characters_without_a_pause():
     assert played(Program(BYTES), b"\x00\x55\xff") == [(value, False, False, 0) for value in (0, 0x55, 0xFF)]
 
 
+def test_a_program_opens_with_characters_that_follow_each_other_from_its_start():
+    program = Program(SESSION)
+    program.read(b"\x09\x02abc")
+    assert program.opens_with(b"ab")
+    assert program.opens_with(b"abc")
+    assert not program.opens_with(b"ac")
+    program.read(b"\x09\x00a")
+    assert program.opens_with(b"a")
+    assert not program.opens_with(b"abc")
+    program.read(b"\x09\x00a\x0a\x00\x09\x00b")
+    assert not program.opens_with(b"ab")
+
+
 @pytest.mark.parametrize("robots", [3, 5])
 def test_frames_are_sealed_as_the_protocol_encodes_them(robots):
     pairs = tuple((100 * slot - 7, -32767 + slot) for slot in range(robots))
