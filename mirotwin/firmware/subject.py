@@ -89,6 +89,10 @@ def open_window(options: WindowOptions) -> Run:
         place = f"--from {options.from_tick}t --to {options.to_tick}t"
         raise BadInput("", place, "the window is empty", "--to must be later")
     run = open_run(options)
+    begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
+    if options.to_tick is not None and options.to_tick <= begin_tick:
+        what = f"the run begins at tick {begin_tick}"
+        raise BadInput(options.subject, f"--to {options.to_tick}t", what, "look later")
     if run.end_tick is not None and options.from_tick >= run.end_tick:
         what = f"the run ends at tick {run.end_tick}"
         raise BadInput(options.subject, f"--from {options.from_tick}t", what, "look earlier")

@@ -52,6 +52,14 @@ class CompareRule(msgspec.Struct, frozen=True):
     host: bool = False
     digests: bool = False
 
+    def compared(self, periods: Sequence[Period]) -> int:
+        """How many of the control periods have a part in the window."""
+        to_tick = NEVER_TICK if self.to_tick is None else self.to_tick
+        return sum(
+            self.from_tick < period.tick + CONTROL_PERIOD_TICKS and period.tick < to_tick
+            for period in periods
+        )
+
 
 EXACT = CompareRule()
 

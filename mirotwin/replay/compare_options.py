@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Annotated, Any
 
 import click
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_sim.periods import Period
 from mirotwin.desk.compare import ANSWERS
 from mirotwin.recording.compare import (
     KINDS,
@@ -101,6 +103,17 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             from_tick=0 if self.from_time is None else self.from_time.ticks(),
             to_tick=None if self.to_time is None else self.to_time.ticks(),
         )
+
+    def check_reaches(self, file: str, recorded: Sequence[Period]) -> None:
+        """Raises BadInput for a window that begins where the recording has ended, or ends where it begins."""
+        rule, first, last = self.rule, recorded[0], recorded[-1]
+        end_tick = last.tick + CONTROL_PERIOD_TICKS
+        if rule.from_tick >= end_tick:
+            what = f"the recording ends at tick {end_tick}"
+            raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
+        if rule.to_tick is not None and rule.to_tick <= first.tick:
+            what = f"the run begins at tick {first.tick}"
+            raise BadInput(file, f"--to {rule.to_tick}t", what, "look later")
 
     def of_answers(self, file: str) -> CompareRule:
         """The comparison of robots at a port. Raises BadInput for one that cannot be made there."""

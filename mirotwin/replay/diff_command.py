@@ -10,6 +10,7 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_sim.periods import Period
 from miro_sim.scenario.file import parse as parse_scenario
 from mirotwin.recording.compare import differences
 from mirotwin.recording.difference import Difference
@@ -70,6 +71,8 @@ def diff(options: DiffOptions) -> int:
     one, other = _same_robots(recordings, notes)
     digests = _digests(compare, recordings, notes)
     rule = msgspec.structs.replace(compare.rule, host=compare.rule.kind == "bits", digests=digests)
+    for path, recording in ((a, one), (b, other)):
+        compare.check_reaches(path, recording.periods)
     found = differences(one.periods, other.periods, rule)
     lengths = len(one.periods), len(other.periods)
     images = load_images(options.lines_from, *(one.image for one in made))
@@ -82,7 +85,7 @@ def diff(options: DiffOptions) -> int:
         _print_sources(origins)
         if found:
             print_differences(found, options.everything, WORDS)
-    code = _verdict(compare, origins, found, lengths, exact, notes)
+    code = _verdict(compare, origins, found, (one.periods, other.periods), exact, notes)
     if compare.as_json:
         document = {
             "a": a,
@@ -173,7 +176,7 @@ def _verdict(
     compare: CompareOptions,
     sources: Sequence[SourceDifference],
     found: Sequence[Difference],
-    lengths: tuple[int, int],
+    periods: tuple[Sequence[Period], Sequence[Period]],
     exact: ExactDifference,
     notes: Sequence[str],
 ) -> int:
@@ -185,13 +188,16 @@ def _verdict(
             complain(f"their states differ from {exact.state} on")
         if exact.firmwares is not None:
             print_firmwares(exact.firmwares, WORDS)
-    if lengths[0] != lengths[1] and compare.rule.to_tick is None:
+    shorter, longer = sorted(periods, key=len)
+    if len(shorter) != len(longer) and compare.rule.to_tick is None:
         code = DIVERGENCE
-        complain(f"A has {lengths[0]} control periods, B has {lengths[1]}")
+        complain(f"A has {len(periods[0])} control periods, B has {len(periods[1])}")
     for note in notes:
         complain(note)
     if code == DONE and not compare.as_json:
         how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         whence = "; they were not made from the same" if sources else ""
-        show(f"the recordings hold the same in all {min(lengths)} control periods{how}{whence}")
+        show(
+            f"the recordings hold the same in all {compare.rule.compared(shorter)} control periods{how}{whence}"
+        )
     return code

@@ -109,11 +109,14 @@ SHOWN = 20
 """Frames in the list unless all are asked for."""
 
 
-def print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
+def print_frames(job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None) -> None:
+    """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
     robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
     lines = sorted(
         frame_lines(transmissions_of(job.recorded or replayed), robots), key=lambda line: line.tick
     )
+    if to_tick is not None:
+        lines = [line for line in lines if line.tick < to_tick]
     shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
     table = Table(box=None, pad_edge=False)
     table.add_column("tick", justify="right")

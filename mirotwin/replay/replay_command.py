@@ -178,6 +178,8 @@ def replay(options: ReplayOptions) -> int:
         _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
         return replay_case(job, options.quiet)
     judged = says_anything(job.scenario)
+    if job.recorded:
+        compare.check_reaches(job.file, job.recorded)
     periods = _periods(job, compare.rule)
     again = _rerun(job, periods, options.quiet or compare.as_json)
     world, checks, replayed = again.world, again.checks, again.periods
@@ -189,7 +191,7 @@ def replay(options: ReplayOptions) -> int:
         apart = firmwares_apart(job, annotated, found)
 
     if not options.quiet and not compare.as_json:
-        print_frames(job, replayed, options.everything)
+        print_frames(job, replayed, options.everything, compare.rule.to_tick)
         if job.recorded and found:
             print_differences(found, options.everything)
     if not job.recorded and not compare.as_json:
@@ -232,9 +234,6 @@ def _periods(job: Job, rule: CompareRule) -> int | None:
         return -(-min(ends) // CONTROL_PERIOD_TICKS) if ends else None
     first = job.recorded[0].index
     there = first + len(job.recorded)
-    if rule.from_tick >= there * CONTROL_PERIOD_TICKS:
-        what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
-        raise BadInput(job.file, f"--from {rule.from_tick}t", what, "look earlier")
     if rule.to_tick is None:
         return there - first
     return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
@@ -269,5 +268,6 @@ def _verdict(
         return DIVERGENCE
     if not compare.as_json:
         how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
-        show(f"the robots' response equals the recorded one in all {len(replayed)} control periods{how}")
+        count = compare.rule.compared(replayed)
+        show(f"the robots' response equals the recorded one in all {count} control periods{how}")
     return DONE

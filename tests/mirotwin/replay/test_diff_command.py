@@ -199,6 +199,29 @@ def test_what_is_no_recording_is_refused_on_either_side(mirotwin, finished, tmp_
         assert expected in err
 
 
+def test_a_window_in_which_one_of_them_has_nothing_is_refused(mirotwin, finished, short, tmp_path):
+    assert mirotwin("run", short, "--seed", 5, "--to", "100ms", "--out", tmp_path / "part", "-q")[0] == 0
+    whole, part = finished / "run.mcap", tmp_path / "part" / "run.mcap"
+    for given in ((whole, whole, "--from", "90s"), (whole, part, "--from", "110ms", "--to", "150ms")):
+        code, out, err = mirotwin("diff", *given)
+        assert (code, out) == (2, "")
+        assert "the recording ends at tick" in err
+        assert err.endswith("; look earlier\n")
+
+
+def test_the_periods_of_the_window_are_counted(mirotwin, finished):
+    run = finished / "run.mcap"
+    for window, count in (
+        (("--from", "1601600t"), 4),
+        (("--from", "1s", "--to", "1s"), 0),
+        (("--to", "801t"), 1),
+    ):
+        code, out, _ = mirotwin("diff", run, run, *window)
+        assert (code, f"in all {count} control periods" in out) == ((0, True) if count else (2, False))
+        code, out, _ = mirotwin("replay", run, *window, "-q")
+        assert (code, f"in all {count} control periods" in out) == ((0, True) if count else (2, False))
+
+
 def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path):
     (tmp_path / "run.part.mcap").write_bytes((finished / "run.mcap").read_bytes())
     code, out, err = mirotwin("diff", finished, tmp_path)

@@ -69,6 +69,22 @@ def test_a_resumed_run_is_not_compared_with_a_whole_one(mirotwin, tmp_path, shor
     assert "a run that was resumed: it begins with control period 3" in err
 
 
+def test_what_was_before_a_resumed_run_cannot_be_looked_at(mirotwin, tmp_path, short):
+    whole, rest = tmp_path / "whole", tmp_path / "rest"
+    mirotwin("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
+    mirotwin("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
+    for words in (
+        ["replay"],
+        ["fw", "trace"],
+        ["fw", "coverage"],
+        ["fw", "vcd", "--out", tmp_path / "a.vcd"],
+    ):
+        code, out, err = mirotwin(*words, rest / "run.mcap", "--to", "100ms")
+        assert (code, out) == (2, "")
+        assert err.endswith(": --to 2400000t: the run begins at tick 2402400; look later\n")
+    assert mirotwin("replay", rest / "run.mcap", "--to", "2402401t")[0] == 0
+
+
 def test_a_run_ends_where_it_is_told_to(mirotwin, tmp_path, short):
     assert mirotwin("run", short, "--out", tmp_path / "a", "--to", "2500000t", *QUIET)[0] == 0
     summary = json.loads((tmp_path / "a" / "summary.json").read_text())
