@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
@@ -194,8 +195,9 @@ def init(options: InitOptions) -> None:
     for name in names:
         if not name.startswith("firmware/"):
             click.echo(folder / name)
+    enter = shlex.join(["cd", str(folder)])
     if options.without_firmware:
-        click.echo(f"next: cd {folder} && make test   (needs make and pytest)")
+        click.echo(f"next: {enter} && make test   (needs make and pytest)")
         return
     click.echo(f"{folder}/firmware: {len([name for name in names if name.startswith('firmware/')])} files")
-    click.echo(f"next: cd {folder} && make test   (needs SDCC, make and pytest)")
+    click.echo(f"next: {enter} && make test   (needs SDCC, make and pytest)")

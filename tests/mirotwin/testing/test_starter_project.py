@@ -27,6 +27,17 @@ def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_p
     assert f"next: cd {tmp_path}/mine && make test" in out
 
 
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_a_folder_whose_name_has_a_space_is_made_and_quoted(mirotwin, tmp_path):
+    folder = tmp_path / "my röbot"
+    _, out, _ = mirotwin("init", folder)
+    assert f"next: cd '{folder}' && make test" in out
+    done = children.run(["make", "-n", "test"], cwd=folder, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "cp ../build/objects/miro.ihx" in done.stdout
+    assert tree(folder) == {name for name, _ in starter.project_files()}
+
+
 def test_an_empty_folder_will_do_and_other_files_stay(mirotwin, tmp_path):
     (tmp_path / "LICENSE").write_text("mine")
     assert mirotwin("init", tmp_path)[0] == 0
