@@ -121,9 +121,11 @@ def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) 
 def _judge(plan: Plan, results: Path) -> int:
     """Says what went wrong; returns the exit code."""
     found = counted(results, LINES)
-    for verdict, (_, first) in found.items():
+    for verdict, (count, first) in found.items():
         if verdict != "passed":
             _list(verdict, first)
+            if count > len(first):
+                complain(f"{verdict}: {count - len(first)} more of {count}")
     errors, faults, failed = (found.get(name, (0, []))[0] for name in ("error", "fault", "failed"))
     if errors:
         complain(f"{errors} of {plan.runs} runs have an error; {results} says which")

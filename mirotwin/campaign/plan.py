@@ -129,6 +129,11 @@ def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
     for name in file.design.names:
         if name in OWN or name in FIGURES or name.startswith(CHECK):
             raise BadInput(file.path, name, "is the name of a column of the results", "choose another name")
+    for setting, place in file.settings:
+        key = setting.partition("=")[0].strip()
+        if key in file.design.names:
+            what = f"the campaign varies {key}, this would have no effect"
+            raise BadInput(file.path, place, what, "leave it out, or the key in the campaign's file")
     plan = Plan(file, _scenarios(file), _images(file), (), versions())
     tried = _Tried(plan)
     return msgspec.structs.replace(plan, checks=tuple(tried.checks), notes=tuple(tried.notes))

@@ -135,6 +135,15 @@ def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
     assert called("c.toml", "--jobs", 1, "--force").exit_code == 0
 
 
+def test_of_many_failures_the_first_are_listed_and_the_others_counted(here):
+    text = FACTORS.replace("0-19", "0-3").replace("far", "also").replace("40.0", "41.0")
+    (here / "c.toml").write_text(f"allowed_failed_share = 1.0\n{text}[expect]\ntracks_within_cm = 0.001\n")
+    result = called("c.toml", "--jobs", 1)
+    assert result.exit_code == 0
+    assert "mirotwin: failed: runs 0, 1, 2, 3" in result.output
+    assert "mirotwin: failed: 3 more of 8\n" in result.output
+
+
 def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
     (here / "c.toml").write_text(
         'scenario = "fig7"\nset = { duration_s = 0.1 }\n'

@@ -13,6 +13,7 @@ from mirotwin import campaign
 from mirotwin.campaign.columns import FIGURES
 from mirotwin.campaign.design import Design, Draw, Factor, Level, inline
 from mirotwin.campaign.file import parse
+from mirotwin.campaign.plan import parse_plan
 from mirotwin.campaign.plan import plan_of as joined
 from mirotwin.campaign.ranges import seeds_of
 from tests.mirotwin.campaign.plans import SHORT, plan_of
@@ -191,6 +192,15 @@ def test_names_of_other_columns_are_no_factors():
     for name in ("run", "verdict", "check.no_fault", next(iter(FIGURES))):
         with pytest.raises(BadInput, match="is the name of a column"):
             plan_of(f'scenario = "fig6"\n[factor."{name}"]\na = []\n')
+
+
+def test_a_setting_of_a_key_that_the_campaign_varies_would_have_no_effect_and_is_refused():
+    text = 'scenario = "fig6"\n[grid]\nnetwork.radio.bit_error_rate = [0.0, 1e-3]\n'
+    expected = "the campaign varies network.radio.bit_error_rate, this would have no effect"
+    with pytest.raises(BadInput, match=rf"--set network.radio.bit_error_rate=0.5: {expected}"):
+        parse_plan(text, "c.toml", ["network.radio.bit_error_rate=0.5"])
+    with pytest.raises(BadInput, match=rf"c.toml: set.network.radio.bit_error_rate: {expected}"):
+        parse_plan(f"set = {{ network.radio.bit_error_rate = 0.5 }}\n{text}", "c.toml")
 
 
 def test_ranges_of_seeds_may_be_as_long_as_is_said():
