@@ -31,6 +31,8 @@ cdef class Board(Bus):
     cdef public bint stop_on_fault
     cdef public long long fault_count
     cdef long long horizon
+    cdef int strobed
+    cdef int reset_pins
     cdef long long busy_writes
     cdef int contention
     cdef readonly int held
@@ -97,14 +99,18 @@ cdef class Board(Bus):
     @cython.final
     cdef inline int _strobes(self, int pins) noexcept
     @cython.final
-    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, at_left=cython.int, at_right=cython.int, levels=cython.int)
+    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, at_left=cython.int, at_right=cython.int, levels=cython.int, due=cython.longlong)
     cdef int _drive_chips(self, long long tick) except -1
     @cython.final
     @cython.locals(busy_writes=cython.longlong)
     cdef inline int _watch_bus(self, int both_drive, long long tick) except -1
     @cython.final
-    @cython.locals(one=BusTiming, other=BusTiming, broken=cython.int, too=cython.int)
-    cdef inline int _watch_timing(self, int left, int right, int data, long long tick) except -1
+    @cython.locals(broken=cython.int, too=cython.int)
+    cdef inline int _watch_timing(self, int left, int right, int at_left, int at_right, int data, long long tick) except -1
+    @cython.final
+    cdef inline int _watch_chip(self, BusTiming timing, int pins, int strobed, int data, long long tick) noexcept
+    @cython.final
+    cdef int _reset_chips(self, int left, int right, long long tick) except -1
     @cython.final
     cdef inline bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
     @cython.locals(left=cython.int, right=cython.int)

@@ -78,7 +78,7 @@ class Board(Bus):
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log",
-        "horizon",
+        "horizon", "strobed", "reset_pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -109,6 +109,8 @@ class Board(Bus):
         self.fault_count = 0
         self.probe: Probe | None = None
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
+        self.strobed = 0  # a chip is being written or read
+        self.reset_pins = _BOTH_RST  # as the chips have them
         self.busy_writes = 0
         self.contention = self.held = 0
         self.forced = 0  # pins change by RST or the supply
@@ -323,31 +325,24 @@ class Board(Bus):
     def _set_pins(self, port: int, levels: int, tick: int) -> None:
         changed = self.bank[port] ^ levels
         self.bank[port] = levels
-        if changed & self.watched[port] and not self._only_levels(tick):
-            self.sync(tick)
-            self._drive_chips(tick)
+        if changed & self.watched[port]:
+            if tick >= self.horizon or self.probe is not None or not self._only_levels(tick):
+                self.sync(tick)
+                self._drive_chips(tick)
 
     def _only_levels(self, tick: int) -> bool:
         """Puts PS and data on the chips' pins and returns True, if that is all that changes.
 
-        So it is without a strobe, before and now, and while no chip has something to tell. Nothing has to be brought
-        up to `tick` for that, unless the run ends before.
+        So it is without a strobe, before and now, while no chip has something to tell (it may have at the horizon).
+        Nothing has to be brought up to `tick` for that.
         """
-        if (
-            tick > self.horizon
-            or tick >= self._next_interrupt(self.left)
-            or tick >= self._next_interrupt(self.right)
-            or not self.powered
-            or self.probe is not None
-        ):
-            return False
         pins = self._pins()
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
         if (
-            self._strobes(left) | self.left.port.writing | self.left.port.reading
-            or self._strobes(right) | self.right.port.writing | self.right.port.reading
-            or left >> 4 != self.left.reset_level
-            or right >> 4 != self.right.reset_level
+            self.strobed
+            or (pins ^ self.reset_pins) & _BOTH_RST
+            or self._strobes(left)
+            or self._strobes(right)
         ):
             return False
         left, right = left >> 3 & 1, right >> 3 & 1
@@ -435,11 +430,10 @@ class Board(Bus):
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
         at_left = self._strobes(left) | self.left.port.writing | self.left.port.reading
         at_right = self._strobes(right) | self.right.port.writing | self.right.port.reading
-        self._watch_timing(left, right, data, tick)
-        if left >> 4 != self.left.reset_level:
-            self.left.set_reset(tick, left >> 4)
-        if right >> 4 != self.right.reset_level:
-            self.right.set_reset(tick, right >> 4)
+        self._watch_timing(left, right, at_left, at_right, data, tick)
+        if (pins ^ self.reset_pins) & _BOTH_RST:
+            self._reset_chips(left, right, tick)
+            self.reset_pins = pins & _BOTH_RST
         if at_left or self.left.next_tick <= tick:
             self.left.set_bus(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
         else:
@@ -448,8 +442,16 @@ class Board(Bus):
             self.right.set_bus(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
         else:
             self.right.port.ps, self.right.port.data = right >> 3 & 1, data
-        if self._next_interrupt(self.left) < self.horizon or self._next_interrupt(self.right) < self.horizon:
-            self.cpu.replan()  # a reset has begun to end, or a mask has gone
+        self.strobed = (
+            self.left.port.writing
+            | self.left.port.reading
+            | self.right.port.writing
+            | self.right.port.reading
+        )
+        due = min(self._next_interrupt(self.left), self._next_interrupt(self.right))
+        if due < self.horizon:  # a reset has begun to end, or a mask has gone
+            self.horizon = due
+            self.cpu.replan()
         levels = self.left.port.drive if self.left.port.reading else 0xFF
         if self.right.port.reading:
             levels &= self.right.port.drive
@@ -475,19 +477,28 @@ class Board(Bus):
             self.fault(FaultKind.BUS_CONTENTION, self.cpu.at, tick)
         self.contention = both_drive
 
-    def _watch_timing(self, left: int, right: int, data: int, tick: int) -> None:
+    def _watch_timing(self, left: int, right: int, at_left: int, at_right: int, data: int, tick: int) -> None:
         """Checks the timing of both chips; an edge that violates it at both is one fault."""
-        one, other = self.left_timing, self.right_timing
-        broken = one.pins(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
-        too = other.pins(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
+        broken = self._watch_chip(self.left_timing, left, at_left, data, tick)
+        too = self._watch_chip(self.right_timing, right, at_right, data, tick)
         if broken:
-            self._timing_fault(broken, one.ticks, tick)
+            self._timing_fault(broken, self.left_timing.ticks, tick)
         elif too:
-            self._timing_fault(too, other.ticks, tick)
+            self._timing_fault(too, self.right_timing.ticks, tick)
+
+    def _watch_chip(self, timing: BusTiming, pins: int, strobed: int, data: int, tick: int) -> int:
+        if strobed:
+            return timing.pins(tick, pins & 1, pins >> 1 & 1, pins >> 2 & 1, pins >> 3 & 1, data)
+        return timing.left_alone(tick, pins >> 3 & 1, data)
+
+    def _reset_chips(self, left: int, right: int, tick: int) -> None:
+        """/RST of a chip has another level."""
         if self._reset_is_short(self.left, left & _RST, tick):
             self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
         elif self._reset_is_short(self.right, right & _RST, tick):
             self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
+        self.left.set_reset(tick, left >> 4)
+        self.right.set_reset(tick, right >> 4)
 
     def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:
         """/RST rises, less than 8 LM629 clocks after it fell."""
@@ -531,10 +542,13 @@ class Board(Bus):
             raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")
         self.hi_seen[0] = self.left.hi
         self.hi_seen[1] = self.right.hi
+        self.reset_pins = self.left.reset_level << 4 | self.right.reset_level << 9
+        self.strobed = 0
         self._rest(self.left_timing, self.left)
         self._rest(self.right_timing, self.right)
 
     def _rest(self, timing: BusTiming, chip: Lm629) -> None:
+        self.strobed |= chip.port.writing | chip.port.reading
         timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)
 
     def __repr__(self) -> str:

@@ -13,6 +13,7 @@ cdef long long _NEVER, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
 cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE
+cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY
 
 
 cdef long long _signed_31(long long value) noexcept
@@ -23,7 +24,8 @@ cdef class MotorAxis:
     cdef readonly object options
     cdef readonly long long reset_ticks, reset_pulse_ticks
     cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats
-    cdef readonly int clamps, rates_of_buffer
+    cdef readonly int clamps, rates_of_buffer, starts_at_sample, stop_bits_stay, stop_lifts_refusal, unsent_is_working
+    cdef readonly int relative_to_real, relative_to_target
     cdef readonly HostPort port
     cdef readonly Encoder encoder
     cdef readonly ProfileGenerator trajectory
@@ -63,6 +65,8 @@ cdef class MotorAxis:
     @cython.final
     @cython.locals(profile=ProfileGenerator, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
+    @cython.final
+    cdef long long _relative_base(self) noexcept
     @cython.final
     @cython.locals(flags=cython.int)
     cdef int _step_profile(self) noexcept

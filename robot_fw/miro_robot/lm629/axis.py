@@ -36,6 +36,9 @@ _EXCESSIVE_ERROR = signals.EXCESSIVE_ERROR
 _WRAP_AROUND = signals.WRAP_AROUND
 _INDEX_ACQUIRED = signals.INDEX_ACQUIRED
 _TRAJECTORY_COMPLETE = signals.TRAJECTORY_COMPLETE
+_VELOCITY_MODE, _FORWARD = buffers.VELOCITY_MODE, buffers.FORWARD
+"""They stand in the same place in the control word and in the signals register."""
+_TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY = buffers.MOTOR_OFF, buffers.STOP_ABRUPTLY, buffers.STOP_SMOOTHLY
 
 
 def _signed_31(value: int) -> int:
@@ -89,6 +92,12 @@ class MotorAxis:
             "error_repeats",
             "clamps",
             "rates_of_buffer",
+            "starts_at_sample",
+            "stop_bits_stay",
+            "stop_lifts_refusal",
+            "unsent_is_working",
+            "relative_to_real",
+            "relative_to_target",
         ),
         *("commands", "encoder_edges", "log", "side", "pulses"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
@@ -107,6 +116,12 @@ class MotorAxis:
         self.error_repeats = 1 if options.error_flag_repeats else 0
         self.clamps = 1 if options.out_of_range == "clamped" else 0
         self.rates_of_buffer = 1 if options.relative_rates == "buffer" else 0
+        self.starts_at_sample = 1 if options.start_takes == "sample" else 0
+        self.stop_bits_stay = 1 if options.stop_bits_stay else 0
+        self.stop_lifts_refusal = 1 if options.stop_lifts_refusal else 0
+        self.unsent_is_working = 1 if options.unsent == "working" else 0
+        self.relative_to_real = 1 if options.relative_base == "real" else 0
+        self.relative_to_target = 1 if options.relative_base == "target" else 0
         self.port = HostPort(options.busy_clocks * TICKS_PER_CLOCK, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
@@ -297,28 +312,27 @@ class MotorAxis:
     def _start(self) -> int:
         """The accepted STT takes effect. Returns flags."""
         profile = self.trajectory
-        if self.options.start_takes == "sample":
-            self.trajectory_buffer.take(self.options.stop_bits_stay)
         buffer = self.trajectory_buffer
+        if self.starts_at_sample:
+            buffer.take(self.stop_bits_stay)
         control = buffer.taken_control
-        profile.target = self.trajectory_buffer.resolve(self._relative_base())
+        profile.target = buffer.resolve(self._relative_base())
         profile.acceleration = buffer.taken_acceleration
         profile.max_velocity = buffer.taken_velocity
-        profile.velocity_mode = 1 if control & buffers.VELOCITY_MODE else 0
-        profile.forward = 1 if control & buffers.FORWARD else 0
+        profile.velocity_mode = 1 if control & _VELOCITY_MODE else 0
+        profile.forward = 1 if control & _FORWARD else 0
         self.start_taken = 0
-        self.signals.clear_bits(_MOTOR_OFF | _ON_TARGET | signals.VELOCITY_MODE | signals.FORWARD)
-        # The two mode bits stand in the same place in the control word and in the signals register.
-        self.signals.set_bits(control & (buffers.VELOCITY_MODE | buffers.FORWARD))
-        if control & buffers.MOTOR_OFF:
+        self.signals.clear_bits(_MOTOR_OFF | _ON_TARGET | _VELOCITY_MODE | _FORWARD)
+        self.signals.set_bits(control & (_VELOCITY_MODE | _FORWARD))
+        if control & _TURN_OFF:
             self.signals.set_bits(_MOTOR_OFF)
             return _TRAJECTORY_COMPLETE
-        if control & buffers.STOP_ABRUPTLY:
+        if control & _STOP_ABRUPTLY:
             at_real = self.options.abrupt_stop_at == "real"
             profile.stop_abruptly(self.real_position if at_real else profile.position >> 16)
             self.signals.set_bits(_ON_TARGET)
             return _TRAJECTORY_COMPLETE
-        if control & buffers.STOP_SMOOTHLY:
+        if control & _STOP_SMOOTHLY:
             profile.stop_smoothly()
         else:
             profile.start()
@@ -333,10 +347,9 @@ class MotorAxis:
 
     def _relative_base(self) -> int:
         """What a relative position adds to (T6)."""
-        choice = self.options.relative_base
-        if choice == "real":
+        if self.relative_to_real:
             return self.real_position
-        if choice == "target" and not self.trajectory.velocity_mode:
+        if self.relative_to_target and not self.trajectory.velocity_mode:
             return self.trajectory.target
         return self.trajectory.position >> 16
 

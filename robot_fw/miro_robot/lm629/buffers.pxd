@@ -33,7 +33,7 @@ cdef class TrajectoryBuffer:
     cpdef void shift(self, long long real_position) noexcept
     cpdef void take(self, bint keep_stops=*) noexcept
     @cython.locals(position=cython.longlong, relative=cython.bint, target=cython.longlong)
-    cpdef resolve(self, long long base)
+    cpdef long long resolve(self, long long base) noexcept
 
 
 @cython.final

@@ -156,7 +156,7 @@ class TrajectoryBuffer:
         if not self.relative:
             self.position = signed_31(self.position - real_position)
 
-    def take(self, keep_stops: bool = False) -> None:
+    def take(self, keep_stops: int = 0) -> None:
         """STT was accepted: it will act on the registers as they are now; stop bits serve once."""
         self.taken_control = self.control
         self.taken_acceleration = self.acceleration

@@ -32,7 +32,8 @@ cdef class Lm629(MotorAxis):
     cdef int _command(self, long long tick) except -1
     cdef int _execute(self, long long tick, int opcode) except -1
     cdef int _complain(self, flags) except -1
-    cdef _accept_start(self)
+    @cython.locals(resting=cython.int, stopping=cython.int)
+    cdef void _accept_start(self) noexcept
     cdef _answer(self, long long tick, int opcode)
     @cython.locals(opcode=cython.int)
     cdef int _word(self, long long tick) except -1

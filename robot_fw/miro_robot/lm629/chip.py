@@ -183,12 +183,12 @@ class Lm629(MotorAxis):
     def _accept_start(self) -> None:
         """STT is refused when it would change the acceleration of a motion that goes on (T2)."""
         resting = self.signals.word & (_ON_TARGET | _MOTOR_OFF)
-        stopping = self.trajectory_buffer.control & _STOPS and self.options.stop_lifts_refusal
+        stopping = self.trajectory_buffer.control & _STOPS and self.stop_lifts_refusal
         if self.signals.word & _ACCELERATION_LOADED and not resting and not stopping:
             self.signals.raise_flags(_COMMAND_ERROR)
             return
-        if self.options.start_takes == "given":
-            self.trajectory_buffer.take(self.options.stop_bits_stay)
+        if not self.starts_at_sample:
+            self.trajectory_buffer.take(self.stop_bits_stay)
         self.signals.clear_bits(_ACCELERATION_LOADED)
         self.start_taken = 1
 
@@ -224,7 +224,7 @@ class Lm629(MotorAxis):
         profile = self.trajectory
         if self.port.recorded == 2:
             self.port.expect(buffer.begin(word))
-            if self.options.unsent == "working":
+            if self.unsent_is_working:
                 buffer.refresh(profile.acceleration, profile.max_velocity, profile.target)
             return
         if self.rates_of_buffer:

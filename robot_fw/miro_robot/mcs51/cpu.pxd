@@ -66,18 +66,18 @@ cdef class Cpu(Executor):
     cdef int boundary(self) except -1
     @cython.final
     @cython.locals(peripherals=Peripherals, earliest='long long', source=int)
-    cdef int _attend(self, long long now) except -1
+    cdef inline int _attend(self, long long now) except -1
     @cython.final
-    cdef int _watch_main_loop(self, long long now) except -1
+    cdef inline int _watch_main_loop(self, long long now) except -1
     @cython.final
-    cdef int _taken_over(self) noexcept
+    cdef inline int _taken_over(self) noexcept
     @cython.final
-    cdef int _enter(self, int source) except -1
+    cdef inline int _enter(self, int source) except -1
     @cython.final
-    cdef int _block(self) except -1
+    cdef inline int _block(self) except -1
     @cython.final
     @cython.locals(peripherals=Peripherals)
-    cdef int _expect(self, long long earliest) except -1
+    cdef inline int _expect(self, long long earliest) except -1
     @cython.final
     @cython.locals(event='long long')
     cdef inline long long _next_look(self) noexcept

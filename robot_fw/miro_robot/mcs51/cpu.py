@@ -448,7 +448,9 @@ class Cpu(Executor):
 
     def write_port(self, port: int, value: int) -> None:
         if value != self.peripherals.ports.latches[port]:
-            self.peripherals.write_port(port, value, self.cycles)
+            if port == 3:
+                self.peripherals.write_p3(value, self.cycles)
+            self.peripherals.ports.latches[port] = value  # the pins follow with the next cycle
             if port & 1:  # P1 and P3 carry sampled inputs
                 self.next_event = 0
                 self.limit = 0

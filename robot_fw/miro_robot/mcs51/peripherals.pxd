@@ -91,5 +91,5 @@ cdef class Peripherals:
     @cython.locals(period='long long')
     cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1
-    cdef int write_port(self, int port, int value, long long cycle) except -1
+    cdef int write_p3(self, int value, long long cycle) except -1
     cdef void taken(self, int source, long long cycle) noexcept

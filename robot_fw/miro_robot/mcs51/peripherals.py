@@ -464,14 +464,12 @@ class Peripherals:
         self.smod = smod
         self.clock_serial()
 
-    def write_port(self, port: int, value: int, cycle: int) -> None:
-        """A latch; the pins follow with `cycle`, and so does what samples them."""
-        if port == 3:
-            self.sync(cycle)
-            self.settle()
-            self.uart.write_latch(value & 3, 12 * cycle)
-            self.look_again()
-        self.ports.latches[port] = value
+    def write_p3(self, value: int, cycle: int) -> None:
+        """The latch of P3 is about to change: what of it concerns the serial port."""
+        self.sync(cycle)
+        self.settle()
+        self.uart.write_latch(value & 3, 12 * cycle)
+        self.look_again()
 
     def taken(self, source: int, cycle: int) -> None:
         """The core vectors to a source: the flags that hardware clears."""
