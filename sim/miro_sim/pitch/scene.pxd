@@ -6,6 +6,9 @@ cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH, _PAD
 cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
 cdef long long _CIRCLE_UM, _AREA_HALF_UM, _AREA_DEPTH_UM, _BALL_UM
 
+@cython.locals(values='short[16]', at='long long', lane='long long')
+cdef void _copy(short[::1] kept, long long pixel, short* line, long long column, long long count) noexcept
+
 
 @cython.final
 cdef class Scene:
@@ -13,7 +16,7 @@ cdef class Scene:
     cdef long long packed[32]
     cdef unsigned char[::1] paint
     cdef long long[::1] total
-    cdef int[::1] lit
+    cdef int[::1] lit, lit_first, lit_end
     cdef short[::1] y, cb, cr
     cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y, falloff
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
@@ -25,8 +28,11 @@ cdef class Scene:
     cdef bint shows_ball(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', lost='long long')
     cdef long long light(self, int pixel) noexcept
-    @cython.locals(scale=int, lit='int[::1]', y='short[::1]', cb='short[::1]', cr='short[::1]', column=int, pixel='long long')
+    @cython.locals(known_first=int, known_end=int, pixel=int)
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
+    @cython.locals(column=int, pixel=int)
+    cdef void _light_up(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
+    cdef inline int behind(self, int pixel) noexcept
     @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
     cdef void look(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', ring=int)

@@ -53,13 +53,13 @@ class Scene:
     """The scene without robots; `ball`: above which place (um) its centre is, if there is one.
 
     `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added. `y`, `cb`, `cr`: what the sensor makes of it
-    when its light has the scale `lit`.
+    in the light of scale `lit`, in each line between two columns.
     """
 
     NOT_STATE = (
         *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
         *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
-        *("falloff", "lit", "y", "cb", "cr"),
+        *("falloff", "lit", "lit_first", "lit_end", "y", "cb", "cr"),
     )
 
     def __init__(self, rays: Rays, picture: PictureSettings, ball: tuple[int, int] | None) -> None:
@@ -70,10 +70,12 @@ class Scene:
         self.falloff = math.floor(picture.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
         self.paint = bytearray([_UNKNOWN]) * 76800
         self.total = array("q", bytes(8 * 76800))
-        self.lit = array("i", b"\xff" * (4 * 76800))  # -1
-        self.y = array("h", bytes(2 * 76800))
-        self.cb = array("h", bytes(2 * 76800))
-        self.cr = array("h", bytes(2 * 76800))
+        self.lit = array("i", b"\xff" * (4 * 240))  # -1
+        self.lit_first = array("i", bytes(4 * 240))
+        self.lit_end = array("i", bytes(4 * 240))
+        self.y = array("h", bytes(2 * 76816))
+        self.cb = array("h", bytes(2 * 76816))
+        self.cr = array("h", bytes(2 * 76816))
         self.half_x = round(LENGTH_M * 500_000.0)
         self.half_y = round(WIDTH_M * 500_000.0)
         self.middle_x = self.half_x - round(INSET_M * 1e6)
@@ -91,7 +93,7 @@ class Scene:
         return f"Scene({self.rays!r}, ball={(self.ball_x, self.ball_y) if self.has_ball else None})"
 
     def shows_ball(self, pixel: int) -> bool:
-        """Whether one of a pixel's samples may be the ball's; `look` has been called."""
+        """Whether one of a pixel's samples may be the ball's; `behind` has been called."""
         paint = self.paint[pixel]
         return self.has_ball and (paint == _MIXED or paint >= self.ball_rim) and self._near_ball(pixel)
 
@@ -116,19 +118,33 @@ class Scene:
 
     def show(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
         """Puts the pixels of a line into the sensor's; `instants`: how many times their samples are added."""
-        scale = sensor.scale
-        lit, y, cb, cr = self.lit, self.y, self.cb, self.cr
+        known_first, known_end = self.lit_first[row], self.lit_end[row]
+        if self.lit[row] != sensor.scale or end < known_first or first > known_end:
+            known_first = known_end = first
+            self.lit[row] = sensor.scale
+        self._light_up(sensor, row, first, known_first, instants)
+        self._light_up(sensor, row, known_end, end, instants)
+        self.lit_first[row], self.lit_end[row] = min(first, known_first), max(end, known_end)
         pixel = row * _WIDTH + first
-        for column in range(first + _PAD, end + _PAD):
-            if lit[pixel] == scale:
-                sensor.y[column], sensor.cb[column], sensor.cr[column] = y[pixel], cb[pixel], cr[pixel]
-            else:
-                if self.paint[pixel] == _UNKNOWN:
-                    self.look(pixel)
-                sensor.put(column - _PAD, self.total[pixel] * instants, self.light(pixel))
-                lit[pixel] = scale
-                y[pixel], cb[pixel], cr[pixel] = sensor.y[column], sensor.cb[column], sensor.cr[column]
-            pixel += 1
+        _copy(self.y, pixel, sensor.y, first + _PAD, end - first)
+        _copy(self.cb, pixel, sensor.cb, first + _PAD, end - first)
+        _copy(self.cr, pixel, sensor.cr, first + _PAD, end - first)
+
+    def _light_up(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
+        """Keeps what the sensor makes of pixels."""
+        for column in range(first, end):
+            pixel = row * _WIDTH + column
+            self.behind(pixel)
+            sensor.put(column, self.total[pixel] * instants, self.light(pixel))
+            self.y[pixel] = sensor.y[column + _PAD]
+            self.cb[pixel] = sensor.cb[column + _PAD]
+            self.cr[pixel] = sensor.cr[column + _PAD]
+
+    def behind(self, pixel: int) -> int:
+        """`paint` of a pixel, which is looked at if that was not done before."""
+        if self.paint[pixel] == _UNKNOWN:
+            self.look(pixel)
+        return self.paint[pixel]
 
     def look(self, pixel: int) -> None:
         """Fills `paint` and `total` of a pixel."""
@@ -257,6 +273,16 @@ class Scene:
         if abs(depth - _AREA_DEPTH_UM) <= half and y <= _AREA_HALF_UM + half:
             return True
         return abs(y - _AREA_HALF_UM) <= half and 0 - more <= depth <= _AREA_DEPTH_UM + more
+
+
+def _copy(kept: array[int], pixel: int, line: list[int], column: int, count: int) -> None:
+    """Copies so many values into a line, and a few more."""
+    values = [0] * 16
+    for at in range(0, count, 16):
+        for lane in range(16):
+            values[lane] = kept[pixel + at + lane]
+        for lane in range(16):
+            line[column + at + lane] = values[lane]
 
 
 @lru_cache(maxsize=3)

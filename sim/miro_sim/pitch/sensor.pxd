@@ -12,30 +12,38 @@ cdef class Sensor:
     cdef long long frame, offset, jitter
     cdef int scale
     cdef readonly int reach, side
-    cdef int shift, half
-    cdef int taps[9]
+    cdef short kept, half
+    cdef short taps[144]
     cdef short gamma[4096]
     cdef short luma_noise[4096]
     cdef short chroma_noise[4096]
-    cdef unsigned short y[352]
-    cdef unsigned short cb[352]
-    cdef unsigned short cr[352]
-    cdef unsigned short soft_cb[352]
-    cdef unsigned short soft_cr[352]
+    cdef short y[352]
+    cdef short cb[352]
+    cdef short cr[352]
+    cdef short soft_cb[352]
+    cdef short soft_cr[352]
+    cdef short noise_y[352]
+    cdef short noise_cb[352]
+    cdef short noise_cr[352]
+    cdef unsigned char byte_y[352]
+    cdef unsigned char byte_cb[352]
+    cdef unsigned char byte_cr[352]
     cdef unsigned int words[448]
-    cdef int sums[16]
 
     cpdef begin(self, long long frame, long long tick, int samples)
     @cython.locals(red=int, green=int, blue=int)
     cdef void put(self, int column, long long total, long long light) noexcept
     @cython.locals(value='long long')
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(first='long long', column=int, part=int, block=int, word='unsigned int', last='unsigned int')
+    @cython.locals(first='long long', column='long long')
     cdef void write(self, int row, int left, int width, unsigned char[::1] out, int at) noexcept
-    @cython.locals(first='long long', lane='long long', step='long long', sums='int *', tap=short, bend=short)
-    cdef void _soften(self, unsigned short* values, unsigned short* soft, long long left, long long width) noexcept
-    cdef inline int _byte(self, int value) noexcept
+    @cython.locals(block='long long', part='long long', at='long long', word='unsigned int', last='unsigned int')
+    cdef void _draw_noise(self, unsigned long long first, long long column, int blocks) noexcept
+    @cython.locals(kept=short, half=short, sums='short[16]', first='long long', lane='long long', value=short)
+    cdef void _quantise(self, short* values, short* noise, unsigned char* out, long long left, long long width) noexcept
+    @cython.locals(first='long long', lane='long long', step='long long', sums='int[16]', bend=short)
+    cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept
     @cython.locals(column=int, after=int, before=int)
-    cdef void _move(self, unsigned short* values, int first, int last, long long by) noexcept
+    cdef void _move(self, short* values, int first, int last, long long by) noexcept

@@ -79,9 +79,9 @@ class Sensor:
     """Sensor, cable and grabber of one camera. `stream` is the source of its noise. Holds one line; no state."""
 
     NOT_STATE = (
-        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "shift", "half"),
+        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "kept", "half"),
         *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr"),
-        *("words", "sums"),
+        *("noise_y", "noise_cb", "noise_cr", "byte_y", "byte_cb", "byte_cr", "words"),
     )
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
@@ -92,13 +92,14 @@ class Sensor:
         self.offset = math.floor(settings.offset * 4095.0 + 0.5)
         taps = _taps(settings.chroma_bandwidth_hz)
         self.reach = len(taps) - 1
-        self.taps = [0] * 9
-        for step, tap in enumerate(taps):
-            self.taps[step] = tap
+        self.taps = [0] * 144  # each for 16 pixels
+        for place in range(16, 16 * len(taps)):
+            self.taps[place] = taps[place // 16]
         self.jitter = math.floor(settings.line_jitter_px * 256.0 + 0.5)
         self.side = self.reach + (1 if self.jitter else 0)
-        self.shift = 8 - settings.bits
-        self.half = (1 << self.shift) >> 1
+        lost = 8 - settings.bits
+        self.kept = 256 - (1 << lost)
+        self.half = (1 << lost) >> 1
         self.gamma = [0] * 4096
         self.luma_noise = [0] * 4096
         self.chroma_noise = [0] * 4096
@@ -112,8 +113,13 @@ class Sensor:
         self.cr = [0] * 352
         self.soft_cb = [0] * 352
         self.soft_cr = [0] * 352
+        self.noise_y = [0] * 352
+        self.noise_cb = [0] * 352
+        self.noise_cr = [0] * 352
+        self.byte_y = [0] * 352
+        self.byte_cb = [0] * 352
+        self.byte_cr = [0] * 352
         self.words = [0] * 448
-        self.sums = [0] * 16
 
     def __repr__(self) -> str:
         return f"Sensor({self.settings!r}, {self.stream!r}, frame={self.frame})"
@@ -153,21 +159,43 @@ class Sensor:
             self._shake(row, left, width)
         self._soften(self.cb, self.soft_cb, left, width)
         self._soften(self.cr, self.soft_cr, left, width)
-        block = 0
-        part = left % 3
         first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS + left // 3
-        self.stream.blocks(first, (part + width + 2) // 3, self.words)
+        self._draw_noise(first, left - left % 3, (left % 3 + width + 2) // 3)
+        self._quantise(self.y, self.noise_y, self.byte_y, left, width)
+        self._quantise(self.soft_cb, self.noise_cb, self.byte_cb, left, width)
+        self._quantise(self.soft_cr, self.noise_cr, self.byte_cr, left, width)
         for column in range(left + _PAD, left + width + _PAD):
-            word = self.words[112 * part + block]
-            last = word >> 24 | (self.words[336 + block] >> 4 * part & 15) << 8
-            out[at] = self._byte(self.y[column] + self.luma_noise[word & 4095])
-            out[at + 1] = self._byte(self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095])
-            out[at + 2] = self._byte(self.soft_cr[column] + self.chroma_noise[last])
+            out[at] = self.byte_y[column]
+            out[at + 1] = self.byte_cb[column]
+            out[at + 2] = self.byte_cr[column]
             at += 3
-            part += 1
-            if part == 3:
-                part = 0
-                block += 1
+
+    def _draw_noise(self, first: int, column: int, blocks: int) -> None:
+        """The noise of pixels from `column` on, three a block: 12 bits of a word for each of Y, Cb, Cr."""
+        self.stream.blocks(first, blocks, self.words)
+        for block in range(blocks):
+            last = self.words[336 + block]
+            for part in range(3):
+                word = self.words[112 * part + block]
+                at = column + _PAD + 3 * block + part
+                self.noise_y[at] = self.luma_noise[word & 4095]
+                self.noise_cb[at] = self.chroma_noise[word >> 12 & 4095]
+                self.noise_cr[at] = self.chroma_noise[word >> 24 | (last >> 4 * part & 15) << 8]
+
+    def _quantise(self, values: list[int], noise: list[int], out: list[int], left: int, width: int) -> None:
+        """Values with four fraction bits as the grabber's bytes: rounded, limited, then the bits that it has."""
+        kept, half = self.kept, self.half
+        sums = [0] * 16
+        for first in range(left + _PAD, left + width + _PAD, 16):  # as many pixels together
+            for lane in range(16):
+                sums[lane] = values[first + lane] + noise[first + lane] + 8
+            for lane in range(16):
+                value = sums[lane] >> 4
+                value = 0 if value < 0 else value
+                value = 255 if value > 255 else value
+                sums[lane] = (value & kept) + half
+            for lane in range(16):
+                out[first + lane] = sums[lane]
 
     def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
         """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border.
@@ -179,27 +207,18 @@ class Sensor:
                 values[_PAD - 1 - step] = values[_PAD]
             if left + width + self.reach > _WIDTH:
                 values[_PAD + _WIDTH + step] = values[_PAD + _WIDTH - 1]
-        sums = self.sums
+        sums = [0] * 16
         for first in range(left + _PAD, left + width + _PAD, 16):  # as many pixels together
             for lane in range(16):
                 sums[lane] = values[first + lane] << 16
             for step in range(1, self.reach + 1):
-                tap = self.taps[step]
                 for lane in range(16):
                     bend = (
                         values[first - step + lane] + values[first + step + lane] - 2 * values[first + lane]
                     )
-                    sums[lane] += bend * tap
+                    sums[lane] += bend * self.taps[16 * step + lane]
             for lane in range(16):
                 soft[first + lane] = sums[lane] >> 16
-
-    def _byte(self, value: int) -> int:
-        """A value with four fraction bits as the grabber's byte: rounded, limited, then the bits that it has."""
-        value = (value + 8) >> 4
-        value = 0 if value < 0 else (255 if value > 255 else value)
-        if self.shift:
-            value = (value >> self.shift << self.shift) + self.half
-        return value
 
     def _shake(self, row: int, left: int, width: int) -> None:
         """Moves the line by its jitter, up to a pixel either way, between neighbouring pixels linearly."""
