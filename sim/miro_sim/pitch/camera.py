@@ -10,9 +10,9 @@ the floor; in a robot's axes that is a straight line from `top` on by `fall`:
 Of several sides the highest is seen; where robots stand in each other, the first one is. All in um and integers.
 `fall` is taken at the middle of the pixel.
 
-The samples of a pixel lie around its middle, no further from it than `spread_um` along the robot's axes. So where that
-is far enough from all edges, no sample is looked at; and any pixel gives the same bits in any window. Where it is so by
-more than a robot moves while the shutter is open (`drift_um`), one look does for all instants.
+Each corner of a pixel has a code, which tells beyond which edges it lies: of the top, of its patches, of all that is
+seen of the robot (outcodes, after Cohen and Sutherland). The samples lie between the corners: where these are on one
+side of an edge, no sample is compared with it. So any pixel gives the same bits in any window.
 """
 
 from __future__ import annotations
@@ -34,16 +34,22 @@ FIELD_S = 1001.0 / 60000.0
 _SETS = 6  # at most: two fields of three instants
 _HALF_UM = 37_500
 _TOP_UM = 75_000
-_CORNER_UM = 53_034  # from the middle of a robot's top to its corner, rounded up
 _ROUNDED_UM = 8  # what rounding adds
-_TOP, _TEAM, _IDENTITY, _RAYS = 0, 1, 2, 3
+_TOP, _TEAM, _IDENTITY, _REACH, _BASE = 0, 1, 2, 3, 4  # rectangles in a robot's axes
+_EDGES = 20  # of a robot at an instant: for each rectangle the last u before it and the last u in it, then v
+_V = 10
+_LOW, _HIGH = 0x401, 0x802  # bits of a code for the edges of the first rectangle
+_ALONG_U = 0x3FF  # bits for edges of u
+_RAYS = 1200  # after the edges of all robots: where those rays begin that may meet one
 _OUT = -1
-_UNSURE = -1
 _FAR_UM = 1 << 29
 _MIXED = 255
 _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321
+_LINE = 352  # places of a line of corners or pixels
+_BAND = 4096  # pixels that are worked on at once
+_SURE, _UNSURE = 1, 2  # whether the samples of a pixel in which robots may be seen are known
 
 
 class Camera:
@@ -55,11 +61,11 @@ class Camera:
 
     NOT_STATE = (
         *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
-        *("field_sets", "side", "black", "robots", "team_paint", "identity_paint", "x", "y", "cos", "sin"),
-        *("spread_um", "drift_um", "near", "near_count", "span_first", "span_end", "seers", "seer_count"),
-        *("first", "samples", "cornered", "top_x", "top_y", "low_u", "high_u", "low_v", "high_v"),
-        *("corner_u", "corner_v", "more_um", "around_um", "middle_u", "middle_v", "fall_u", "fall_v"),
-        *("sure", "sampled", "u", "v", "seen", "height_um"),
+        *("field_sets", "side", "black", "boxes", "robots", "team_paint", "identity_paint", "x", "y"),
+        *("cos", "sin", "shift_u", "shift_v", "edges", "near_low", "near_high", "drift_um"),
+        *("span_first", "span_end", "corner_u", "corner_v", "code", "every", "some", "always", "ever"),
+        *("covered", "total", "first", "samples", "above", "below", "fall_u", "fall_v"),
+        *("spread_u", "spread_v", "u", "v", "seen", "height_um"),
     )
 
     def __init__(
@@ -78,10 +84,7 @@ class Camera:
         self.side = NUMBERS["side"]
         self.black = NUMBERS["top"]
         boxes = [(0, 0, _HALF_UM), *((1000 * u, 1000 * v, 500 * PATCH_MM) for u, v in pattern)]
-        self.low_u = [u - half_um for u, _, half_um in boxes] + [0]
-        self.high_u = [u + half_um for u, _, half_um in boxes] + [0]
-        self.low_v = [v - half_um for _, v, half_um in boxes] + [0]
-        self.high_v = [v + half_um for _, v, half_um in boxes] + [0]
+        self.boxes = [(u - half, u + half, v - half, v + half) for u, v, half in boxes]
         self.robots = 0
         self.team_paint = [0] * 10
         self.identity_paint = [0] * 10
@@ -89,33 +92,35 @@ class Camera:
         self.y = [0] * 60
         self.cos = [0] * 60
         self.sin = [0] * 60
-        self.spread_um = [0] * 60
+        self.shift_u = [0] * 60
+        self.shift_v = [0] * 60
+        self.edges = [0] * 1220
+        self.near_low = [0] * 60
+        self.near_high = [0] * 60
         self.drift_um = [0] * 10
-        self.near = [0] * 10
-        self.near_count = 0
-        self.span_first = [0] * 10
-        self.span_end = [0] * 10
-        self.seers = [0] * 10
-        self.seer_count = 0
+        self.span_first = 0
+        self.span_end = 0
+        self.corner_u = [0] * 4224
+        self.corner_v = [0] * 4224
+        self.code = [0] * 4224
+        self.every = [0] * 2112
+        self.some = [0] * 2112
+        self.always = [0] * 352
+        self.ever = [0] * 352
+        self.covered = [0] * 4096
+        self.total = [0] * 4096
         self.first = 0
         self.samples = 16
-        self.cornered = -1
-        self.top_x = [0] * 4
-        self.top_y = [0] * 4
-        self.corner_u = [0] * 4
-        self.corner_v = [0] * 4
-        self.more_um = 0
-        self.around_um = 0
-        self.middle_u = 0
-        self.middle_v = 0
+        self.above = 0
+        self.below = 0
         self.fall_u = 0
         self.fall_v = 0
-        self.sure = True
-        self.sampled = False
+        self.spread_u = False
+        self.spread_v = False
         self.u = [0] * 16
         self.v = [0] * 16
-        self.seen = [0] * 16
-        self.height_um = [0] * 16
+        self.seen = [0] * 96
+        self.height_um = [0] * 96
 
     def __repr__(self) -> str:
         return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
@@ -166,21 +171,58 @@ class Camera:
             sine, cosine = sincos(theta_rad + w_rad_s * after_s)
             self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
             self.sin[place] = math.floor(sine * 32768.0 + 0.5)
-            aside = self.rays.aside_um * (abs(self.cos[place]) + abs(self.sin[place])) >> 15
-            self.spread_um[place] = min(self.rays.spread_um, aside + 2)  # of a pixel along the robot's axes
+            self._stand(place)
         self._bound(body)
         self.robots = body + 1
+
+    def _stand(self, place: int) -> None:
+        """What follows from where a robot is: what moves places into its axes, and the edges there.
+
+        The ray through the middle of its top falls by `fall`, that from a place u beside it by `fall` + u top / drop:
+        it ends at `fall` + u camera / drop. What may be seen of the robot begins in `_REACH`; what begins in `_BASE`
+        ends under the robot. An edge of the top is near if rays from beyond it may fall towards the robot.
+        """
+        cosine, sine = self.cos[place], self.sin[place]
+        self.shift_u[place] = self.x[place] * cosine + self.y[place] * sine
+        self.shift_v[place] = self.y[place] * cosine - self.x[place] * sine
+        self.near_low[place] = self.near_high[place] = 0
+        at = _EDGES * place
+        for box, (low_u, high_u, low_v, high_v) in enumerate(self.boxes):
+            self.edges[at + 2 * box], self.edges[at + 2 * box + 1] = low_u - 1, high_u
+            self.edges[at + 2 * box + _V], self.edges[at + 2 * box + _V + 1] = low_v - 1, high_v
+        drop = self.rays.height_um - _TOP_UM
+        x = _TOP_UM * (self.x[place] - self.rays.x_um) // drop
+        y = _TOP_UM * (self.y[place] - self.rays.y_um) // drop
+        self._surround(place, at, _LOW & _ALONG_U, (x * cosine + y * sine) >> 15)
+        self._surround(place, at + _V, _LOW & ~_ALONG_U, (y * cosine - x * sine) >> 15)
+
+    def _surround(self, place: int, at: int, low: int, fall: int) -> None:
+        """The edges that depend on the fall, along u or along v; `low`: the bit of the top's lower one."""
+        camera = self.rays.height_um
+        drop = camera - _TOP_UM
+        margin = self.rays.spread_um // 4 + 2 * _ROUNDED_UM  # all rays of a pixel are taken to fall alike
+        self.edges[at + 2 * _REACH] = min(-_HALF_UM, (-_HALF_UM - fall - margin) * drop // camera) - 1
+        self.edges[at + 2 * _REACH + 1] = max(_HALF_UM, (_HALF_UM - fall + margin) * drop // camera + 1)
+        self.edges[at + 2 * _BASE] = (-_HALF_UM - fall + margin) * drop // camera + 1
+        self.edges[at + 2 * _BASE + 1] = (_HALF_UM - fall - margin) * drop // camera
+        if fall > -margin:
+            self.near_low[place] |= low
+        if fall < margin:
+            self.near_high[place] |= low << 1
 
     def _bound(self, body: int) -> None:
         """How far, at most, a place of the robot is at any instant from where it is at the middle one."""
         first = body * _SETS
         middle = first + self.sets // 2
+        reach = _EDGES * middle + 2 * _REACH
+        length = self.edges[reach + 1] - self.edges[reach]
+        length += self.edges[reach + _V + 1] - self.edges[reach + _V]
         drift = 0
         for place in range(first, first + self.sets):
             way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
             turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
-            drift = max(drift, way + (_CORNER_UM * turn >> 15))
-        self.drift_um[body] = drift + _ROUNDED_UM if drift else 0
+            drift = max(drift, way + way // 4 + (length * turn >> 15))
+        self.drift_um[body] = drift + _ROUNDED_UM
 
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
@@ -199,281 +241,432 @@ class Camera:
     def _draw(self, left: int, top: int, width: int, height: int, out: bytearray) -> None:
         first = max(0, left - self.sensor.side)
         end = min(_WIDTH, left + width + self.sensor.side)
-        self._gather(first, top, end - first, height)
-        for row in range(top, top + height):
-            self.scene.show(self.sensor, row, first, end, self.field_sets)
-            if self.near_count:
-                self._draw_robots(row, first, end)
-            self.sensor.write(row, left, width, out, 3 * width * (row - top))
+        band = _BAND // (end - first)
+        for above in range(top, top + height, band):
+            below = min(top + height, above + band)
+            self._cover(above, below, first, end)
+            for row in range(above, below):
+                self.scene.show(self.sensor, row, first, end, self.field_sets)
+                self._put_robots(row, first, end, (row - above) * (end - first))
+                self.sensor.write(row, left, width, out, 3 * width * (row - top))
 
-    def _gather(self, left: int, top: int, width: int, height: int) -> None:
-        """Which bodies may be seen in the window: neighbouring pixels are no further apart than two spreads."""
-        pixel = (top + height // 2) * _WIDTH + left + width // 2
-        reach = (width // 2 + height // 2 + 3) * 2 * self.rays.spread_um + self.rays.longest_fall_um
-        self.near_count = 0
+    def _put_robots(self, row: int, first: int, end: int, at: int) -> None:
+        """Those pixels of a line in which a robot may be seen; `at`: where the line begins in the band."""
+        for column in range(first, end):
+            if self.covered[at]:
+                total = self.total[at] if self.covered[at] == _SURE else self._samples(row, column)
+                self.sensor.put(column, total, self.scene.light(row * _WIDTH + column))
+            at += 1
+
+    # ---- one robot
+
+    def _cover(self, top: int, bottom: int, first: int, end: int) -> None:
+        """Finds the pixels of a band in which robots may be seen, and their paints where it is one robot."""
+        width, height = end - first, bottom - top
+        for at in range(width * height):
+            self.covered[at] = 0
+        pixel = (top + height // 2) * _WIDTH + first + width // 2
+        most = (width + height + 6) * self.rays.spread_um  # neighbours are no further apart than two spreads
         for body in range(self.robots):
-            if self._beyond(body, pixel) <= reach:
-                self.near[self.near_count] = body
-                self.near_count += 1
+            if self._beside(body, pixel) <= most:
+                self._cover_with(body, top, bottom, first, end)
 
-    def _beyond(self, body: int, pixel: int) -> int:
-        """How far the ray of a pixel's middle stays beside a robot, at least; below 0 where its samples may meet it."""
+    def _cover_with(self, body: int, top: int, bottom: int, first: int, end: int) -> None:
+        """The same for one robot: line by line, between the corners above and below."""
+        self._find_span(body, top, first, end)
+        self._find_corners(body, top, self.span_first, self.span_end)
+        at = 0 - first
+        for row in range(top, bottom):
+            left, right = self.span_first, self.span_end
+            self._find_span(body, row + 1, first, end if row + 1 < bottom else first)
+            self._find_corners(body, row + 1, min(left, self.span_first), max(right, self.span_end))
+            self._join(row, left, right)
+            for column in range(left, right):
+                self._cover_pixel(body, row, column, at + column)
+            at += end - first
+
+    def _find_span(self, body: int, row: int, first: int, end: int) -> None:
+        """Between which columns of a line a robot may be seen: where it is far, as many pixels are left out.
+
+        Where it is not seen at all, the span begins after its end.
+        """
+        step = self.rays.stride_um + _ROUNDED_UM
+        left, right = first, end
+        while left < right:
+            beside = self._beside(body, row * _WIDTH + left)
+            if beside <= 0:
+                break
+            left += 1 + (beside - 1) // step
+        while left < right:
+            beside = self._beside(body, row * _WIDTH + right - 1)
+            if beside <= 0:
+                break
+            right -= 1 + (beside - 1) // step
+        self.span_first = left if left < right else _WIDTH
+        self.span_end = right if left < right else 0
+
+    def _beside(self, body: int, pixel: int) -> int:
+        """How far the samples of a pixel stay beside all that is seen of a robot; 0 or less where they may meet it."""
         place = body * _SETS + self.sets // 2
-        cosine, sine = self.cos[place], self.sin[place]
-        x = self.rays.middle_x[pixel] - self.x[place]
-        y = self.rays.middle_y[pixel] - self.y[place]
-        u = (x * cosine + y * sine) >> 15
-        v = (y * cosine - x * sine) >> 15
-        x = self.rays.fall_x[pixel]
-        y = self.rays.fall_y[pixel]
-        end_u = u + ((x * cosine + y * sine) >> 15)
-        end_v = v + ((y * cosine - x * sine) >> 15)
-        aside = max(min(u, end_u), -max(u, end_u), min(v, end_v), -max(v, end_v))
-        return aside - _HALF_UM - self.drift_um[body] - self.rays.spread_um - _ROUNDED_UM
+        edges = _EDGES * place + 2 * _REACH
+        x, y = self.rays.middle_x[pixel], self.rays.middle_y[pixel]
+        u = (x * self.cos[place] + y * self.sin[place] - self.shift_u[place]) >> 15
+        v = (y * self.cos[place] - x * self.sin[place] - self.shift_v[place]) >> 15
+        beside_u = max(self.edges[edges] - u, u - self.edges[edges + 1])
+        beside_v = max(self.edges[edges + _V] - v, v - self.edges[edges + _V + 1])
+        return max(beside_u, beside_v) - self.drift_um[body] - self.rays.spread_um - _ROUNDED_UM
 
-    def _find_span(self, index: int, row: int, first: int, end: int) -> None:
-        """Between which columns of a line a robot may be seen: where it is far, as many pixels are left out."""
-        step = 2 * self.rays.spread_um + _ROUNDED_UM
-        body = self.near[index]
-        while first < end:
-            beyond = self._beyond(body, row * _WIDTH + first)
-            if beyond <= 0:
-                break
-            first += 1 + (beyond - 1) // step
-        while first < end:
-            beyond = self._beyond(body, row * _WIDTH + end - 1)
-            if beyond <= 0:
-                break
-            end -= 1 + (beyond - 1) // step
-        self.span_first[index], self.span_end[index] = first, end
+    def _find_corners(self, body: int, row: int, left: int, right: int) -> None:
+        """The corners above a line, from `left` to `right`, in the axes of a robot at each instant, and their codes."""
+        rays = self.rays
+        for at in range(self.sets):
+            place = body * _SETS + at
+            cosine, sine = self.cos[place], self.sin[place]
+            shift_u, shift_v = self.shift_u[place], self.shift_v[place]
+            line = (2 * at + (row & 1)) * _LINE
+            corner = row * _CORNERS
+            for column in range(left, right + 1):
+                x, y = rays.top_x[corner + column], rays.top_y[corner + column]
+                self.corner_u[line + column] = (x * cosine + y * sine - shift_u) >> 15
+                self.corner_v[line + column] = (y * cosine - x * sine - shift_v) >> 15
+            self._encode(_EDGES * place, line + left, line + right + 1)
 
-    def _draw_robots(self, row: int, first: int, end: int) -> None:
-        """Those pixels of a line in which a robot may be seen."""
-        left, right = end, first
-        for index in range(self.near_count):
-            self._find_span(index, row, first, end)
-            if self.span_first[index] < self.span_end[index]:
-                left = min(left, self.span_first[index])
-                right = max(right, self.span_end[index])
-        for column in range(left, right):
-            passing = 0
-            last = 0
-            for index in range(self.near_count):
-                if self.span_first[index] <= column < self.span_end[index]:
-                    passing += 1
-                    last = self.near[index]
-            if passing:
-                pixel = row * _WIDTH + column
-                total = self._steady(last, pixel) if passing == 1 else _UNSURE
-                if total == _UNSURE:
-                    total = 0
-                    for at in range(self.sets):
-                        total += self._instant(pixel, column, at)
-                self.sensor.put(column, total, self.scene.light(pixel))
+    def _encode(self, at: int, first: int, end: int) -> None:
+        """The codes of corners: bit k tells whether u is beyond edge k, bit 10 + k the same of v."""
+        a, b, c, d, e = (
+            self.edges[at + 9],
+            self.edges[at + 8],
+            self.edges[at + 7],
+            self.edges[at + 6],
+            self.edges[at + 5],
+        )
+        f, g, h, i, j = (
+            self.edges[at + 4],
+            self.edges[at + 3],
+            self.edges[at + 2],
+            self.edges[at + 1],
+            self.edges[at],
+        )
+        for corner in range(first, end, 8):  # as many together
+            for lane in range(8):
+                u = self.corner_u[corner + lane]
+                high = 2 * (2 * (2 * (2 * (u > a) + (u > b)) + (u > c)) + (u > d)) + (u > e)
+                high = 2 * (2 * (2 * (2 * high + (u > f)) + (u > g)) + (u > h)) + (u > i)
+                self.code[corner + lane] = 2 * high + (u > j)
+        at += _V
+        a, b, c, d, e = (
+            self.edges[at + 9],
+            self.edges[at + 8],
+            self.edges[at + 7],
+            self.edges[at + 6],
+            self.edges[at + 5],
+        )
+        f, g, h, i, j = (
+            self.edges[at + 4],
+            self.edges[at + 3],
+            self.edges[at + 2],
+            self.edges[at + 1],
+            self.edges[at],
+        )
+        for corner in range(first, end, 8):
+            for lane in range(8):
+                v = self.corner_v[corner + lane]
+                high = 2 * (2 * (2 * (2 * (v > a) + (v > b)) + (v > c)) + (v > d)) + (v > e)
+                high = 2 * (2 * (2 * (2 * high + (v > f)) + (v > g)) + (v > h)) + (v > i)
+                self.code[corner + lane] |= (2 * high + (v > j)) << _V
 
-    def _steady(self, body: int, pixel: int) -> int:
-        """The paints of all samples of a pixel, added, if they are the same at all instants of the exposure."""
-        self.first, self.samples = 0, 16
-        self.more_um = self.drift_um[body]
-        total = self._alone(body * _SETS + self.sets // 2, pixel)
-        return total * self.field_sets if total != _UNSURE else _UNSURE
+    def _join(self, row: int, left: int, right: int) -> None:
+        """What the codes of a pixel's corners have all (`every`) and what one of them has (`some`), at each instant.
 
-    def _instant(self, pixel: int, column: int, at: int) -> int:
-        """The samples of one instant: all 16, or the 8 of its field."""
+        `always` and `ever`: the same over all instants.
+        """
+        for column in range(left, right, 8):
+            for lane in range(8):
+                self.always[column + lane] = -1
+                self.ever[column + lane] = 0
+        for at in range(self.sets):
+            above = (2 * at + (row & 1)) * _LINE
+            below = (2 * at + (~row & 1)) * _LINE
+            joined = at * _LINE
+            for column in range(left, right, 8):
+                for lane in range(8):
+                    a, b = self.code[above + column + lane], self.code[above + column + lane + 1]
+                    c, d = self.code[below + column + lane], self.code[below + column + lane + 1]
+                    self.every[joined + column + lane] = a & b & c & d
+                    self.some[joined + column + lane] = a | b | c | d
+                    self.always[column + lane] &= a & b & c & d
+                    self.ever[column + lane] |= a | b | c | d
+
+    def _cover_pixel(self, body: int, row: int, column: int, index: int) -> None:
+        """A pixel in which a robot may be seen: its paints, added over all samples and instants."""
+        if _outside(_REACH, self.always[column], self.ever[column]):
+            return
+        if self.covered[index]:
+            self.covered[index] = _UNSURE
+            return
+        self.covered[index] = _SURE
+        pixel = row * _WIDTH + column
+        total = self._steady(body, pixel, self.always[column], self.ever[column])
+        if total < 0:
+            total = 0
+            for at in range(self.sets):
+                self._turn(row, column, at)
+                part = self._alone(
+                    body * _SETS + at, pixel, self.every[at * _LINE + column], self.some[at * _LINE + column]
+                )
+                if part < 0:
+                    self.covered[index] = _UNSURE
+                    return
+                total += part
+        self.total[index] = total
+
+    def _steady(self, body: int, pixel: int, every: int, some: int) -> int:
+        """The samples of a pixel at all instants, if all see the same of the robot; else -1."""
+        if not _inside(_TOP, every, some):
+            if not _outside(_TOP, every, some) or not _inside(_BASE, every, some):
+                return -1
+            self.scene.behind(pixel)
+            if self.scene.shows_ball(pixel):
+                return -1
+            paint = self.side
+        elif _inside(_TEAM, every, some):
+            paint = self.team_paint[body]
+        elif not _outside(_TEAM, every, some):
+            return -1
+        elif _inside(_IDENTITY, every, some):
+            paint = self.identity_paint[body]
+        elif not _outside(_IDENTITY, every, some):
+            return -1
+        else:
+            paint = self.black
+        return 16 * self.field_sets * self.scene.packed[paint]
+
+    def _turn(self, row: int, column: int, at: int) -> None:
+        """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
+        self.above = (2 * at + (row & 1)) * _LINE + column
+        self.below = (2 * at + (~row & 1)) * _LINE + column
+        self.spread_u = self.spread_v = False
         if self.sets != self.field_sets:
             self.first, self.samples = 8 * (at // self.field_sets), 8
-        self.more_um = 0
-        self.seer_count = 0
-        for index in range(self.near_count):
-            if self.span_first[index] <= column < self.span_end[index]:
-                self.seers[self.seer_count] = self.near[index] * _SETS + at
-                self.seer_count += 1
-        total = self._alone(self.seers[0], pixel) if self.seer_count == 1 else _UNSURE
-        return total if total != _UNSURE else self._samples(pixel)
 
-    def _turn(self, place: int, pixel: int) -> None:
-        """Where the pixel's middle is in the axes of a robot at an instant, and how far from it its samples are."""
-        self.sampled = False
-        self.around_um = self.spread_um[place] + self.more_um
-        x = self.rays.middle_x[pixel] - self.x[place]
-        y = self.rays.middle_y[pixel] - self.y[place]
-        self.middle_u = (x * self.cos[place] + y * self.sin[place]) >> 15
-        self.middle_v = (y * self.cos[place] - x * self.sin[place]) >> 15
-
-    def _fall(self, place: int, pixel: int) -> None:
-        """How far rays fall in a robot's axes, and between which places they begin that may meet it."""
-        x = self.rays.fall_x[pixel]
-        y = self.rays.fall_y[pixel]
-        self.fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
-        self.fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
-        self.low_u[_RAYS] = self.low_u[_TOP] - max(self.fall_u, 0)
-        self.high_u[_RAYS] = self.high_u[_TOP] - min(self.fall_u, 0)
-        self.low_v[_RAYS] = self.low_v[_TOP] - max(self.fall_v, 0)
-        self.high_v[_RAYS] = self.high_v[_TOP] - min(self.fall_v, 0)
-
-    def _alone(self, place: int, pixel: int) -> int:
-        """The samples where only one robot may be seen, by how many see what; or _UNSURE."""
+    def _alone(self, place: int, pixel: int, every: int, some: int) -> int:
+        """The samples of an instant where one robot may be seen, by how many see what; -1 if that does not tell."""
         scene = self.scene
-        self._turn(place, pixel)
-        self.sure = True
-        on_top = entered = self._within(place, pixel, _TOP)
+        on_top = self._within(place, _TOP, every, some)
         total = 0
         if on_top < self.samples:
-            self._fall(place, pixel)
-            entered = self._within(place, pixel, _RAYS)
-            if entered:
-                entered = self._across(place, pixel, entered)
-            if entered == 0 and self.samples == 16 and self.sure:
+            behind = scene.behind(pixel)
+            entered = self._entered(place, pixel, every, some, on_top)
+            if entered == 0 and self.samples == 16:
                 return scene.total[pixel]
-            behind = scene.paint[pixel]
-            if not self.sure or (entered < self.samples and behind == _MIXED) or scene.shows_ball(pixel):
-                return _UNSURE
+            if (entered < self.samples and behind == _MIXED) or scene.shows_ball(pixel):
+                return -1
             if entered < self.samples:
                 total = (self.samples - entered) * scene.packed[behind]
             total += (entered - on_top) * scene.packed[self.side]
         if on_top:
-            team = self._within(place, pixel, _TEAM)
-            identity = self._within(place, pixel, _IDENTITY) if team < on_top else 0
+            team = self._within(place, _TEAM, every, some)
+            identity = self._within(place, _IDENTITY, every, some) if team < on_top else 0
             body = place // _SETS
             total += team * scene.packed[self.team_paint[body]]
             total += identity * scene.packed[self.identity_paint[body]]
             total += (on_top - team - identity) * scene.packed[self.black]
-        return total if self.sure else _UNSURE
+        return total
 
-    def _within(self, place: int, pixel: int, box: int) -> int:
+    def _within(self, place: int, box: int, every: int, some: int) -> int:
         """How many samples lie in a rectangle."""
-        low_u, high_u = self.low_u[box] - self.middle_u, self.high_u[box] - self.middle_u
-        low_v, high_v = self.low_v[box] - self.middle_v, self.high_v[box] - self.middle_v
-        around = self.around_um
-        if low_u > around or high_u < -around or low_v > around or high_v < -around:
+        if _outside(box, every, some):
             return 0
-        if low_u <= -around and high_u >= around and low_v <= -around and high_v >= around:
+        low, high = _LOW << 2 * box, _HIGH << 2 * box
+        crossed = ((every & low) | (some & high)) ^ low
+        if crossed == 0:
             return self.samples
-        return self._count(place, pixel, low_u - 1, high_u + 1, low_v - 1, high_v + 1)
+        return self._count(_EDGES * place + 2 * box, crossed & _ALONG_U, crossed & ~_ALONG_U)
 
-    def _count(self, place: int, pixel: int, low_u: int, high_u: int, low_v: int, high_v: int) -> int:
-        """How many samples lie between these distances from the middle."""
-        if not self.sampled:
-            self._sample(place, pixel)
+    def _count(self, at: int, along_u: int, along_v: int) -> int:
+        """How many samples lie between edges; along an axis that is 0 all do."""
+        if along_u and not self.spread_u:
+            self._spread(self.u, self.corner_u)
+            self.spread_u = True
+        if along_v and not self.spread_v:
+            self._spread(self.v, self.corner_v)
+            self.spread_v = True
+        low_u, high_u = (
+            self.edges[at] - self.corner_u[self.above],
+            self.edges[at + 1] - self.corner_u[self.above],
+        )
+        if not along_v:
+            return _between(self.u, low_u, high_u)
+        low_v, high_v = (
+            self.edges[at + _V] - self.corner_v[self.above],
+            self.edges[at + _V + 1] - self.corner_v[self.above],
+        )
+        if not along_u:
+            return _between(self.v, low_v, high_v)
         within = 0
         for sample in range(16):
-            inside_u = (self.u[sample] > low_u) & (self.u[sample] < high_u)
-            within += inside_u & (self.v[sample] > low_v) & (self.v[sample] < high_v)
+            inside_u = (self.u[sample] > low_u) & (self.u[sample] <= high_u)
+            within += inside_u & (self.v[sample] > low_v) & (self.v[sample] <= high_v)
         return within
 
-    def _across(self, place: int, pixel: int, within: int) -> int:
-        """How many of the samples between the right places see any of a robot: as `_enters`."""
-        fall_u, fall_v = self.fall_u, self.fall_v
-        reach = abs(fall_u) + abs(fall_v)
-        middle = self.middle_u * fall_v - self.middle_v * fall_u
-        low, high = -_HALF_UM * reach - middle, _HALF_UM * reach - middle
-        around = self.around_um * reach
-        if low > around or high < -around:
+    def _entered(self, place: int, pixel: int, every: int, some: int, on_top: int) -> int:
+        """How many samples see any of a robot, `on_top` of them its top."""
+        near = self.near_low[place]
+        if ((every & near) | (some & self.near_high[place])) == near or _outside(_REACH, every, some):
+            return on_top
+        if _inside(_BASE, every, some):
+            return self.samples
+        self._fall(place, pixel)
+        a, b = self.corner_u[self.above], self.corner_u[self.above + 1]
+        c, d = self.corner_u[self.below], self.corner_u[self.below + 1]
+        least_u, most_u = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+        a, b = self.corner_v[self.above], self.corner_v[self.above + 1]
+        c, d = self.corner_v[self.below], self.corner_v[self.below + 1]
+        least_v, most_v = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+        low_u, high_u = self.edges[_RAYS], self.edges[_RAYS + 1]
+        low_v, high_v = self.edges[_RAYS + _V], self.edges[_RAYS + _V + 1]
+        if most_u <= low_u or least_u > high_u or most_v <= low_v or least_v > high_v:
             return 0
-        if low <= -around and high >= around:
+        within = self.samples
+        along_u = least_u <= low_u or most_u > high_u
+        along_v = least_v <= low_v or most_v > high_v
+        if along_u or along_v:
+            within = self._count(_RAYS, along_u, along_v)
+        u, v = (least_u + most_u) >> 1, (least_v + most_v) >> 1
+        return self._across(within, u, v, most_u - u, most_v - v) if within else 0
+
+    def _fall(self, place: int, pixel: int) -> None:
+        """How far rays fall in a robot's axes, and between which edges they begin that may meet it."""
+        x, y = self.rays.fall_x[pixel], self.rays.fall_y[pixel]
+        self.fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
+        self.fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
+        self.edges[_RAYS] = -_HALF_UM - 1 - max(self.fall_u, 0)
+        self.edges[_RAYS + 1] = _HALF_UM - min(self.fall_u, 0)
+        self.edges[_RAYS + _V] = -_HALF_UM - 1 - max(self.fall_v, 0)
+        self.edges[_RAYS + _V + 1] = _HALF_UM - min(self.fall_v, 0)
+
+    def _across(self, within: int, u: int, v: int, around_u: int, around_v: int) -> int:
+        """How many of the samples between the right edges see any of a robot; all lie around (u, v)."""
+        fall_u, fall_v = self.fall_u, self.fall_v
+        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
+        middle = u * fall_v - v * fall_u
+        around = around_u * abs(fall_v) + around_v * abs(fall_u)
+        if abs(middle) - around > most:
+            return 0
+        if abs(middle) + around <= most:
             return within
-        if not self.sampled:
-            self._sample(place, pixel)
-        low_u, high_u = self.low_u[_RAYS] - self.middle_u, self.high_u[_RAYS] - self.middle_u
-        low_v, high_v = self.low_v[_RAYS] - self.middle_v, self.high_v[_RAYS] - self.middle_v
+        return self._count_entering()
+
+    def _count_entering(self) -> int:
+        """How many samples see any of a robot, one by one."""
+        self._spread(self.u, self.corner_u)
+        self._spread(self.v, self.corner_v)
+        self.spread_u = self.spread_v = True
+        u, v = self.corner_u[self.above], self.corner_v[self.above]
         entered = 0
         for sample in range(16):
-            u, v = self.u[sample], self.v[sample]
-            if low_u <= u <= high_u and low_v <= v <= high_v and low <= u * fall_v - v * fall_u <= high:
+            if _enters(u + self.u[sample], v + self.v[sample], self.fall_u, self.fall_v):
                 entered += 1
         return entered
 
-    def _sample(self, place: int, pixel: int) -> None:
-        """How far samples lie from the middle in a robot's axes; those of the other field lie far away."""
-        self.sampled = True
-        if self.more_um:
-            self.sure = False
-            return
-        if self.cornered != pixel:
-            self._find_corners(pixel)
-        u, v = self.corner_u, self.corner_v
-        cosine, sine = self.cos[place], self.sin[place]
-        for corner in range(4):
-            x = self.top_x[corner] - self.x[place]
-            y = self.top_y[corner] - self.y[place]
-            u[corner] = ((x * cosine + y * sine) >> 15) - self.middle_u
-            v[corner] = ((y * cosine - x * sine) >> 15) - self.middle_v
-        self._spread(self.u, u[0], u[1], u[2], u[3])
-        self._spread(self.v, v[0], v[1], v[2], v[3])
-        if self.samples < 16:
-            for column in range(8):
-                self.u[8 - self.first + column] = _FAR_UM
-
-    def _spread(self, samples: list[int], a: int, b: int, c: int, d: int) -> None:
-        """Sixteen samples, row by row, between corners: a b above, c d below; as `rays.between`."""
-        twist = a - b - c + d
+    def _spread(self, samples: list[int], corners: list[int]) -> None:
+        """How far samples lie from a pixel's first corner: as `rays.between`; those of the other field lie far away."""
+        a = corners[self.above]
+        b, c, d = corners[self.above + 1] - a, corners[self.below] - a, corners[self.below + 1] - a
         for column in range(4):
             p = 2 * column + 1
-            at = 64 * a + 8 * p * (b - a)
-            by = 8 * (c - a) + p * twist
+            at = 8 * p * b
+            by = 8 * c + p * (d - b - c)
             samples[column] = (at + by) >> 6
             samples[4 + column] = (at + 3 * by) >> 6
             samples[8 + column] = (at + 5 * by) >> 6
             samples[12 + column] = (at + 7 * by) >> 6
+        if self.samples < 16:
+            for column in range(8):
+                samples[8 - self.first + column] = _FAR_UM
 
-    def _find_corners(self, pixel: int) -> None:
-        """Where the pixel's corners are at the height of the tops; corners in rows: two above, two below."""
-        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
-        for corner in range(4):
-            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
-            self.top_x[corner] = self.rays.top_x(ray)
-            self.top_y[corner] = self.rays.top_y(ray)
-        self.cornered = pixel
+    # ---- several robots, or much in the background
 
-    def _samples(self, pixel: int) -> int:
-        """The samples of a pixel at one instant, one by one."""
+    def _samples(self, row: int, column: int) -> int:
+        """The samples of a pixel at all instants, one by one."""
+        pixel = row * _WIDTH + column
         scene = self.scene
-        behind = scene.paint[pixel]
+        behind = scene.behind(pixel)
         ball_seen = scene.shows_ball(pixel)
-        for sample in range(self.first, self.first + self.samples):
-            self.seen[sample] = _OUT
-            self.height_um[sample] = -1
-        for index in range(self.seer_count):
-            self._see(self.seers[index], pixel)
+        for at in range(16 * self.sets):
+            self.seen[at] = _OUT
+            self.height_um[at] = -1
+        for body in range(self.robots):
+            if self._beside(body, pixel) <= 0:
+                self._find_corners(body, row, column, column + 1)
+                self._find_corners(body, row + 1, column, column + 1)
+                for at in range(self.sets):
+                    self._turn(row, column, at)
+                    self._see(body, at, pixel)
         total = 0
-        for sample in range(self.first, self.first + self.samples):
-            paint = self.seen[sample]
-            if paint == _OUT:
-                paint = behind if behind != _MIXED else scene.sample(pixel, sample)
-            elif ball_seen and self.height_um[sample] < _TOP_UM:
-                ball = scene.ball_above(pixel, sample, self.height_um[sample])
-                paint = ball if ball >= 0 else paint
-            total += scene.packed[paint]
+        for at in range(self.sets):
+            self._turn(row, column, at)
+            for sample in range(self.first, self.first + self.samples):
+                paint, height = self.seen[16 * at + sample], self.height_um[16 * at + sample]
+                if paint == _OUT:
+                    paint = behind if behind != _MIXED else scene.sample(pixel, sample)
+                elif ball_seen and height < _TOP_UM:
+                    ball = scene.ball_above(pixel, sample, height)
+                    paint = ball if ball >= 0 else paint
+                total += scene.packed[paint]
         return total
 
-    def _see(self, place: int, pixel: int) -> None:
-        """What samples see of one robot, where it is higher than what they have seen."""
-        self._turn(place, pixel)
+    def _see(self, body: int, at: int, pixel: int) -> None:
+        """What the samples of an instant see of one robot, where it is higher than what they have seen."""
+        place = body * _SETS + at
         self._fall(place, pixel)
-        if self._within(place, pixel, _RAYS) == 0:
-            return
-        self._sample(place, pixel)
+        self._spread(self.u, self.corner_u)
+        self._spread(self.v, self.corner_v)
         for sample in range(self.first, self.first + self.samples):
-            if self.height_um[sample] == _TOP_UM:
+            u, v = self.corner_u[self.above] + self.u[sample], self.corner_v[self.above] + self.v[sample]
+            index = 16 * at + sample
+            if self.height_um[index] == _TOP_UM:
                 continue
-            u, v = self.middle_u + self.u[sample], self.middle_v + self.v[sample]
-            if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
-                self.seen[sample] = self._top(place // _SETS, u, v)
-                self.height_um[sample] = _TOP_UM
+            if self._lies_in(place, _TOP, u, v):
+                self.seen[index] = self._top(body, u, v)
+                self.height_um[index] = _TOP_UM
             elif _enters(u, v, self.fall_u, self.fall_v):
                 height = _entry(u, v, self.fall_u, self.fall_v)
-                if height > self.height_um[sample]:
-                    self.seen[sample] = self.side
-                    self.height_um[sample] = height
+                if height > self.height_um[index]:
+                    self.seen[index] = self.side
+                    self.height_um[index] = height
 
     def _top(self, body: int, u: int, v: int) -> int:
         """The paint of a place on the top."""
-        if self.low_u[_TEAM] <= u <= self.high_u[_TEAM] and self.low_v[_TEAM] <= v <= self.high_v[_TEAM]:
+        if self._lies_in(body * _SETS, _TEAM, u, v):
             return self.team_paint[body]
-        if self.low_u[_IDENTITY] <= u <= self.high_u[_IDENTITY]:
-            if self.low_v[_IDENTITY] <= v <= self.high_v[_IDENTITY]:
-                return self.identity_paint[body]
-        return self.black
+        return self.identity_paint[body] if self._lies_in(body * _SETS, _IDENTITY, u, v) else self.black
+
+    def _lies_in(self, place: int, box: int, u: int, v: int) -> bool:
+        """Whether a place lies in a rectangle."""
+        at = _EDGES * place + 2 * box
+        inside_u = self.edges[at] < u <= self.edges[at + 1]
+        return inside_u and self.edges[at + _V] < v <= self.edges[at + _V + 1]
+
+
+def _inside(box: int, every: int, some: int) -> bool:
+    """Whether all corners with such codes, and so all samples between them, lie in a rectangle."""
+    low, high = _LOW << 2 * box, _HIGH << 2 * box
+    return ((every & low) | (some & high)) == low
+
+
+def _outside(box: int, every: int, some: int) -> bool:
+    """Whether all lie beyond the same side of it."""
+    low, high = _LOW << 2 * box, _HIGH << 2 * box
+    return ((some & low) | (every & high)) != low
+
+
+def _between(samples: list[int], low: int, high: int) -> int:
+    """How many of 16 samples are above `low` and not above `high`."""
+    within = 0
+    for sample in range(16):
+        within += (samples[sample] > low) - (samples[sample] > high)
+    return within
 
 
 def _um(metres: float) -> int:

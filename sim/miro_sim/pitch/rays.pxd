@@ -11,17 +11,15 @@ cpdef long long between(long long a, long long b, long long c, long long d, int 
 
 @cython.final
 cdef class Rays:
-    cdef int[::1] slope_x, slope_y, middle_x, middle_y, fall_x, fall_y
-    cdef readonly long long x_um, y_um, height_um, spread_um, aside_um, longest_fall_um
+    cdef int[::1] slope_x, slope_y, top_x, top_y, middle_x, middle_y, fall_x, fall_y
+    cdef readonly long long x_um, y_um, height_um, spread_um, stride_um
 
     @cython.locals(x='long long', y='long long', exact_x=double, exact_y=double, i=int, j=int,
                    corner=int)
     cdef _cast(self, lens.Lens lens)
-    cdef inline long long top_x(self, int corner) noexcept
-    cdef inline long long top_y(self, int corner) noexcept
     @cython.locals(x='long long', y='long long', i=int, j=int, a=int, c=int, pixel=int)
     cdef _gather(self)
     @cython.locals(widest='long long', x='long long', y='long long', i=int, j=int, corner=int, at=int, pixel=int)
     cdef long long _spread(self) noexcept
-    @cython.locals(longest='long long', pixel=int)
-    cdef long long _longest_fall(self) noexcept
+    @cython.locals(widest='long long', x='long long', y='long long', j=int, pixel=int)
+    cdef long long _stride(self) noexcept

@@ -30,12 +30,12 @@ class Rays:
     """The rays of one camera. Constant. All lengths in um, in the paper's axes.
 
     `spread_um`: no sample of a pixel is further than this from the mean of its corners, on the floor and at the top,
-    rounding included; along x and along y than `aside_um`. `longest_fall_um`: of all rays, from the top to the floor.
+    rounding included. `stride_um`: nor are the middles of two neighbours in a row from each other, at the top.
     """
 
     NOT_STATE = (
-        *("slope_x", "slope_y", "middle_x", "middle_y", "fall_x", "fall_y"),
-        *("x_um", "y_um", "height_um", "spread_um", "aside_um", "longest_fall_um"),
+        *("slope_x", "slope_y", "top_x", "top_y", "middle_x", "middle_y", "fall_x", "fall_y"),
+        *("x_um", "y_um", "height_um", "spread_um", "stride_um"),
     )
 
     def __init__(self, parameters: CameraParameters) -> None:
@@ -46,15 +46,16 @@ class Rays:
         self.height_um = _um(parameters.height_m)
         self.slope_x = array("i", bytes(4 * 77361))
         self.slope_y = array("i", bytes(4 * 77361))
+        self.top_x = array("i", bytes(4 * 77361))
+        self.top_y = array("i", bytes(4 * 77361))
         self.middle_x = array("i", bytes(4 * 76800))
         self.middle_y = array("i", bytes(4 * 76800))
         self.fall_x = array("i", bytes(4 * 76800))
         self.fall_y = array("i", bytes(4 * 76800))
         self._cast(lens)
         self._gather()
-        self.aside_um = 0
         self.spread_um = self._spread()
-        self.longest_fall_um = self._longest_fall()
+        self.stride_um = self._stride()
 
     def __repr__(self) -> str:
         return f"Rays(({self.x_um}, {self.y_um}, {self.height_um}) um, spread {self.spread_um} um)"
@@ -76,14 +77,8 @@ class Rays:
                 corner = j * _CORNERS + i
                 self.slope_x[corner] = x
                 self.slope_y[corner] = y
-
-    def top_x(self, corner: int) -> int:
-        """Where a corner's ray passes the height of the tops."""
-        return self.x_um + ((self.height_um - _TOP_UM) * self.slope_x[corner] >> 22)
-
-    def top_y(self, corner: int) -> int:
-        """The same along y."""
-        return self.y_um + ((self.height_um - _TOP_UM) * self.slope_y[corner] >> 22)
+                self.top_x[corner] = self.x_um + ((self.height_um - _TOP_UM) * x >> 22)
+                self.top_y[corner] = self.y_um + ((self.height_um - _TOP_UM) * y >> 22)
 
     def _gather(self) -> None:
         """The means of each pixel's corners."""
@@ -96,33 +91,35 @@ class Rays:
                 y = self.slope_y[a] + self.slope_y[a + 1] + self.slope_y[c] + self.slope_y[c + 1]
                 self.fall_x[pixel] = _TOP_UM * x >> 24
                 self.fall_y[pixel] = _TOP_UM * y >> 24
-                x = self.top_x(a) + self.top_x(a + 1) + self.top_x(c) + self.top_x(c + 1)
-                y = self.top_y(a) + self.top_y(a + 1) + self.top_y(c) + self.top_y(c + 1)
+                x = self.top_x[a] + self.top_x[a + 1] + self.top_x[c] + self.top_x[c + 1]
+                y = self.top_y[a] + self.top_y[a + 1] + self.top_y[c] + self.top_y[c + 1]
                 self.middle_x[pixel] = (x + 2) >> 2
                 self.middle_y[pixel] = (y + 2) >> 2
 
     def _spread(self) -> int:
-        """The longest way from a pixel's middle to one of its corners, both on the floor; `aside_um` along an axis."""
+        """The longest way from a pixel's middle to one of its corners, both on the floor."""
         widest = 0
         for j in range(_HEIGHT):
             for i in range(_WIDTH):
                 pixel = j * _WIDTH + i
                 for corner in range(4):
                     at = (j + (corner >> 1)) * _CORNERS + i + (corner & 1)
-                    x = self.top_x(at) + (_TOP_UM * self.slope_x[at] >> 22)
-                    y = self.top_y(at) + (_TOP_UM * self.slope_y[at] >> 22)
+                    x = self.top_x[at] + (_TOP_UM * self.slope_x[at] >> 22)
+                    y = self.top_y[at] + (_TOP_UM * self.slope_y[at] >> 22)
                     x -= self.middle_x[pixel] + self.fall_x[pixel]
                     y -= self.middle_y[pixel] + self.fall_y[pixel]
-                    self.aside_um = max(self.aside_um, abs(x), abs(y))
                     widest = max(widest, x * x + y * y)
-        self.aside_um += 1 + _MARGIN_SPARE_UM
         return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
 
-    def _longest_fall(self) -> int:
-        longest = 0
-        for pixel in range(_WIDTH * _HEIGHT):
-            longest = max(longest, abs(self.fall_x[pixel]), abs(self.fall_y[pixel]))
-        return longest
+    def _stride(self) -> int:
+        """The longest way from the middle of a pixel to that of its neighbour, both at the height of the tops."""
+        widest = 0
+        for j in range(_HEIGHT):
+            for pixel in range(j * _WIDTH + 1, (j + 1) * _WIDTH):
+                x = self.middle_x[pixel] - self.middle_x[pixel - 1]
+                y = self.middle_y[pixel] - self.middle_y[pixel - 1]
+                widest = max(widest, x * x + y * y)
+        return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
 
 
 def between(a: int, b: int, c: int, d: int, sample: int) -> int:
