@@ -2,14 +2,18 @@
 
 A walk begins in a function that takes the parameter and follows it into every function of the product that it is given
 to, first into the first one called, each function once. A name that is assigned from it is it, too; what a function
-makes of it (an image of a file's name) is where WALKS says so, an object that is made with it never. Counted are stays
-(stretches of the walk in one file), rooms (files), and returns (stays in a file where the walk has been before).
+makes of it (an image of a file's name) is where WALKS says so, an object that is made with it never. A scenario's key,
+which is no parameter of anything, is followed as it runs (`key_walk`). Counted are stays (stretches of the walk in one
+file), rooms (files), and returns (stays in a file where the walk has been before).
 """
 
 import argparse
 import ast
+import sys
 from itertools import groupby
 from pathlib import Path
+
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {"exact": "miro_exact", "protocol": "miro_protocol", "robot_fw": "miro_robot", "host": "miro_host"}
@@ -118,16 +122,21 @@ def walk(code, module, function, record, first, made_too):
 def figures(root):
     """Name of a walk -> stays, rooms, returns."""
     code = Code(root)
-    found = {}
-    for name, begin in WALKS.items():
-        stays = walk(code, *begin)
-        found[name] = (len(stays), len(set(stays)), len(stays) - len(set(stays)))
-    return found
+    walks = {name: walk(code, *begin) for name, begin in WALKS.items() if begin[:2] in code.functions}
+    follow = [sys.executable, "-P", str(Path(__file__).with_name("key_walk.py")), str(root)]
+    passed = children.run(follow, capture_output=True, text=True, check=True).stdout.splitlines()
+    walks["a scenario's key, to the plant"] = [one for one, _ in groupby(passed)]
+    return {
+        name: (len(found), len(set(found)), len(found) - len(set(found))) for name, found in walks.items()
+    }
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkouts", nargs="*", type=Path, default=[ROOT])
     columns = [figures(path.resolve()) for path in parser.parse_args().checkouts]
-    for name in WALKS:
-        print(f"{name:36}", *("{:4} stays {:3} rooms {:3} returns   ".format(*one[name]) for one in columns))
+    for name in columns[0]:
+        found = (one.get(name) for one in columns)
+        print(
+            f"{name:36}", *("{:4} stays {:3} rooms {:3} returns   ".format(*(one or "---")) for one in found)
+        )
