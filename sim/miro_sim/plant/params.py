@@ -12,6 +12,9 @@ from typing import ClassVar
 import msgspec
 
 GRAVITY_M_S2 = 9.81
+MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
+MIN_MOTOR_S = 1e-4
+"""The plant steps by a PWM period, 85 us: the speed of a quicker motor would grow from step to step."""
 
 Ranges = dict[str, tuple[float, float]]
 """Lowest and highest value of each number of a table, far beyond any robot of this size."""
@@ -203,6 +206,23 @@ class DriveParams(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     tyre: Tyre = Tyre()
     ball: RollingBall = RollingBall()
     disturbance: Disturbance = Disturbance()
+
+    def __post_init__(self) -> None:
+        motor, voltage_v = self.motor, self.battery.voltage_v
+        constant = motor.torque_constant_nm_a
+        counts_per_s = voltage_v / constant * self.counts_per_radian()
+        if counts_per_s > MAX_COUNTS_PER_S:
+            raise ValueError(
+                f"{voltage_v} V, {constant} Nm/A and {self.encoder.lines} lines make {counts_per_s:.3g} counts/s"
+                f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
+            )
+        motor_s = self.motor_s()
+        if motor_s < MIN_MOTOR_S:
+            ohm = motor.resistance_ohm + self.battery.resistance_ohm
+            raise ValueError(
+                f"motor: {motor.rotor_inertia_kg_m2:g} kg m2, {ohm:g} ohm with the battery and {constant:g} Nm/A make"
+                f" a time constant of {motor_s:.3g} s; at least {MIN_MOTOR_S:g} s (real motors: 0.001 to 0.1 s)"
+            )
 
     def is_rough(self) -> bool:
         """Whether anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""

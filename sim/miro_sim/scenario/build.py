@@ -36,6 +36,18 @@ def reference_for(robot: sc.RobotSpec, duration_s: float) -> Trajectory:
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
+def reference_and_start(robot: sc.RobotSpec, duration_s: float) -> tuple[Trajectory, Posture]:
+    """The reference, and where the robot starts: there, but for the errors of its start. Raises PluginError."""
+    reference = reference_for(robot, duration_s)
+    at = reference.at(0.0).posture
+    start = Posture(
+        at.x_m + robot.start_error_x_cm / 100.0,
+        at.y_m + robot.start_error_y_cm / 100.0,
+        at.theta_rad + robot.start_error_theta_rad,
+    )
+    return reference, start
+
+
 def dead_s(scenario: sc.Scenario, network: sc.NetworkSpec) -> float:
     """What a PC knows of its own delay: from a period's begin to the end of its frame."""
     radio = network.radio
@@ -85,16 +97,6 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
     except (Exception, SystemExit) as error:
         what = f"{word} {name!r} cannot be made: {raised(error)}"
         raise PluginError(what, f"mend the {word} or its parameters") from error
-
-
-def start_of(robot: sc.RobotSpec, reference: Trajectory) -> Posture:
-    """Where the robot starts: at its reference, but for the errors of its start."""
-    at = reference.at(0.0).posture
-    return Posture(
-        at.x_m + robot.start_error_x_cm / 100.0,
-        at.y_m + robot.start_error_y_cm / 100.0,
-        at.theta_rad + robot.start_error_theta_rad,
-    )
 
 
 def drive_for(robot: sc.RobotSpec, start: Posture, wheels: Stream, noise: Stream) -> DifferentialDrive:

@@ -200,7 +200,7 @@ def _checked(
 
 def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
-    complete = _with_profiles(_with_variant(raw, origin), origin)
+    complete = _with_profiles(_with_variant(raw, origin) if "variant" in raw else raw, origin)
     try:
         scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
     except msgspec.ValidationError as error:

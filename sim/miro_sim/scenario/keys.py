@@ -23,10 +23,6 @@ from miro_sim.radio.params import Radio
 from miro_sim.scenario.camera_keys import Camera, PitchCm, PixelCamera
 
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
-MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
-MIN_MOTOR_S = (
-    1e-4  # the plant steps by a PWM period, 85 us: a quicker motor's speed would grow from step to step
-)
 
 Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
 TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
@@ -71,21 +67,6 @@ class RobotSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     expect: dict[str, Any] = {}
 
     def __post_init__(self) -> None:
-        motor, encoder, voltage_v = self.drive.motor, self.drive.encoder, self.drive.battery.voltage_v
-        constant = motor.torque_constant_nm_a
-        counts_per_s = voltage_v / constant * self.drive.counts_per_radian()
-        if counts_per_s > MAX_COUNTS_PER_S:
-            raise ValueError(
-                f"drive: {voltage_v} V, {constant} Nm/A and {encoder.lines} lines make {counts_per_s:.3g} counts/s"
-                f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
-            )
-        motor_s = self.drive.motor_s()
-        if motor_s < MIN_MOTOR_S:
-            ohm = motor.resistance_ohm + self.drive.battery.resistance_ohm
-            raise ValueError(
-                f"drive.motor: {motor.rotor_inertia_kg_m2:g} kg m2, {ohm:g} ohm with the battery and {constant:g} Nm/A"
-                f" make a time constant of {motor_s:.3g} s; at least {MIN_MOTOR_S:g} s (real motors: 0.001 to 0.1 s)"
-            )
         spread = self.wheel_radius_mismatch
         for name in ("left_radius_factor", "right_radius_factor"):
             factor = getattr(self.drive.chassis, name)

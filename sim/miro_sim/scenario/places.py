@@ -50,12 +50,11 @@ def check_places(scenario: Scenario, origin: str) -> None:
 
 def _check(robot: RobotSpec, scenario: Scenario, origin: str, path: str) -> None:
     from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
-    from miro_sim.scenario.build import reference_for, start_of
+    from miro_sim.scenario.build import reference_and_start
     from miro_sim.scenario.drives import limits_problem, origin_problem
 
     duration_s = scenario.duration_s
-    reference = reference_for(robot, duration_s)
-    start = start_of(robot, reference)
+    reference, start = reference_and_start(robot, duration_s)
     off = _off_pitch(start)
     if off is not None:
         axis, what = off

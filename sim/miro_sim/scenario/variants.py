@@ -70,8 +70,6 @@ def with_variant(raw: Table) -> Table:
 
     A camera of another kind, and a radio with a profile, are what the file says.
     """
-    if "variant" not in raw:
-        return raw
     variant = _named(raw["variant"])
     complete = {key: value for key, value in raw.items() if key != "variant"}
     complete["camera"] = _camera(raw.get("camera", {}), variant.get("camera", {}))

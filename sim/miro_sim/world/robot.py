@@ -22,7 +22,7 @@ from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import drive_for, pilot_for, reference_for, start_of
+from miro_sim.scenario.build import drive_for, pilot_for, reference_and_start
 from miro_sim.world.events import RobotLog
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
@@ -53,8 +53,7 @@ class Robot:
         self.network = network
         self.slot = spec.slot
         try:
-            self.reference = reference_for(spec, scenario.duration_s)
-            start = start_of(spec, self.reference)
+            self.reference, start = reference_and_start(spec, scenario.duration_s)
             self.pilot: Pilot = pilot_for(spec, self.reference, scenario, network)
         except PluginError as error:
             raise self._named(error, 0) from error

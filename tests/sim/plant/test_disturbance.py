@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from miro_exact.rng import Stream
 from miro_sim.plant.disturbance import DisturbingForce
 from miro_sim.plant.drive import DifferentialDrive
-from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, RollingBall, Tyre
+from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, OpticalEncoder, RollingBall, Tyre
 
 SECOND = 24_000_000
 TICK = st.integers(0, 1 << 40)
@@ -58,7 +58,8 @@ def test_what_is_off_is_zero():
 def test_a_force_and_a_torque_accelerate_mass_and_inertia():
     """Wheels on ice with shafts that turn freely: of the rotors' inertia nearly nothing is felt."""
     params = DriveParams(
-        motor=Motor(friction_nm=0.0, rotor_inertia_kg_m2=1e-13),
+        motor=Motor(friction_nm=0.0, rotor_inertia_kg_m2=1e-13, torque_constant_nm_a=2e-5),
+        encoder=OpticalEncoder(lines=16),
         chassis=Chassis(rolling_resistance=0.0),
         tyre=Tyre(grip=0.01),
         ball=RollingBall(load_share=0.0),
