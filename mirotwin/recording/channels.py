@@ -47,14 +47,14 @@ IMAGE_SCHEMA: dict[str, Any] = {
 }
 
 
-class TimeMessage(msgspec.Struct, frozen=True):
+class TimeMessage(msgspec.Struct, frozen=True, gc=False):
     """Simulated time, rounded down to nanoseconds."""
 
     sec: int
     nsec: int
 
 
-class ImageMessage(msgspec.Struct, frozen=True):
+class ImageMessage(msgspec.Struct, frozen=True, gc=False):
     """`camera/image`: a plain frame as the PC gets it; `data` is a file of this `format`, in base64 as JSON."""
 
     timestamp: TimeMessage
@@ -70,7 +70,7 @@ def image_message(network: int, tick: int, png: bytes) -> ImageMessage:
     return ImageMessage(at, f"net{network}/camera", png, "png", tick)
 
 
-class TheoryMessage(msgspec.Struct, frozen=True):
+class TheoryMessage(msgspec.Struct, frozen=True, gc=False):
     """`theory`: terms of the paper's theory.
 
     f of equation (15) over the period that ends at `tick` (null where nothing was commanded), rho_c, the distance of
@@ -87,7 +87,7 @@ class TheoryMessage(msgspec.Struct, frozen=True):
     holds_3: bool
 
 
-class PostureMessage(msgspec.Struct, frozen=True):
+class PostureMessage(msgspec.Struct, frozen=True, gc=False):
     """`reference`: a posture in world axes."""
 
     tick: int
@@ -96,7 +96,7 @@ class PostureMessage(msgspec.Struct, frozen=True):
     theta_rad: float
 
 
-class MeasurementMessage(msgspec.Struct, frozen=True):
+class MeasurementMessage(msgspec.Struct, frozen=True, gc=False):
     """`measurement`: a posture as the PC gets it at `tick`, of the picture that was exposed at `exposed_tick`.
 
     `confidence` from 0 to 1 is the tracker's; both are null where a camera without pictures made the measurement.
@@ -110,7 +110,7 @@ class MeasurementMessage(msgspec.Struct, frozen=True):
     confidence: float | None = None
 
 
-class TruthMessage(msgspec.Struct, frozen=True):
+class TruthMessage(msgspec.Struct, frozen=True, gc=False):
     """`truth`: posture (heading unwrapped) and velocity of the robot."""
 
     tick: int
@@ -121,7 +121,7 @@ class TruthMessage(msgspec.Struct, frozen=True):
     w_rad_s: float
 
 
-class ControlMessage(msgspec.Struct, frozen=True):
+class ControlMessage(msgspec.Struct, frozen=True, gc=False):
     """`control`: what the controller answered, see `periods.Control`.
 
     `inner` holds the values that the law names, `estimate` those of the estimator.
@@ -136,7 +136,7 @@ class ControlMessage(msgspec.Struct, frozen=True):
     estimate: dict[str, float] = {}
 
 
-class FirmwareMessage(msgspec.Struct, frozen=True):
+class FirmwareMessage(msgspec.Struct, frozen=True, gc=False):
     """`firmware`: the robot's own frame counters, modulo 2^16; absent if its image exports none."""
 
     tick: int
@@ -145,7 +145,7 @@ class FirmwareMessage(msgspec.Struct, frozen=True):
     stale: int
 
 
-class CommandMessage(msgspec.Struct, frozen=True):
+class CommandMessage(msgspec.Struct, frozen=True, gc=False):
     """A complete LM629 command; `data` in hex."""
 
     tick: int
@@ -153,7 +153,7 @@ class CommandMessage(msgspec.Struct, frozen=True):
     data: str
 
 
-class RegistersMessage(msgspec.Struct, frozen=True):
+class RegistersMessage(msgspec.Struct, frozen=True, gc=False):
     """One LM629: counts, counts per sample with 16 fraction bits, status byte, commands since the last
     message.
     """
@@ -165,7 +165,7 @@ class RegistersMessage(msgspec.Struct, frozen=True):
     commands: tuple[CommandMessage, ...]
 
 
-class Lm629Message(msgspec.Struct, frozen=True):
+class Lm629Message(msgspec.Struct, frozen=True, gc=False):
     """`lm629`: both motion controllers."""
 
     tick: int
@@ -173,14 +173,14 @@ class Lm629Message(msgspec.Struct, frozen=True):
     right: RegistersMessage
 
 
-class DutyMessage(msgspec.Struct, frozen=True):
+class DutyMessage(msgspec.Struct, frozen=True, gc=False):
     """Sign pin (1 = negative) and magnitude 0..127 of one LM629."""
 
     sign: int
     magnitude: int
 
 
-class PwmMessage(msgspec.Struct, frozen=True):
+class PwmMessage(msgspec.Struct, frozen=True, gc=False):
     """`pwm`: what both L298 bridges are driven with."""
 
     tick: int
@@ -188,7 +188,7 @@ class PwmMessage(msgspec.Struct, frozen=True):
     right: DutyMessage
 
 
-class SampleMessage(msgspec.Struct, frozen=True):
+class SampleMessage(msgspec.Struct, frozen=True, gc=False):
     """`samples`, in full recordings only: both LM629 once a sample (8192 ticks)."""
 
     tick: int
@@ -202,7 +202,7 @@ class SampleMessage(msgspec.Struct, frozen=True):
     right_duty: int
 
 
-class FaultMessage(msgspec.Struct, frozen=True):
+class FaultMessage(msgspec.Struct, frozen=True, gc=False):
     """`fault`: what the firmware did that it must not do."""
 
     tick: int
@@ -212,7 +212,7 @@ class FaultMessage(msgspec.Struct, frozen=True):
     text: str
 
 
-class WireMessage(msgspec.Struct, frozen=True):
+class WireMessage(msgspec.Struct, frozen=True, gc=False):
     """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as the PC heard them.
 
     `data` in hex; `bad_stop`: indices of the characters whose stop bit is bad.
@@ -224,7 +224,7 @@ class WireMessage(msgspec.Struct, frozen=True):
     bad_stop: tuple[int, ...]
 
 
-class ActionMessage(msgspec.Struct, frozen=True):
+class ActionMessage(msgspec.Struct, frozen=True, gc=False):
     """`actions`: what was done to a robot, or (`slot` -1) to the radio of the network.
 
     `what` is "reset" or "power" with `value` 0 or 1, or the radio "up", "down" or "noise" from then on.
@@ -236,7 +236,7 @@ class ActionMessage(msgspec.Struct, frozen=True):
     value: Annotated[int, Meta(ge=0, le=1)] = 1
 
 
-class PeriodMessage(msgspec.Struct, frozen=True):
+class PeriodMessage(msgspec.Struct, frozen=True, gc=False):
     """`/period`: a control period that is over, and the digest of all states up to its end."""
 
     tick: int

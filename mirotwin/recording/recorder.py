@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
@@ -18,8 +18,8 @@ from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels, topics
-from mirotwin.recording.channels import TheoryMessage, image_message
-from mirotwin.recording.rows import Head, Rows
+from mirotwin.recording.channels import ControlMessage, TheoryMessage, image_message
+from mirotwin.recording.rows import Message, Rows
 from mirotwin.recording.writer import McapWriter, Writable
 
 if TYPE_CHECKING:
@@ -91,10 +91,6 @@ def source_of(text: ScenarioText, world: World, record: str = "default", resumed
     )
 
 
-_Message = tuple[str, int, msgspec.Struct]
-"""Topic, tick and content of what does not come out of a control period."""
-
-
 class Recorder:
     """An open recording. Use as a context manager: an error ends the file too, and marks it as broken off.
 
@@ -109,12 +105,11 @@ class Recorder:
         undisturbed: AbstractContextManager[object] | None = None,
     ) -> None:
         self._undisturbed = undisturbed or nullcontext()
-        self._encoder = msgspec.json.Encoder()
         self._schemas: dict[bytes, int] = {}
         self._named: dict[str, int] = {}
-        self._waiting: list[Period | _Message] = []
-        self._rows = Rows(self._add_channel, self._write)
+        self._waiting: list[Period | Message] = []
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
+        self._rows = Rows(self._writer.chunk, self._add_channel)
         self._writer.add_metadata(
             METADATA,
             {
@@ -153,9 +148,9 @@ class Recorder:
             self._write_waiting()
             self._writer.flush()
 
-    def write(self, period: Period) -> None:
-        """Adds everything in a control period."""
-        self._waiting.append(period)
+    def write(self, one: Period | Message) -> None:
+        """Adds everything in a control period, or a message."""
+        self._waiting.append(one)
         if len(self._waiting) >= TOGETHER:
             with self._undisturbed:
                 self._write_waiting()
@@ -167,47 +162,27 @@ class Recorder:
 
     def _write_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
-        self._rows.clear()
-        for one in waiting:
-            if isinstance(one, tuple):
-                self._rows.message(*one)
-            else:
-                self._rows.period(one)
-        self._rows.flush()
+        self._rows.write_all(waiting)
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
-        with self._undisturbed:
-            self._write_waiting()
-            self._add([(topics.robot_topic(network, slot, "samples"), sample.tick, sample)])
+        self.write((topics.robot_topic(network, slot, "samples"), sample.tick, sample))
 
     def write_faults(self, network: int, slot: int, faults: Sequence[AnyFault]) -> None:
         """Adds a robot's firmware faults."""
         topic = topics.robot_topic(network, slot, "fault")
-        with self._undisturbed:
-            self._write_waiting()
-            for fault in faults:
-                message = channels.FaultMessage(
-                    fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
-                )
-                self._add([(topic, fault.tick, message)])
+        for fault in faults:
+            message = channels.FaultMessage(fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault))
+            self.write((topic, fault.tick, message))
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
         """Adds a frame of a network's camera, after all that was added before."""
-        with self._undisturbed:
-            self._write_waiting()
-            self._add([(topics.image_topic(network), tick, image_message(network, tick, png))])
+        self.write((topics.image_topic(network), tick, image_message(network, tick, png)))
 
-    def _add(self, found: Iterable[_Message]) -> None:
-        for message in found:
-            self._rows.message(*message)
-        self._rows.flush()
-
-    def _write(self, heads: list[Head], values: list[Any]) -> None:
-        self._writer.add_rows(heads, self._encoder.encode_lines(values))
-
-    def _add_channel(self, topic: str, kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> int:
-        """A new channel. A second law's inner values make the schema `mirotwin.Control2`, and so on."""
+    def _add_channel(self, topic: str, message: msgspec.Struct) -> int:
+        """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""
+        kind = type(message)
+        inner = tuple(message.inner) if isinstance(message, ControlMessage) else None
         text = channels.schema_text(kind, inner)
         if text not in self._schemas:
             name = channels.schema_name(kind)

@@ -1,50 +1,57 @@
 # C layout of mirotwin.recording.rows.
 cimport cython
 
-cdef int _LINE_END, _MESSAGE, _HEAD, _BEFORE_LENGTH
+cdef int _MESSAGE, _HEAD, _BEFORE_LENGTH
+cdef bytes _EMPTY_HEAD
+cdef unsigned int _CRC_32, _ONE, _BYTE
+
+
+cdef class Index:
+    cdef readonly long long channel
+    cdef readonly Py_ssize_t size
+    cdef object array
+    cdef unsigned long long[::1] entries
+
+    cdef add(self, unsigned long long time_ns, unsigned long long offset)
+    cpdef bytes as_bytes(self)
 
 
 cdef class Chunk:
-    cdef public bytearray data
+    cdef Py_ssize_t limit
+    cdef object full, encode_into
+    cdef readonly bytearray data
+    cdef readonly Py_ssize_t stored
     cdef readonly dict indexes
     cdef readonly unsigned long long first_ns, last_ns
-    cdef Py_ssize_t end
 
-    cpdef add(self, long long channel, unsigned long long time_ns, bytes content)
-    @cython.locals(end=Py_ssize_t, room=Py_ssize_t, place=Py_ssize_t)
-    cpdef fill(self, list heads, Py_ssize_t first, bytes text, Py_ssize_t at, Py_ssize_t limit)
-    @cython.locals(
-        place=Py_ssize_t, begin=Py_ssize_t, index=Py_ssize_t, channel='long long', time_ns='unsigned long long', form=bytes,
-        byte='unsigned char'
-    )
-    cdef _fill(
-        self, unsigned char[::1] out, Py_ssize_t end, list heads, Py_ssize_t first, bytes text, Py_ssize_t at, Py_ssize_t limit
-    )
-    @cython.locals(index=list)
-    cdef _head(
-        self, unsigned char[::1] out, Py_ssize_t begin, Py_ssize_t size, long long channel, unsigned long long time_ns
-    )
+    cpdef begin(self)
+    cpdef is_stored(self)
+    cpdef add_record(self, bytes record)
+    @cython.locals(begin=Py_ssize_t, index=Index)
+    cpdef add(self, channel, unsigned long long time_ns, message)
+    cdef _end(self)
 
 
-@cython.locals(index=int)
-cdef void _put(unsigned char[::1] out, Py_ssize_t place, unsigned long long value, int size) noexcept
+cdef void _put_head(unsigned char *out, Py_ssize_t begin, Py_ssize_t size, long long channel, unsigned long long time_ns) noexcept
+cdef void _put(unsigned char *out, Py_ssize_t place, unsigned long long value) noexcept
+
+@cython.locals(factor='unsigned int', power='unsigned int')
+cpdef unsigned int joined_crc(unsigned int first, unsigned int second, Py_ssize_t size) noexcept
+@cython.locals(product='unsigned int', place=int)
+cdef unsigned int _times(unsigned int one, unsigned int other) noexcept
 
 
 cdef class Rows:
-    cdef object add_channel, write
+    cdef Chunk chunk
+    cdef object add_channel
     cdef readonly dict channels
-    cdef list heads, values
 
-    cpdef flush(self)
-    cpdef clear(self)
-    cpdef message(self, str topic, tick, message)
-    cpdef period(self, period)
-    cdef _wire(self, sent)
+    cpdef write_all(self, list waiting)
+    cdef _period(self, period)
     @cython.locals(names=list)
-    cdef _robot(self, robot, tick)
-    cdef _control(self, str topic, answer, tick)
-    cdef _registers(self, axis)
-    cdef _posture(self, tick, at)
-    @cython.locals(found=tuple)
-    cdef _begin(self, str topic, tick, kind)
-    cdef _add_channel(self, str topic, kind, bytes form, inner)
+    cdef _robot(self, robot, tick, time_ns)
+    cdef _add(self, str topic, time_ns, message)
+
+
+cdef _registers(axis)
+cdef _duty(axis)

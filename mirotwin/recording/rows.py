@@ -1,248 +1,246 @@
-"""Messages on their way into a recording: values in the forms that they stand in, and the chunk that takes them.
+"""Messages on their way into a recording: the structs of a control period, and the chunk that takes them as JSON.
 
-A form is a message as JSON, with a line end in place of each value. So the values of many messages are encoded at once,
-a line each, and only copied here. What belongs in a message says `channels`, where a chunk ends says `writer`.
+What belongs in a message says `channels`, what becomes of a chunk that is full says `writer`.
 """
 
 from __future__ import annotations
 
+import sys
+from array import array
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import msgspec
 from msgspec.structs import astuple
 
 from miro_host.eye.track import Sighting
-from miro_host.posture import Posture
-from miro_protocol.transmission import Transmission
-from miro_sim.periods import Axis, Control, Period, RobotPeriod
+from miro_sim.periods import Axis, Period, RobotPeriod
 from mirotwin.recording import topics
 from mirotwin.recording.channels import (
     CommandMessage,
     ControlMessage,
+    DutyMessage,
     FirmwareMessage,
     Lm629Message,
     MeasurementMessage,
     PeriodMessage,
     PostureMessage,
     PwmMessage,
+    RegistersMessage,
     TruthMessage,
     WireMessage,
     action_message,
 )
 
-Head = tuple[int, int, bytes]
-"""Channel, time and form of a message."""
+Message = tuple[str, int, msgspec.Struct]
+"""Topic, tick and content of what does not come out of a control period."""
 
-WHOLE = b"\n"
-"""The form of a message whose only value is all of it."""
 LAST_NS = (1 << 64) - 1
-_LINE_END = 10
 _MESSAGE = 5  # opcode
 _HEAD = 31  # bytes: opcode, length, channel, sequence, log time, publish time
 _BEFORE_LENGTH = 9
+_EMPTY_HEAD = bytes(_HEAD)
+_CRC_32 = 0xEDB88320  # polynomials have the highest power in the lowest bit
+_ONE = 1 << 31
+_BYTE = 1 << 23  # x^8
 
 
-@cache
-def form_of(kind: type[msgspec.Struct]) -> bytes:
-    """The form of messages of a kind; what a message in it holds are values too."""
-    fields = [
-        f'"{field.encode_name}":'.encode() + (form_of(field.type) if _is_message(field.type) else WHOLE)
-        for field in msgspec.structs.fields(kind)
-    ]
-    return b"{" + b",".join(fields) + b"}"
+class Index:
+    """Times and offsets of the messages that a channel has in a chunk, in one row."""
 
+    def __init__(self, channel: int) -> None:
+        self.channel = channel
+        self.array = array("Q", bytes(256))
+        self.entries = memoryview(self.array)
+        self.size = 0  # of the row
 
-def _is_message(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+    def add(self, time_ns: int, offset: int) -> None:
+        """Adds a message."""
+        if self.size == len(self.entries):
+            self.array = self.array + self.array
+            self.entries = memoryview(self.array)
+        self.entries[self.size] = time_ns
+        self.entries[self.size + 1] = offset
+        self.size += 2
+
+    def as_bytes(self) -> bytes:
+        """The row as it stands in a file."""
+        row = self.array[: self.size]
+        if sys.byteorder == "big":
+            row.byteswap()
+        return row.tobytes()
 
 
 class Chunk:
-    """The records of a chunk under way. `indexes`: channel -> time and offset of each message, in one row."""
+    """The records of a chunk under way, of which `data` are those that are not in the file yet.
 
-    def __init__(self) -> None:
+    `full` is called with the record that makes the chunk longer than `limit`, to write it and begin another one.
+    """
+
+    def __init__(self, limit: int, full: Callable[[], None]) -> None:
+        self.limit = limit
+        self.full = full
+        self.encode_into = msgspec.json.Encoder().encode_into
         self.data = bytearray()
-        self.indexes: dict[int, list[int]] = {}
+        self.begin()
+
+    def begin(self) -> None:
+        """Begins another chunk."""
+        self.stored = 0  # bytes of the records in the file
+        self.indexes: dict[int, Index] = {}  # by channel
         self.first_ns = LAST_NS
         self.last_ns = 0
-        self.end = 0  # where `_fill` came to
 
-    def add(self, channel: int, time_ns: int, content: bytes) -> None:
-        """Adds a message."""
+    def is_stored(self) -> None:
+        """All records are in the file."""
+        self.stored += len(self.data)
+        self.data.clear()
+
+    def add_record(self, record: bytes) -> None:
+        """Adds a record that is no message."""
+        self.data += record
+        self._end()
+
+    def add(self, channel: int, time_ns: int, message: msgspec.Struct | msgspec.Raw) -> None:
+        """Adds a message, or raises and adds nothing where it cannot be written as JSON."""
         begin = len(self.data)
-        self.data += bytes(_HEAD)
-        self._head(memoryview(self.data), begin, len(content), channel, time_ns)
-        self.data += content
-
-    def fill(self, heads: list[Head], first: int, text: bytes, at: int, limit: int) -> tuple[int, int]:
-        """Adds messages from `heads[first]` on, up to the one that makes the chunk longer than `limit`.
-
-        Their values stand in `text`, from `at` on. Returns where both go on.
-        """
-        end = len(self.data)
-        room = len(text) - at
-        for place in range(first, len(heads)):
-            room += _HEAD + len(heads[place][2])
-        self.data += bytes(room)
-        reached = self._fill(memoryview(self.data), end, heads, first, text, at, limit)
-        del self.data[self.end :]
-        return reached
-
-    def _fill(
-        self, out: memoryview, end: int, heads: list[Head], first: int, text: bytes, at: int, limit: int
-    ) -> tuple[int, int]:
-        place = first
-        while place < len(heads) and (place == first or end <= limit):
-            channel, time_ns, form = heads[place]
-            begin = end
-            end += _HEAD
-            for index in range(len(form)):
-                byte = form[index]
-                if byte != _LINE_END:
-                    out[end] = byte
-                    end += 1
-                    continue
-                assert at < len(text), "there are fewer values than the forms have places for"
-                while text[at] != _LINE_END:
-                    out[end] = text[at]
-                    end += 1
-                    at += 1
-                at += 1
-            self._head(out, begin, end - begin - _HEAD, channel, time_ns)
-            place += 1
-        self.end = end
-        return place, at
-
-    def _head(self, out: memoryview, begin: int, size: int, channel: int, time_ns: int) -> None:
-        """The head of a message whose content has `size` bytes, and its entry in the index."""
-        out[begin] = _MESSAGE
-        _put(out, begin + 1, size + _HEAD - _BEFORE_LENGTH, 8)
-        _put(out, begin + 9, channel, 2)
-        _put(out, begin + 11, 0, 4)
-        _put(out, begin + 15, time_ns, 8)
-        _put(out, begin + 23, time_ns, 8)
+        self.data += _EMPTY_HEAD
+        try:
+            self.encode_into(message, self.data, -1)
+        except BaseException:
+            del self.data[begin:]
+            raise
         index = self.indexes.get(channel)
         if index is None:
-            index = self.indexes[channel] = []
-        index.append(time_ns)
-        index.append(begin)
+            index = self.indexes[channel] = Index(channel)
+        _put_head(self.data, begin, len(self.data) - begin - _BEFORE_LENGTH, index.channel, time_ns)
+        index.add(time_ns, self.stored + begin)
         self.first_ns = min(self.first_ns, time_ns)
         self.last_ns = max(self.last_ns, time_ns)
+        self._end()
+
+    def _end(self) -> None:
+        if self.stored + len(self.data) > self.limit:
+            self.full()
 
 
-def _put(out: memoryview, place: int, value: int, size: int) -> None:
-    """A number, the lowest byte first."""
-    for index in range(size):
-        out[place + index] = value >> 8 * index & 0xFF
+def _put_head(out: bytearray, begin: int, size: int, channel: int, time_ns: int) -> None:
+    """The head of a message. Each number covers what the one before it wrote too much; the sequence is 0."""
+    out[begin] = _MESSAGE
+    _put(out, begin + 1, size)
+    _put(out, begin + 9, channel)
+    _put(out, begin + 15, time_ns)
+    _put(out, begin + 23, time_ns)
+
+
+def _put(out: bytearray, place: int, value: int) -> None:
+    """A number in 8 bytes, the lowest first; written out, a compiler makes one store of it."""
+    out[place] = value & 0xFF
+    out[place + 1] = value >> 8 & 0xFF
+    out[place + 2] = value >> 16 & 0xFF
+    out[place + 3] = value >> 24 & 0xFF
+    out[place + 4] = value >> 32 & 0xFF
+    out[place + 5] = value >> 40 & 0xFF
+    out[place + 6] = value >> 48 & 0xFF
+    out[place + 7] = value >> 56 & 0xFF
+
+
+def joined_crc(first: int, second: int, size: int) -> int:
+    """The CRC-32 of two pieces of data in a row, from that of each. `size`: bytes of the second one.
+
+    A byte of 0 multiplies what was before by x^8, and so on: as `crc32_combine` of zlib does it.
+    """
+    factor, power = _ONE, _BYTE
+    while size:
+        if size & 1:
+            factor = _times(factor, power)
+        power = _times(power, power)
+        size >>= 1
+    return _times(factor, first) ^ second
+
+
+def _times(one: int, other: int) -> int:
+    """The product of two polynomials modulo the one of CRC-32."""
+    product = 0
+    for place in range(31, -1, -1):
+        if one >> place & 1:
+            product ^= other
+        other = other >> 1 ^ (_CRC_32 if other & 1 else 0)
+    return product
 
 
 class Rows:
-    """Messages that wait: their heads, and the values of all of them.
+    """Writes messages into a chunk.
 
-    `add_channel` makes a channel of a topic, from its first message's kind and the names of a law's inner values.
-    `write` takes heads and values, and is called before a channel is added too.
+    `add_channel` makes a channel of a topic, from its first message and the names of a law's inner values.
     """
 
     def __init__(
         self,
-        add_channel: Callable[[str, type[msgspec.Struct], tuple[str, ...] | None], int],
-        write: Callable[[list[Head], list[Any]], None],
+        chunk: Chunk,
+        add_channel: Callable[[str, msgspec.Struct], int],
     ) -> None:
+        self.chunk = chunk
         self.add_channel = add_channel
-        self.write = write
-        self.channels: dict[str, tuple[int, bytes]] = {}  # by topic: number, form of the messages
-        self.heads: list[Head] = []
-        self.values: list[Any] = []
+        self.channels: dict[str, int] = {}  # by topic
 
-    def flush(self) -> None:
-        """Writes what waits."""
-        heads, values = self.heads, self.values
-        self.clear()
-        self.write(heads, values)
+    def write_all(self, waiting: list[Period | Message]) -> None:
+        """Writes periods and single messages, in turn."""
+        for one in waiting:
+            if isinstance(one, tuple):
+                topic, tick, message = one
+                self._add(topic, tick * 125 // 3, message)  # `nanoseconds`
+            else:
+                self._period(one)
 
-    def clear(self) -> None:
-        """Drops what waits: of a period that failed there is a part, perhaps heads without values."""
-        self.heads, self.values = [], []
-
-    def message(self, topic: str, tick: int, message: msgspec.Struct) -> None:
-        """Any message, encoded as one value."""
-        if topic not in self.channels:
-            self._add_channel(topic, type(message), WHOLE, None)
-        self._begin(topic, tick, type(message))
-        self.values.append(message)
-
-    def period(self, period: Period) -> None:
-        """All messages of a control period."""
+    def _period(self, period: Period) -> None:
         tick = period.tick
+        time_ns = tick * 125 // 3
         for robot in period.robots:
-            self._robot(robot, tick)
+            self._robot(robot, tick, time_ns)
         for sent in period.wire:
-            self._wire(sent)
+            message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
+            self._add(_wire_topic(sent.network), sent.tick * 125 // 3, message)
         for action in period.actions:
-            self.message(topics.actions_topic(action.network), action.tick, action_message(action))
-        self._begin(topics.PERIOD, tick, PeriodMessage)
-        self.values += (tick, period.index, period.digest)
+            topic = topics.actions_topic(action.network)
+            self._add(topic, action.tick * 125 // 3, action_message(action))
+        self._add(topics.PERIOD, time_ns, PeriodMessage(tick, period.index, period.digest))
 
-    def _wire(self, sent: Transmission) -> None:
-        self._begin(_wire_topic(sent.network), sent.tick, WireMessage)
-        self.values += (sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-
-    def _robot(self, robot: RobotPeriod, tick: int) -> None:
+    def _robot(self, robot: RobotPeriod, tick: int, time_ns: int) -> None:
         """All messages of one robot."""
         names: list[str] = _robot_topics(robot.network, robot.slot)
-        seen, answer, left, right = robot.measurement, robot.control, robot.left, robot.right
-        accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
-        self._begin(names[0], tick, PostureMessage)
-        self._posture(tick, robot.reference)
-        self._begin(names[1], tick, TruthMessage)
-        self._posture(tick, robot.truth)
-        self.values += (robot.v_m_s, robot.w_rad_s)
+        at, true, seen, control = robot.reference, robot.truth, robot.measurement, robot.control
+        self._add(names[0], time_ns, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad))
+        speeds = robot.v_m_s, robot.w_rad_s
+        self._add(names[1], time_ns, TruthMessage(tick, true.x_m, true.y_m, true.theta_rad, *speeds))
         if seen is not None:
-            self._begin(names[2], tick, MeasurementMessage)
-            self._posture(tick, seen)
-            self.values += (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
-        if answer is not None:
-            self._control(names[3], answer, tick)
+            of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
+            message = MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture)
+            self._add(names[2], time_ns, message)
+        if control is not None:
+            self._add(names[3], time_ns, ControlMessage(tick, *astuple(control)))
+        accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
         if accepted is not None and rejected is not None and stale is not None:
-            self._begin(names[4], tick, FirmwareMessage)
-            self.values += (tick, accepted, rejected, stale)
-        self._begin(names[5], tick, Lm629Message)
-        self.values.append(tick)
-        self._registers(left)
-        self._registers(right)
-        self._begin(names[6], tick, PwmMessage)
-        self.values += (tick, left.pwm_sign, left.pwm_magnitude, right.pwm_sign, right.pwm_magnitude)
+            self._add(names[4], time_ns, FirmwareMessage(tick, accepted, rejected, stale))
+        left, right = robot.left, robot.right
+        self._add(names[5], time_ns, Lm629Message(tick, _registers(left), _registers(right)))
+        self._add(names[6], time_ns, PwmMessage(tick, _duty(left), _duty(right)))
 
-    def _control(self, topic: str, answer: Control, tick: int) -> None:
-        if topic not in self.channels:
-            self._add_channel(topic, ControlMessage, form_of(ControlMessage), tuple(answer.inner))
-        self._begin(topic, tick, ControlMessage)
-        self.values.append(tick)
-        self.values += astuple(answer)
+    def _add(self, topic: str, time_ns: int, message: msgspec.Struct) -> None:
+        channel = self.channels.get(topic)
+        if channel is None:
+            channel = self.channels[topic] = self.add_channel(topic, message)
+        self.chunk.add(channel, time_ns, message)
 
-    def _registers(self, axis: Axis) -> None:
-        commands = [CommandMessage(tick, opcode, data) for tick, opcode, data in axis.commands]
-        self.values += (axis.desired_position, axis.real_position, axis.desired_velocity, axis.status)
-        self.values.append(commands)
 
-    def _posture(self, tick: int, at: Posture) -> None:
-        """By name: a plug-in's reference may give a posture that holds more."""
-        self.values += (tick, at.x_m, at.y_m, at.theta_rad)
+def _registers(axis: Axis) -> RegistersMessage:
+    desired, real, velocity, status, _, _, commands = astuple(axis)
+    taken = tuple([CommandMessage(tick, opcode, data) for tick, opcode, data in commands])
+    return RegistersMessage(desired, real, velocity, status, taken)
 
-    def _begin(self, topic: str, tick: int, kind: type[msgspec.Struct]) -> None:
-        """A message, whose values are the next ones."""
-        found = self.channels.get(topic)
-        if found is None:
-            found = self._add_channel(topic, kind, form_of(kind), None)
-        self.heads.append((found[0], tick * 125 // 3, found[1]))  # `nanoseconds`
 
-    def _add_channel(
-        self, topic: str, kind: type[msgspec.Struct], form: bytes, inner: tuple[str, ...] | None
-    ) -> tuple[int, bytes]:
-        self.flush()
-        found = self.channels[topic] = self.add_channel(topic, kind, inner), form
-        return found
+def _duty(axis: Axis) -> DutyMessage:
+    return DutyMessage(axis.pwm_sign, axis.pwm_magnitude)
 
 
 @cache

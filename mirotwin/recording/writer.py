@@ -14,6 +14,7 @@ import struct
 from typing import Protocol
 from zlib import crc32
 
+import msgspec
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -32,7 +33,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from mirotwin.recording.rows import Chunk, Head
+from mirotwin.recording.rows import Chunk, joined_crc
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 20
@@ -73,7 +74,8 @@ class McapWriter:
         self._chunks: list[ChunkIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
         self._times: list[int] = []  # of the first and last message of each chunk
-        self._begin_chunk()
+        self.chunk = Chunk(CHUNK_SIZE, self._end_chunk)
+        self._chunk_checksum = 0  # of what is in the file
         self._put(MAGIC + _bytes(Header(profile, library)))
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
@@ -95,33 +97,23 @@ class McapWriter:
         """Adds a schema and returns its number."""
         schema = Schema(len(self._schemas) + 1, data, encoding, name)
         self._schemas.append(schema)
-        self._add(_bytes(schema))
+        self.chunk.add_record(_bytes(schema))
         return schema.id
 
     def add_channel(self, topic: str, encoding: str, schema: int) -> int:
         """Adds a channel and returns its number."""
         channel = Channel(len(self._channels) + 1, topic, encoding, {}, schema)
         self._channels.append(channel)
-        self._add(_bytes(channel))
+        self.chunk.add_record(_bytes(channel))
         return channel.id
 
-    def add_message(self, channel: int, time_ns: int, data: bytes) -> None:
-        """Adds a message; `time_ns` is both when it was logged and published."""
-        self._chunk.add(channel, time_ns, data)
-        if len(self._chunk.data) > CHUNK_SIZE:
-            self._end_chunk()
-
-    def add_rows(self, heads: list[Head], text: bytes) -> None:
-        """Adds messages in a row; the values of all of them stand in `text`, a line each."""
-        place = at = 0
-        while place < len(heads):
-            place, at = self._chunk.fill(heads, place, text, at, CHUNK_SIZE)
-            if len(self._chunk.data) > CHUNK_SIZE:
-                self._end_chunk()
+    def add_message(self, channel: int, time_ns: int, message: msgspec.Struct | msgspec.Raw) -> None:
+        """Adds a message: a struct, or JSON as `msgspec.Raw`; `time_ns` is both when it was logged and published."""
+        self.chunk.add(channel, time_ns, message)
 
     def flush(self) -> None:
         """Brings everything so far into the file, so that it outlives this process."""
-        if self._chunk.indexes:
+        if self.chunk.indexes:
             self._store_chunk()
         self._stream.flush()
 
@@ -166,59 +158,49 @@ class McapWriter:
             (Opcode.METADATA_INDEX, [*self._metadata]),
         ]
 
-    def _begin_chunk(self) -> None:
-        self._chunk = Chunk()
-        self._stored = 0  # bytes of the chunk that are in the file
-        self._chunk_checksum = 0  # of these
-
-    def _add(self, record: bytes) -> None:
-        """A schema or channel, which stands in the chunk of its first message."""
-        self._chunk.data += record
-        if len(self._chunk.data) > CHUNK_SIZE:
-            self._end_chunk()
-
     def _end_chunk(self) -> None:
         """Closes the open chunk, if there is a message in it, and writes the indexes of its messages."""
-        if not self._chunk.indexes:
+        if not self.chunk.indexes:
             return
-        head, chunk = self._store_chunk(), self._chunk
-        start, size = self._end, len(chunk.data)
+        head, chunk = self._store_chunk(), self.chunk
+        start, size = self._end, chunk.stored
         self._end = start + len(head) + size
-        self._checksum = crc32(chunk.data, crc32(head, self._checksum))
+        self._checksum = joined_crc(crc32(head, self._checksum), self._chunk_checksum, size)
         index_start, offsets, rows = self._end, {}, bytearray()
         for channel, index in chunk.indexes.items():
             offsets[channel] = index_start + len(rows)
-            entries = _ENTRY * (len(index) // 2)
-            rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + entries, channel, entries)
-            rows += struct.pack(f"<{len(index)}Q", *index)
-            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
+            entries = index.as_bytes()
+            rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + len(entries), channel, len(entries))
+            rows += entries
+            self._counts[channel] = self._counts.get(channel, 0) + len(entries) // _ENTRY
         self._put(rows)
         self._times += (chunk.first_ns, chunk.last_ns)
         length = len(head) + size
         self._chunks.append(
             ChunkIndex(length, start, "", size, chunk.last_ns, len(rows), offsets, chunk.first_ns, size)
         )
-        self._begin_chunk()
+        chunk.begin()
+        self._chunk_checksum = 0
 
     def _store_chunk(self) -> bytes:
         """Writes the new records of the open chunk, then the head that takes them in; returns the head."""
-        if not self._stored:  # its head first, of an empty chunk: what follows never stands in half a chunk
+        stored, new = self.chunk.stored, bytes(self.chunk.data)
+        if not stored:  # its head first, of an empty chunk: what follows never stands in half a chunk
             self._write(self._end, self._chunk_head(0, 0))
-        new = bytes(memoryview(self._chunk.data)[self._stored :])
-        size = len(self._chunk.data)
         checksum = crc32(new, self._chunk_checksum)
-        head = self._chunk_head(size, checksum)
+        head = self._chunk_head(stored + len(new), checksum)
         if new:
-            self._write(self._end + len(head) + self._stored, new)
+            self._write(self._end + len(head) + stored, new)
             self._stream.flush()
             self._write(self._end, head)
             self._stream.flush()
-        self._stored, self._chunk_checksum = size, checksum
+        self.chunk.is_stored()
+        self._chunk_checksum = checksum
         return head
 
     def _chunk_head(self, size: int, checksum: int) -> bytes:
         length = _BEFORE_DATA + size
-        times = self._chunk.first_ns, self._chunk.last_ns
+        times = self.chunk.first_ns, self.chunk.last_ns
         return _CHUNK.pack(Opcode.CHUNK, length, *times, size, checksum, 0, size)
 
     def _put(self, data: bytes | bytearray) -> None:

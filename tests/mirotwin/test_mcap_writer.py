@@ -2,6 +2,7 @@
 
 import io
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -65,7 +66,7 @@ def put(writer, step):
     elif what == "channel":
         writer.add_channel(f"/topic{number}", "json", number)
     elif what == "message":
-        writer.add_message(number, time_ns, data)
+        writer.add_message(number, time_ns, msgspec.Raw(data))
     else:
         writer.flush()
 

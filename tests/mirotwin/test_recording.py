@@ -6,6 +6,7 @@ import re
 import struct
 import time
 import tracemalloc
+from zlib import crc32
 
 import msgspec
 import pytest
@@ -26,7 +27,7 @@ from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import Recorder, RunSource
-from mirotwin.recording.rows import Chunk
+from mirotwin.recording.rows import Chunk, joined_crc
 from mirotwin.recording.writer import MAGIC
 from tests.mirotwin.synthetic import periods
 from tests.naive import recording_messages
@@ -140,9 +141,19 @@ def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, ch
     assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
 
 
-def test_a_chunk_reads_no_value_beyond_those_that_it_is_given():
-    with pytest.raises(AssertionError, match="fewer values than the forms have places for"):
-        Chunk().fill([(1, 0, b"[\n,\n]")], 0, b"1\n", 0, 100)
+def test_a_message_that_cannot_be_written_leaves_nothing_in_its_chunk():
+    chunk = Chunk(1 << 20, pytest.fail)
+    chunk.add(1, 5, channels.DutyMessage(0, 1))
+    before = bytes(chunk.data)
+    with pytest.raises(TypeError, match="Encoding objects of type object"):
+        chunk.add(1, 6, channels.DutyMessage(0, object()))
+    assert chunk.data == before
+    assert chunk.last_ns == 5
+
+
+@given(st.binary(), st.binary())
+def test_checksums_of_two_pieces_are_joined_to_that_of_both(one, other):
+    assert joined_crc(crc32(one), crc32(other), len(other)) == crc32(one + other)
 
 
 def write_all(recorder, written):
@@ -155,10 +166,10 @@ def test_a_period_that_cannot_be_written_leaves_a_recording_of_those_before():
     written = [*periods(20)]
     lost = msgspec.structs.replace(written[11].robots[0], left=None)
     written[11] = msgspec.structs.replace(written[11], robots=(lost,))
-    with pytest.raises(AttributeError), Recorder(stream, SOURCE) as recorder:
+    with pytest.raises(TypeError), Recorder(stream, SOURCE) as recorder:
         write_all(recorder, written)
     found = parse(stream.getvalue(), "run.mcap")
-    assert len(found.periods) == 10
+    assert len(found.periods) == 11
     assert found.broken_off
 
 

@@ -84,7 +84,6 @@ class _Conversion:
         self.derive = derive
         self.writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self.result = Converted(len(periods), 0, told)
-        self._encode = msgspec.json.Encoder().encode
         self._images = msgspec.json.Decoder(ImageMessage)
         self._faults = msgspec.json.Decoder(FaultMessage)
         self._schemas: dict[int, int] = {}  # theirs by number -> ours
@@ -135,7 +134,7 @@ class _Conversion:
     def _take_message(self, record: Message) -> None:
         number, topic = self._channels.get(record.channel_id, (0, None))
         if number:
-            self.writer.add_message(number, record.log_time, record.data)
+            self.writer.add_message(number, record.log_time, msgspec.Raw(record.data))
         if topic is None:
             return
         if topic.channel == IMAGE:
@@ -162,7 +161,7 @@ class _Conversion:
     def _add(self, said: Said) -> None:
         topic, tick, message = said
         channel = self._topics.get(topic) or self._register(topic, message)
-        self.writer.add_message(channel, nanoseconds(tick), self._encode(message))
+        self.writer.add_message(channel, nanoseconds(tick), message)
 
     def _register(self, topic: str, message: msgspec.Struct) -> int:
         name, text = schema_of(message)
