@@ -14,8 +14,9 @@ cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET
 cdef bytes _OPENING
 
 
-cdef class Opening:
-    cdef int usable, mask
+cdef class Moment:
+    cdef Cpu cpu
+    cdef EventLog log
     cdef long long tick
     cdef object flat
     cdef bytes state
@@ -24,10 +25,12 @@ cdef class Opening:
     cdef int edge_before, edge_depth, highest_sp
     cdef int edge_outer[8]
 
-    @cython.locals(serial='long long', depth=int)
-    cdef int keep(self, Cpu cpu, EventLog log, long long begun) except -1
-    @cython.locals(serial='long long', place='Py_ssize_t', count=int, depth=int)
-    cdef int put(self, Cpu cpu, EventLog log) except -1
+    @cython.locals(cpu=Cpu, serial='long long', depth=int)
+    cdef int keep(self, long long tick, long long begun, bytes edges) except -1
+    @cython.locals(cpu=Cpu, place='Py_ssize_t', count=int, depth=int)
+    cdef int put(self) except -1
+    @cython.locals(serial='long long')
+    cdef int tell(self) except -1
 
 
 cdef class Harness:
@@ -37,17 +40,16 @@ cdef class Harness:
     cdef readonly LiveOracle oracle
     cdef readonly long long bit_ticks, begin_tick, now_tick, end_tick
     cdef readonly int sleeps
-    cdef object _flat
-    cdef bytes _state
-    cdef Opening _opening
+    cdef Moment _start, _opening
+    cdef int _opening_mask
 
     cpdef back(self)
+    cdef int _put(self, Moment moment) except -1
     cdef int _forget_records(self, Board board) except -1
-    @cython.locals(board=Board)
     cdef int _begin(self, Program program) except -1
     cdef bint _opens(self, Board board, Program program) except -1
-    @cython.locals(opening=Opening, begun='long long', tick='long long', value=int)
-    cdef int _open(self, Board board) except -1
+    @cython.locals(begun='long long', tick='long long', value=int, stopped=int)
+    cdef int _open(self, EventLog log) except -1
     @cython.locals(first=int, tick='long long', pause='long long', place=int, flaws=int, waiting=int)
     cpdef int play(self, Program program) except -1
     @cython.locals(bit='long long', levels=int, place=int, rxd=Line)

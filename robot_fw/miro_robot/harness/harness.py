@@ -4,7 +4,7 @@
                         |
                         +--> edges between branches, stack, event log --> oracle
 
-Most inputs begin with a frame, and all frames begin alike: that moment is kept too, with what was seen on the way.
+Most inputs begin with a frame, and all frames begin alike: that moment is kept too.
 
 A character begins with the end of the one before it or after a pause, and a bad stop bit is space for three quarters of
 a bit, as on the air (`miro_sim.radio.sender`): the same characters at the same ticks in a world give the same levels.
@@ -46,49 +46,50 @@ _BAD_STOP, _RESET = 1, 2
 _OPENING = downlink(3).lead + downlink(3).sync  # of any number of robots
 
 
-class Opening:
-    """The moment right before the first character after `_OPENING`, and what was seen on the way to it.
+class Moment:
+    """A moment of a machine, with the events and the edges that were seen on the way to it.
 
-    `usable`: no mistake was found on the way. `mask`: of the map in which edges were counted; -1 before the first time.
+    `tick`: of it, -1 for none.
     """
 
     NOT_STATE = (
-        "usable", "mask", "tick", "flat", "state", "events", "passed", "edge_before", "edge_depth", "edge_outer",
+        "cpu", "log", "tick", "flat", "state", "events", "passed", "edge_before", "edge_depth", "edge_outer",
         "highest_sp",
     )  # fmt: skip
 
-    def __init__(self, machine: Any) -> None:
-        self.usable = 0
-        self.mask = -1
-        self.tick = 0
+    def __init__(self, machine: Any, cpu: Cpu, log: EventLog | None) -> None:
+        self.cpu = cpu
+        self.log = log
+        self.tick = -1
         self.flat = Flat(machine)
         self.state = b""
         self.events = EventLog()
-        self.passed = array("i")  # index in the map, how often, index, ..
+        self.passed = array("i")  # index in the map of edges, how often, index, ..
         self.edge_before = 0
         self.edge_depth = 0
         self.edge_outer = [0] * 8
         self.highest_sp = 0
 
-    def keep(self, cpu: Cpu, log: EventLog, begun: int) -> None:
-        """This is the moment; events of the log count from `begun` on, and edges in a map that was empty."""
+    def keep(self, tick: int, begun: int, edges: bytes) -> None:
+        """It is now. The way to it has the events of the log from `begun` on, and the edges counted in a map."""
+        cpu = self.cpu
+        self.tick = tick
         self.state = self.flat.save()
         self.events = EventLog()
-        for serial in range(begun, log.end):
-            self.events.copy(log, serial)
-        counts = bytes(cpu.edges)
-        self.passed = array("i", [n for index, count in enumerate(counts) if count for n in (index, count)])
+        if self.log is not None:
+            for serial in range(begun, self.log.end):
+                self.events.copy(self.log, serial)
+        self.passed = array("i", [n for index, count in enumerate(edges) if count for n in (index, count)])
         self.edge_before = cpu.edge_before
         self.edge_depth = cpu.edge_depth
         for depth in range(8):
             self.edge_outer[depth] = cpu.edge_outer[depth]
         self.highest_sp = cpu.highest_sp
 
-    def put(self, cpu: Cpu, log: EventLog) -> None:
-        """Back to it."""
+    def put(self) -> None:
+        """Puts the machine back to it, and adds the edges to the map."""
+        cpu = self.cpu
         self.flat.load(self.state)
-        for serial in range(self.events.end):
-            log.copy(self.events, serial)
         for place in range(0, len(self.passed), 2):
             count = cpu.edges[self.passed[place]] + self.passed[place + 1]
             cpu.edges[self.passed[place]] = (count & 0xFF) + (count >> 8)
@@ -97,6 +98,12 @@ class Opening:
         for depth in range(8):
             cpu.edge_outer[depth] = self.edge_outer[depth]
         cpu.highest_sp = self.highest_sp
+
+    def tell(self) -> None:
+        """Puts the events into the log."""
+        if self.log is not None:
+            for serial in range(self.events.end):
+                self.log.copy(self.events, serial)
 
 
 class Harness:
@@ -108,7 +115,7 @@ class Harness:
 
     NOT_STATE = (
         *("machine", "board", "cpu", "oracle", "bit_ticks", "begin_tick", "sleeps", "now_tick", "end_tick"),
-        *("_flat", "_state", "_opening"),
+        *("_start", "_opening", "_opening_mask"),
     )
 
     def __init__(
@@ -128,21 +135,27 @@ class Harness:
         self.now_tick = 0
         self.end_tick = 0  # of the last character of a run
         self.sleeps = 1
-        self._flat = Flat(machine)
-        self._state = self._flat.save()
-        self._flat.load(self._state)
-        self._opening = Opening(machine)
+        log = None if board is None else board.log
+        self._start = Moment(machine, cpu, log)
+        self._opening = Moment(machine, cpu, log)
+        self._opening_mask = -1  # of the map in which its edges were counted
+        cpu.begin_edges()
+        self._start.keep(self.begin_tick, 0 if log is None else log.end, b"")
+        self._start.put()
         self.sleeps = 1 if self._falls_asleep(self.begin_tick + _SETTLE) else 0
         self.back()
 
     def back(self) -> None:
         """To the moment at which the harness was made."""
-        self._flat.load(self._state)
-        self.cpu.begin_edges()
+        self._put(self._start)
+
+    def _put(self, moment: Moment) -> None:
+        moment.put()
         if self.board is not None:
             self._forget_records(self.board)
-        self.now_tick = self.begin_tick
+        self.now_tick = moment.tick
         self.oracle.begin(self.begin_tick)
+        moment.tell()
 
     def _forget_records(self, board: Board) -> None:
         """What observers could have read: it would fill the memory."""
@@ -181,40 +194,35 @@ class Harness:
 
     def _begin(self, program: Program) -> int:
         """Puts the machine back to before a character of the program; which one."""
-        board = self.board
-        if board is None or not self._opens(board, program):
+        if self.board is None or not self._opens(self.board, program):
             self.back()
             return 0
-        self.oracle.begin(self.begin_tick)
-        self._opening.put(self.cpu, board.log)
-        self._forget_records(board)
-        self.now_tick = self._opening.tick
+        self._put(self._opening)
         return len(_OPENING)
 
     def _opens(self, board: Board, program: Program) -> bool:
         """Whether the program begins as all frames do, and nobody looks into the board meanwhile."""
         if board.probe is not None or self.cpu.inspector is not None or not program.opens_with(_OPENING):
             return False
-        if self._opening.mask != self.cpu.edge_mask:
-            self._open(board)
-        return self._opening.usable != 0
+        if self._opening_mask != self.cpu.edge_mask:
+            self._open(board.log)
+        return self._opening.tick >= 0
 
-    def _open(self, board: Board) -> None:
-        """Sends what all frames begin with, and keeps the moment after it."""
-        opening = self._opening
+    def _open(self, log: EventLog) -> None:
+        """Sends what all frames begin with, and keeps the moment after it; none if that is a mistake already."""
         edges = self.cpu.edges
-        self.cpu.watch_edges(memoryview(bytearray(self.cpu.edge_mask + 1)))
+        counted = bytearray(self.cpu.edge_mask + 1)
+        self.cpu.watch_edges(memoryview(counted))
         self.back()
-        begun = board.log.end
+        begun = log.end
         tick = self.begin_tick + _LEAD
         for value in _OPENING:
             self._character(value, 0, tick)
             tick += 10 * self.bit_ticks
-        opening.mask = self.cpu.edge_mask
-        opening.tick = tick - _AHEAD
-        opening.usable = 0 if self._run(opening.tick) else 1
-        opening.keep(self.cpu, board.log, begun)
-        board.log.cut(begun)
+        stopped = self._run(tick - _AHEAD)
+        self._opening.keep(-1 if stopped else tick - _AHEAD, begun, bytes(counted))
+        self._opening_mask = self.cpu.edge_mask
+        log.cut(begun)
         self.cpu.watch_edges(edges)
 
     def _character(self, value: int, bad_stop: int, tick: int) -> None:
