@@ -5,6 +5,7 @@ ctypedef (u64_t, u64_t, u64_t, u64_t) words_t
 
 cdef u64_t _WORD, _M0, _M1, _W0, _W1, _PAIRS, _BITS, _GAUSS, _NO_BLOCK
 cdef long long _INDICES
+cdef u64_t[::1] _TABLE
 
 
 @cython.locals(p0=u64_t, p1=u64_t)
@@ -33,5 +34,5 @@ cdef class Stream:
     @cython.locals(word=u64_t, part=int)
     cpdef int bit(self, long long index) except -1
     cpdef double uniform(self, long long index) except? -1.0
-    @cython.locals(draw=u64_t, magnitude=u64_t, cell=int, fraction=double, middle=double, place=double, z=double)
+    @cython.locals(draw=u64_t, magnitude=u64_t, low=u64_t, cell=int, above=int, half=int, fraction=double, middle=double, place=double, z=double)
     cpdef double gauss(self, long long index) except? -1000.0

@@ -19,7 +19,7 @@ bits first): 0 `u32` and `below`, 4; 1 `u64` and `uniform`, 2; 2 `bit`, 128; 3 `
 from __future__ import annotations
 
 import hashlib
-from bisect import bisect_right
+from array import array
 
 from miro_exact.domain import MAX_SEED
 
@@ -207,9 +207,15 @@ class Stream:
         """
         draw = self.pair(_GAUSS, index)
         magnitude = draw >> 1
-        cell = bisect_right(HALF_NORMAL, magnitude) - 1
-        low = HALF_NORMAL[cell]
-        fraction = float(magnitude - low) / float(HALF_NORMAL[cell + 1] - low)
+        cell, above = 0, 147  # entries of the table between which the magnitude is
+        while above - cell > 1:
+            half = (cell + above) >> 1
+            if _TABLE[half] <= magnitude:
+                cell = half
+            else:
+                above = half
+        low = _TABLE[cell]
+        fraction = float(magnitude - low) / float(_TABLE[above] - low)
         middle = (float(cell) + 0.5) * 0.0625
         place = fraction - 0.03125 * middle * fraction * (1.0 - fraction)
         z = (float(cell) + place) * 0.0625
@@ -246,3 +252,5 @@ def half_normal_table() -> list[int]:
 
 
 HALF_NORMAL = half_normal_table()
+_TABLE = array("Q", HALF_NORMAL)
+assert len(HALF_NORMAL) == 148

@@ -11,6 +11,7 @@ What does not: saving and hashing it (`miro_exact.state`, which reads the same t
 import math
 import re
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, ClassVar
 
 LARGEST = (1 << 63) - 1
@@ -52,19 +53,27 @@ class Remembering:
 
 def check(name: str, code: str, value: object) -> None:
     """Raises ValueError, which names the attribute, unless `value` is of the type that `code` names."""
-    match = re.fullmatch(r"([1-9]\d{0,5})?([dq?])", code)
-    if match is None or int(match[1] or 1) > LONGEST:
+    count, kind = _parsed(code)
+    if not kind:
         raise ValueError(
             f"STATE[{name!r}] = {code!r}: must be d, q or ?, or a number up to {LONGEST} before it"
         )
-    if match[1] is None:
-        _check(name, match[2], value)
+    if count is None:
+        _check(name, kind, value)
         return
-    count = int(match[1])
     if not isinstance(value, list) or len(value) != count:
         raise ValueError(f"attribute {name!r} is not a list of {count} items")
     for index, item in enumerate(value):
-        _check(f"{name}[{index}]", match[2], item)
+        _check(f"{name}[{index}]", kind, item)
+
+
+@cache
+def _parsed(code: str) -> tuple[int | None, str]:
+    """The number and the type that a code names; no type if it is none."""
+    match = re.fullmatch(r"([1-9]\d{0,5})?([dq?])", code)
+    if match is None or int(match[1] or 1) > LONGEST:
+        return None, ""
+    return (None if match[1] is None else int(match[1])), match[2]
 
 
 def _check(name: str, code: str, value: object) -> None:

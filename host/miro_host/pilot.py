@@ -124,14 +124,14 @@ class Pilot:
         at_s = estimate.t_s + self.reference_lead_s
         path, reference, posture = self.reference, self.reference_at(at_s), estimate.posture
         answer = self._ask(LawInput(at_s, z.period_s, reference, path, posture, v_m_s, w_rad_s, telemetry))
-        inner = {name: answer.inner[name] for name in self.law.INNER}
+        inner = _in_order(answer.inner, self.law.INNER)
         if isinstance(answer, Accelerations):
             z.step(answer.v_dot_m_s2, answer.w_dot_rad_s2)  # equation (15)
         else:
             z.go_to(answer.v_m_s, answer.w_rad_s)
         left_factor, right_factor = estimate.left_factor, estimate.right_factor
         left, right = self.wheels.command(z.v_m_s, z.w_rad_s, left_factor, right_factor)
-        named = {name: estimate.inner[name] for name in self.estimator.INNER}
+        named = _in_order(estimate.inner, self.estimator.INNER)
         self.command = WheelCommand(left, right, z.v_m_s, z.w_rad_s, inner, left_factor, right_factor, named)
         return self.command
 
@@ -236,8 +236,13 @@ def _check_factors(left: float, right: float) -> None:
         raise ValueError(f"the wheel factors ({left}, {right}) are those of no robot")
 
 
+def _in_order(values: Mapping[str, float], declared: tuple[str, ...]) -> Mapping[str, float]:
+    """A copy, for a plug-in may go on to use its own."""
+    return {name: values[name] for name in declared}
+
+
 def _check_inner(values: Mapping[str, float], declared: tuple[str, ...]) -> None:
-    if tuple(values) != declared and sorted(values) != sorted(declared):
+    if len(values) != len(declared) or not all(name in values for name in declared):
         raise ValueError(f"its inner values are {sorted(values)}, but INNER declares {sorted(declared)}")
     for name, value in values.items():
         _check(name, value)

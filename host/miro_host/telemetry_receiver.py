@@ -17,6 +17,7 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 
 HALF_TURN = 1 << 15
 TURN = 1 << 16
+_HALF_TURN, _TURN = HALF_TURN, TURN
 
 _COUNT = ("q", -NEVER_TICK, NEVER_TICK)
 _NO_TELEMETRY = (-1, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -81,16 +82,17 @@ class TelemetryReceiver:
         if not isinstance(message, TelemetryFrame) or message.slot >= len(self.last):
             return
         before = self.last[message.slot]
+        left, right = (0, 0) if before is None else (before.position_left, before.position_right)
         self.last[message.slot] = LastTelemetry(
-            tick=event.start_tick,
-            seq=message.seq,
-            flags=message.flags,
-            status_left=message.status_left,
-            status_right=message.status_right,
-            position_left=unwrapped(message.position_left, 0 if before is None else before.position_left),
-            position_right=unwrapped(message.position_right, 0 if before is None else before.position_right),
-            accepted=message.accepted,
-            rejected=message.rejected,
+            event.start_tick,
+            message.seq,
+            message.flags,
+            message.status_left,
+            message.status_right,
+            unwrapped(message.position_left, left),
+            unwrapped(message.position_right, right),
+            message.accepted,
+            message.rejected,
         )
 
     def after_load(self) -> None:
@@ -101,4 +103,4 @@ class TelemetryReceiver:
 
 def unwrapped(low: int, before: int) -> int:
     """The count with the 16 low bits `low` that is nearest to `before`; halfway, the smaller one."""
-    return before + ((low - before + HALF_TURN) % TURN) - HALF_TURN
+    return before + ((low - before + _HALF_TURN) % _TURN) - _HALF_TURN

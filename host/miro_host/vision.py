@@ -12,6 +12,7 @@ from collections import deque
 import msgspec
 
 from miro_exact import dmath
+from miro_exact.domain import DomainError
 from miro_exact.state import Rows
 from miro_host.posture import Posture
 
@@ -49,7 +50,10 @@ def to_grid(x: float, step: float) -> float:
     """The multiple of `step` nearest to x, halves upwards; x itself for step 0. The origin is on the grid."""
     if step == 0.0:
         return x
-    return step * math.floor(x / step + 0.5)
+    cells = x / step + 0.5
+    if cells - cells != 0.0:
+        raise DomainError(f"{x!r} m is beyond any grid of {step!r} m")
+    return step * math.floor(cells)
 
 
 def measure(true: Posture, normals: tuple[float, float, float], errors: VisionErrors) -> Posture:
@@ -58,10 +62,13 @@ def measure(true: Posture, normals: tuple[float, float, float], errors: VisionEr
     `normals` are three standard normals for x, y and heading. Off by at most the bound plus half a pixel per
     axis, and by at most the heading bound.
     """
+    position_m, pixel_m = errors.position_m, errors.pixel_m
+    x_m, y_m, theta_rad = true.x_m, true.y_m, true.theta_rad
+    right, up, turn = normals
     return Posture(
-        to_grid(true.x_m + error_of(normals[0], errors.position_m), errors.pixel_m),
-        to_grid(true.y_m + error_of(normals[1], errors.position_m), errors.pixel_m),
-        dmath.wrap_pi(true.theta_rad + error_of(normals[2], errors.heading_rad)),
+        to_grid(x_m + error_of(right, position_m), pixel_m),
+        to_grid(y_m + error_of(up, position_m), pixel_m),
+        dmath.wrap_pi(theta_rad + error_of(turn, errors.heading_rad)),
     )
 
 

@@ -115,7 +115,7 @@ class RobotPort:
         self.scenario = scenario
         self.recorder = recorder
         spec = scenario.networks[0]
-        self.log = HostLog(0, lambda tick: tick)
+        self.log = HostLog(0, lambda tick: tick, spec.robots)
         self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=())]
         self.end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
         self.observers: list[Callable[[Period], object]] = []

@@ -5,12 +5,19 @@ from miro_exact cimport dmath
 cpdef double sign(double x) noexcept
 cpdef double saturation(double x, double width) except? -7.5
 cpdef double curvature_term(double v, double w, double rho, double sin_alpha) except? -7.5
-cdef double _switch(double x, double width, bint smooth) except? -7.5
 cpdef double guarded_inverse(double cos_alpha, double d) except? -7.5
-@cython.locals(
-    x=double, y=double, theta=double, rho=double, phi=double, sin_alpha=double, cos_alpha=double, rho_floor=double,
-    rho_e=double, phi_e=double, theta_e=double, rho_e_rate=double, phi_e_rate=double, theta_e_rate=double,
-    abs_phi_e_rate=double, side=double, s1=double, s2=double, braces=double, u1=double, u2=double, layer=double,
-    smooth=cython.bint, gamma1=double, gamma2=double, v_dot=double,
-)
-cdef _control(g, r, measured, double v_m_s, double w_rad_s)
+
+
+cdef class Terms:
+    cdef double gamma1, gamma2, q1, q2, p1, p2, layer_s1, layer_s2, layer_theta, cosine_guard, rho_floor
+    cdef bint smooth, layer_derivative
+    cdef readonly double rho_e, phi_e, theta_e, s1, s2, u1, u2
+
+    @cython.locals(
+        x=double, y=double, theta=double, rho=double, phi=double, sin_alpha=double, cos_alpha=double, rho_floor=double,
+        rho_e=double, phi_e=double, theta_e=double, rho_e_rate=double, phi_e_rate=double, theta_e_rate=double,
+        abs_phi_e_rate=double, side=double, s1=double, s2=double, braces=double, u1=double, u2=double, rho_r=double,
+        phi_r=double, theta_r=double, rho_r_rate=double, phi_r_rate=double, w_r=double, v_r_dot=double, rho_r_accel=double,
+    )
+    cpdef int work_out(self, r, measured, double v_m_s, double w_rad_s) except -1
+    cdef double _switch(self, double x, double width) except? -7.5

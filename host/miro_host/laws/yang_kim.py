@@ -129,13 +129,19 @@ class YangKim(Law[Gains]):
     """Equations (13) and (16) with one set of gains; without memory: the same inputs give the same output."""
 
     INNER = ("u1", "u2", "s1", "s2")
+    NOT_STATE = ("parameters", "terms")
+
+    def __init__(self, parameters: Gains) -> None:
+        super().__init__(parameters)
+        self.terms = Terms(parameters)
 
     def step(self, given: LawInput) -> Accelerations:
         """v_r' + u1 and w_r' + u2, which equation (15) integrates."""
-        r = given.reference
-        c = self.control(r, given.posture, given.v_m_s, given.w_rad_s)
-        inner = {"u1": c.u1, "u2": c.u2, "s1": c.s1, "s2": c.s2}
-        return Accelerations(r.v_dot_m_s2 + c.u1, r.w_dot_rad_s2 + c.u2, inner)
+        r, terms = given.reference, self.terms
+        terms.work_out(r, given.posture, given.v_m_s, given.w_rad_s)
+        u1, u2 = terms.u1, terms.u2
+        inner = {"u1": u1, "u2": u2, "s1": terms.s1, "s2": terms.s2}
+        return Accelerations(r.v_dot_m_s2 + u1, r.w_dot_rad_s2 + u2, inner)
 
     def control(
         self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float
@@ -144,51 +150,88 @@ class YangKim(Law[Gains]):
 
         ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
         """
-        return _control(self.parameters, reference, measured, v_m_s, w_rad_s)
+        terms = self.terms
+        terms.work_out(reference, measured, v_m_s, w_rad_s)
+        errors = terms.rho_e, terms.phi_e, terms.theta_e
+        return YangKimControl(*errors, terms.s1, terms.s2, terms.u1, terms.u2)
 
 
-def _control(g: Gains, r: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> YangKimControl:
-    x, y, theta = measured.x_m, measured.y_m, measured.theta_rad
-    gamma1, gamma2, layer, v_dot = g.gamma1_per_s, g.gamma2_per_s, g.layer_theta_rad, r.v_dot_m_s2
-    smooth = g.switching != "sign"
-    rho = math.sqrt(x * x + y * y)
-    phi = dmath.atan2(y, x)
-    sin_alpha, cos_alpha = dmath.sincos(phi - theta)
-    rho_floor = g.rho_floor_m
-    if not rho_floor > rho:
-        rho_floor = rho
-    rho_e = rho - r.rho_m
-    phi_e = dmath.wrap_pi(phi - r.phi_rad)
-    theta_e = dmath.wrap_pi(theta - r.posture.theta_rad)
-    # rates by equation (9)
-    rho_e_rate = v_m_s * cos_alpha - r.rho_rate_m_s
-    phi_e_rate = -(v_m_s / rho_floor) * sin_alpha - r.phi_rate_rad_s
-    theta_e_rate = w_rad_s - r.w_rad_s
-    abs_phi_e_rate = sign(phi_e) * phi_e_rate  # d|phi_e|/dt, not |phi_e'|
-    side = _switch(theta_e, layer, smooth)
-    s1 = rho_e_rate + gamma1 * rho_e  # (13)
-    s2 = theta_e_rate + gamma2 * theta_e + side * abs(phi_e)  # (13)
-    braces = (
-        -g.q1_per_s * s1
-        - g.p1_m_s2 * _switch(s1, g.layer_s1_m_s, smooth)
-        - gamma1 * rho_e_rate
-        + r.rho_accel_m_s2  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
-        - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
+class Terms:
+    """The terms of the law as they were worked out last, with one set of gains."""
+
+    NOT_STATE = (
+        *(
+            "gamma1",
+            "gamma2",
+            "q1",
+            "q2",
+            "p1",
+            "p2",
+            "smooth",
+            "layer_derivative",
+            "cosine_guard",
+            "rho_floor",
+        ),
+        *("layer_s1", "layer_s2", "layer_theta"),
+        *("rho_e", "phi_e", "theta_e", "s1", "s2", "u1", "u2"),
     )
-    u1 = guarded_inverse(cos_alpha, g.cosine_guard) * braces - v_dot  # (16)
-    u2 = (  # (16)
-        -g.q2_per_s * s2
-        - g.p2_rad_s2 * _switch(s2, g.layer_s2_rad_s, smooth)
-        - gamma2 * theta_e_rate
-        - side * abs_phi_e_rate
-    )
-    if g.layer_derivative and abs(theta_e) < layer:
-        u2 -= theta_e_rate / layer * abs(phi_e)
-    return YangKimControl(rho_e, phi_e, theta_e, s1, s2, u1, u2)
 
+    def __init__(self, gains: Gains) -> None:
+        self.gamma1, self.gamma2 = gains.gamma1_per_s, gains.gamma2_per_s
+        self.q1, self.q2 = gains.q1_per_s, gains.q2_per_s
+        self.p1, self.p2 = gains.p1_m_s2, gains.p2_rad_s2
+        self.smooth = gains.switching != "sign"
+        self.layer_s1, self.layer_s2 = gains.layer_s1_m_s, gains.layer_s2_rad_s
+        self.layer_theta = gains.layer_theta_rad
+        self.layer_derivative = gains.layer_derivative
+        self.cosine_guard = gains.cosine_guard
+        self.rho_floor = gains.rho_floor_m
+        self.rho_e = self.phi_e = self.theta_e = self.s1 = self.s2 = self.u1 = self.u2 = 0.0
 
-def _switch(x: float, width: float, smooth: bool) -> float:
-    return saturation(x, width) if smooth else sign(x)
+    def work_out(self, r: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> None:
+        """See `YangKim.control`."""
+        x, y, theta = measured.x_m, measured.y_m, measured.theta_rad
+        rho_r, phi_r, theta_r = r.rho_m, r.phi_rad, r.posture.theta_rad
+        rho_r_rate, phi_r_rate, w_r = r.rho_rate_m_s, r.phi_rate_rad_s, r.w_rad_s
+        v_r_dot, rho_r_accel = r.v_dot_m_s2, r.rho_accel_m_s2
+        rho = math.sqrt(x * x + y * y)
+        phi = dmath.atan2(y, x)
+        sin_alpha, cos_alpha = dmath.sincos(phi - theta)
+        rho_floor = self.rho_floor
+        if not rho_floor > rho:
+            rho_floor = rho
+        rho_e = rho - rho_r
+        phi_e = dmath.wrap_pi(phi - phi_r)
+        theta_e = dmath.wrap_pi(theta - theta_r)
+        # rates by equation (9)
+        rho_e_rate = v_m_s * cos_alpha - rho_r_rate
+        phi_e_rate = -(v_m_s / rho_floor) * sin_alpha - phi_r_rate
+        theta_e_rate = w_rad_s - w_r
+        abs_phi_e_rate = sign(phi_e) * phi_e_rate  # d|phi_e|/dt, not |phi_e'|
+        side = self._switch(theta_e, self.layer_theta)
+        s1 = rho_e_rate + self.gamma1 * rho_e  # (13)
+        s2 = theta_e_rate + self.gamma2 * theta_e + side * abs(phi_e)  # (13)
+        braces = (
+            -self.q1 * s1
+            - self.p1 * self._switch(s1, self.layer_s1)
+            - self.gamma1 * rho_e_rate
+            + rho_r_accel  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
+            - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
+        )
+        u1 = guarded_inverse(cos_alpha, self.cosine_guard) * braces - v_r_dot  # (16)
+        u2 = (  # (16)
+            -self.q2 * s2
+            - self.p2 * self._switch(s2, self.layer_s2)
+            - self.gamma2 * theta_e_rate
+            - side * abs_phi_e_rate
+        )
+        if self.layer_derivative and abs(theta_e) < self.layer_theta:
+            u2 -= theta_e_rate / self.layer_theta * abs(phi_e)
+        self.rho_e, self.phi_e, self.theta_e = rho_e, phi_e, theta_e
+        self.s1, self.s2, self.u1, self.u2 = s1, s2, u1, u2
+
+    def _switch(self, x: float, width: float) -> float:
+        return saturation(x, width) if self.smooth else sign(x)
 
 
 def guarded_inverse(cos_alpha: float, d: float) -> float:

@@ -27,6 +27,8 @@ import msgspec
 
 from miro_protocol.actions import Action, RadioState, Reset
 from miro_protocol.events import Received
+from miro_protocol.frames import ContentError, Message, TelemetryFrame
+from miro_protocol.transmission import Transmission
 from miro_robot import event_log
 from miro_robot.event_log import EventLog
 from miro_robot.lm629.commands import BY_OPCODE
@@ -84,23 +86,25 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
 class HostLog:
     """The last 4096 events at the PC of one network, with serial numbers as a board's log has them.
 
-    `known_tick`: when a symbol is known whose start bit began at a tick. Symbols become events when they are asked for.
+    What the host sent, answers and characters become events when they are asked for. `known_tick`: when a symbol is
+    known whose start bit began at a tick. `robots`: of the network.
     """
 
-    NOT_STATE = ("network", "known_tick", "end", "kept")
+    NOT_STATE = ("network", "robots", "known_tick", "end", "kept")
 
-    def __init__(self, network: int, known_tick: Callable[[int], int]) -> None:
+    def __init__(self, network: int, known_tick: Callable[[int], int], robots: int) -> None:
         self.network = network
+        self.robots = robots
         self.known_tick = known_tick
         self.end = 0
-        self.kept: deque[Event | Symbol] = deque(maxlen=KEPT)
+        self.kept: deque[Event | Transmission | Received | Symbol] = deque(maxlen=KEPT)
 
     @property
     def first(self) -> int:
         return self.end - len(self.kept)
 
-    def note(self, event: Event) -> None:
-        self.kept.append(event)
+    def note(self, one: Event | Transmission | Received) -> None:
+        self.kept.append(one)
         self.end += 1
 
     def note_heard(self, symbols: Sequence[Symbol]) -> None:
@@ -113,8 +117,25 @@ class HostLog:
             one = self.kept[place]
             if isinstance(one, Event):
                 yield self.first + place, one
+            elif isinstance(one, Transmission):
+                yield self.first + place, self._sent(one)
+            elif isinstance(one, Received):
+                yield self.first + place, self._answer(one)
             elif heard:
                 yield self.first + place, self._heard(*one)
+
+    def _sent(self, sent: Transmission) -> Event:
+        good = not sent.bad_stop
+        return Event(tick=sent.tick, what="sent", network=self.network, data=sent.data, good_stop=good)
+
+    def _answer(self, answer: Received) -> Event:
+        try:
+            message: Message | None = answer.message(self.robots)
+        except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
+            message = None
+        slot = message.slot if isinstance(message, TelemetryFrame) else -1
+        tick = self.known_tick(answer.last_tick)
+        return Event(tick=tick, what="answer", network=self.network, value=slot, frame=answer)
 
     def _heard(self, value: int, good_stop: bool, start_tick: int) -> Event:
         tick = self.known_tick(start_tick)

@@ -11,7 +11,6 @@ from miro_host.pilot import WheelCommand
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol.decoder import Received, Symbol
-from miro_protocol.frames import ContentError, Message, TelemetryFrame
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
 from miro_robot.mcs51.execute import STOPPED
@@ -100,7 +99,7 @@ class Network:
         self.heard: list[Symbol] = []  # in this period so far
         self.sent: list[Transmission] = []
         self.seen: list[RobotPeriod] = []
-        self.log = HostLog(index, self.uplink.known_tick)
+        self.log = HostLog(index, self.uplink.known_tick, spec.robots)
 
     def begin_period(self, tick: int) -> None:
         """Camera, PC and station, in this order."""
@@ -147,10 +146,7 @@ class Network:
             self.downlink.send(sent.tick, sent.data, sent.bad_stop)
             self.frames_sent += 1
             self.sent.append(sent)
-            good = not sent.bad_stop
-            self.log.note(
-                Event(tick=sent.tick, what="sent", network=self.index, data=sent.data, good_stop=good)
-            )
+            self.log.note(sent)
 
     def settle(self, rendezvous_tick: int) -> None:
         """All networks have sent: the line is known up to where the robots stop next."""
@@ -213,16 +209,8 @@ class Network:
         self.log.note_heard(heard)
         for found in self.telemetry.receive(heard):
             if isinstance(found, Received):
-                self._note_answer(self.uplink.known_tick(found.last_tick), found)
+                self.log.note(found)
         self.heard += heard
-
-    def _note_answer(self, tick: int, answer: Received) -> None:
-        try:
-            message: Message | None = answer.message(self.spec.robots)
-        except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
-            message = None
-        slot = message.slot if isinstance(message, TelemetryFrame) else -1
-        self.log.note(Event(tick=tick, what="answer", network=self.index, value=slot, frame=answer))
 
     def note_touch(self, tick: int, one: Robot, other: Robot) -> None:
         """Two robots on the pitch have begun to touch, `one` of this network."""

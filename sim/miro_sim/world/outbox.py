@@ -80,8 +80,10 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        waiting = self.waiting
-        if sent.tick < free_tick or (waiting and any(_overlap(one.sent, sent) for one in waiting)):
+        busy = sent.tick < free_tick
+        for one in self.waiting:
+            busy = busy or _overlap(one.sent, sent)
+        if busy:
             self.dropped += 1
             return False
         self._add(Waiting(sent, STATION))
@@ -94,15 +96,16 @@ class Outbox:
         """
         if sent.tick < free_tick:
             raise ValueError(f"tick {sent.tick}: the transmitter is busy until tick {free_tick}")
-        if not self.waiting or self.waiting[-1].sent.end_tick <= sent.tick:  # a long script comes in order
+        count = len(self.waiting)
+        if not count or self.waiting[count - 1].sent.end_tick <= sent.tick:  # a long script comes in order
             self.waiting.append(Waiting(sent, INJECTED))
             return
         for old, origin in self.waiting:
             if _overlap(old, sent) and (origin == INJECTED or old.tick < sent.tick):
                 busy = f"is busy from tick {old.tick} to {old.end_tick}"
-                count = len(sent.data)
+                size = len(sent.data)
                 raise ValueError(
-                    f"tick {sent.tick}: the transmitter {busy}; {count} characters end at tick {sent.end_tick}"
+                    f"tick {sent.tick}: the transmitter {busy}; {size} characters end at tick {sent.end_tick}"
                 )
         kept = [one for one in self.waiting if not _overlap(one.sent, sent)]
         self.dropped += len(self.waiting) - len(kept)
@@ -112,21 +115,22 @@ class Outbox:
     def _add(self, one: Waiting) -> None:
         self.waiting.append(one)
         if len(self.waiting) > 1:
-            self.waiting.sort(key=lambda one: one.sent.tick)
+            self.waiting.sort(key=_tick)
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
-        return max([free_tick, *(one.sent.end_tick for one in self.waiting)])
+        return max([free_tick] + [one.sent.end_tick for one in self.waiting])
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
         if not self.waiting:
             return []
-        count = 0
-        while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
-            count += 1
-        taken = [one.sent for one in self.waiting[:count]]
-        del self.waiting[:count]
+        taken: list[Transmission] = []
+        for one in self.waiting:
+            if one.sent.tick >= until_tick + self.lead_ticks:
+                break
+            taken.append(one.sent)
+        del self.waiting[: len(taken)]
         return taken
 
     def after_load(self) -> None:
@@ -143,3 +147,7 @@ class Outbox:
 
 def _overlap(one: Transmission, other: Transmission) -> bool:
     return one.tick < other.end_tick and other.tick < one.end_tick
+
+
+def _tick(one: Waiting) -> int:
+    return one.sent.tick

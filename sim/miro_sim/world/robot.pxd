@@ -3,6 +3,7 @@ cimport cython
 from miro_host.pilot cimport Pilot
 from miro_robot.board cimport Board
 from miro_robot.lm629.chip cimport Lm629
+from miro_robot.lm629.trajectory cimport ProfileGenerator
 from miro_sim.plant.drive cimport DifferentialDrive
 
 cdef long long CYCLE_TICKS, GRID_TICKS
@@ -27,6 +28,6 @@ cdef class Robot:
     cpdef record(self, long long tick, measured, command)
 
 
-@cython.locals(chip=Lm629)
-cdef _axis(chip)
+@cython.locals(profile=ProfileGenerator, data=bytes)
+cdef _axis(Lm629 chip)
 cdef _control(command)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from msgspec.structs import astuple
+
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
@@ -128,26 +130,25 @@ class Robot:
 
     def record(self, tick: int, measured: Posture | None, command: WheelCommand | None) -> RobotPeriod:
         """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
-        x_m, y_m, theta_rad = self.drive.pose_at(tick)
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
         try:
             reference = self.pilot.reference_at(seconds(tick)).posture
         except PluginError as error:
             raise self._named(error, tick) from error
         return RobotPeriod(
-            network=self.network,
-            slot=self.spec.slot,
-            reference=reference,
-            truth=Posture(x_m, y_m, theta_rad),
-            v_m_s=v_m_s,
-            w_rad_s=w_rad_s,
-            measurement=measured,
-            control=_control(command),
-            accepted=self.counter(0),
-            rejected=self.counter(1),
-            stale=self.counter(2),
-            left=_axis(self.board.left),
-            right=_axis(self.board.right),
+            self.network,
+            self.slot,
+            reference,
+            Posture(*self.drive.pose_at(tick)),
+            v_m_s,
+            w_rad_s,
+            measured,
+            None if command is None else _control(command),
+            self.counter(0),
+            self.counter(1),
+            self.counter(2),
+            _axis(self.board.left),
+            _axis(self.board.right),
         )
 
     def __repr__(self) -> str:
@@ -159,22 +160,21 @@ def _iram_address(image: Image, name: str) -> int | None:
     return symbol.address if symbol is not None and symbol.space == "iram" else None
 
 
-def _control(command: WheelCommand | None) -> Control | None:
-    if command is None:
-        return None
-    inner, estimate = dict(command.inner), dict(command.estimate)
-    return Control(command.v_m_s, command.w_rad_s, command.left, command.right, inner, estimate)
+def _control(command: WheelCommand) -> Control:
+    left, right, v_m_s, w_rad_s, inner, _, _, estimate = astuple(command)
+    return Control(v_m_s, w_rad_s, left, right, inner, estimate)
 
 
 def _axis(chip: Lm629) -> Axis:
     commands = tuple([(tick, opcode, data.hex()) for tick, opcode, data in chip.commands])
     chip.commands.clear()
+    profile = chip.trajectory
     return Axis(
-        desired_position=chip.desired_position,
-        real_position=chip.real_position,
-        desired_velocity=chip.desired_velocity,
-        status=chip.status,
-        pwm_sign=chip.sign,
-        pwm_magnitude=chip.pwm_magnitude,
-        commands=commands,
+        profile.position >> 16,
+        chip.real_position,
+        profile.velocity,
+        chip.signals.word & 0xFE,
+        chip.sign,
+        chip.pwm_magnitude,
+        commands,
     )

@@ -14,7 +14,7 @@ def robot_log():
 
 
 def host_log():
-    return HostLog(0, lambda start_tick: start_tick + 7)
+    return HostLog(0, lambda start_tick: start_tick + 7, 3)
 
 
 def test_a_cursor_gives_what_was_noted_after_it_was_made_once():
