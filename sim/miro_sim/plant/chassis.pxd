@@ -13,7 +13,7 @@ cdef class Body:
 
     @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
                    left_rub=double, right_rub=double, new_left=double, new_right=double)
-    cpdef int push(self, double left_nms, double right_nms, int ticks) except -1
+    cdef int _push(self, double left_nms, double right_nms, int ticks) except -1
     @cython.final
     @cython.locals(left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double left, double right, double most) noexcept

@@ -72,6 +72,9 @@ class Body:
 
     def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
         """Applies motor impulses and friction over `ticks`; moves on at the mean of old and new speed."""
+        self._push(left_nms, right_nms, ticks)
+
+    def _push(self, left_nms: float, right_nms: float, ticks: int) -> None:
         old_left = self.left_rad_s
         old_right = self.right_rad_s
         self.turned_left_rad = 0.0

@@ -415,7 +415,7 @@ class DifferentialDrive(Plant):
                     self.rough.feel(begin + (ticks >> 1))
                 left_charge = self.left_winding._pass(ticks, constant * self.body.left_rad_s)
                 right_charge = self.right_winding._pass(ticks, constant * self.body.right_rad_s)
-                self.body.push(impulse * left_charge, impulse * right_charge, ticks)
+                self.body._push(impulse * left_charge, impulse * right_charge, ticks)
                 self.left_encoder.turn(self.body.turned_left_rad, begin, ticks)
                 self.right_encoder.turn(self.body.turned_right_rad, begin, ticks)
                 begin = now

@@ -109,7 +109,7 @@ class RoughBody(Body):
         """The next push is at this tick: the disturbing force is that of then."""
         self.forces.at(tick)
 
-    def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
+    def _push(self, left_nms: float, right_nms: float, ticks: int) -> None:
         """Applies motor impulses, disturbance and friction over `ticks`; moves on at the mean of old and new speed."""
         step_s = TICK_S * ticks
         half_s = 0.5 * step_s
