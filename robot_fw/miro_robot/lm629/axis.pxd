@@ -53,15 +53,15 @@ cdef class MotorAxis:
     @cython.locals(now=cython.longlong, passed=cython.longlong)
     cpdef rest(self, long long tick)
     @cython.final
-    cdef int _period(self, long long now) except -1
+    cdef inline int _period(self, long long now) except -1
     @cython.final
     cdef bint _late_pulse_begins(self, long long now) noexcept
     @cython.final
     @cython.locals(flags=cython.int, drive=cython.int, error=cython.longlong)
-    cdef int _sample(self, long long now) except -1
+    cdef inline int _sample(self, long long now) except -1
     @cython.final
     @cython.locals(flags=cython.int, moved=cython.longlong)
-    cdef int _latch_position(self, long long now) noexcept
+    cdef inline int _latch_position(self, long long now) noexcept
     @cython.final
     @cython.locals(profile=ProfileGenerator, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
@@ -69,15 +69,15 @@ cdef class MotorAxis:
     cdef long long _relative_base(self) noexcept
     @cython.final
     @cython.locals(flags=cython.int)
-    cdef int _step_profile(self) noexcept
+    cdef inline int _step_profile(self) noexcept
     @cython.final
     @cython.locals(flags=cython.int, before=cython.int)
-    cdef int _check_error(self, long long error) noexcept
+    cdef inline int _check_error(self, long long error) noexcept
     @cython.final
     @cython.locals(top=cython.int)
-    cdef void _put_out(self, int drive) noexcept
+    cdef inline void _put_out(self, int drive) noexcept
     @cython.final
     @cython.locals(side=cython.int)
-    cdef int _check_breakpoint(self) noexcept
+    cdef inline int _check_breakpoint(self) noexcept
     cpdef int set_breakpoint(self, long long place) except -1
     cpdef long long live_position(self, long long tick) except? -1

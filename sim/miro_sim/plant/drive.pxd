@@ -55,7 +55,7 @@ cdef class Quadrature:
     cpdef inline void turn(self, double radians, long long start_tick, int ticks) noexcept
     @cython.locals(chip=Lm629)
     cpdef void tell(self) noexcept
-    @cython.locals(limit=double, step=cython.longlong, crossing=cython.int, last=cython.int, ticks=cython.int, moved=double,
+    @cython.locals(least=double, step=cython.longlong, crossing=cython.int, last=cython.int, ticks=cython.int, needed=double,
                    start=double, end=double, start_tick=cython.longlong, end_tick=cython.longlong, edges=cython.longlong, first_tick=cython.longlong,
                    before_tick=cython.longlong, last_tick=cython.longlong, before=cython.longlong)
     cdef int _tell_run(self, Lm629 chip) noexcept

@@ -252,16 +252,16 @@ class Quadrature:
         """Tells of them all at once, if they go one way and so slowly that the decoder counts each. Returns whether."""
         if chip.encoder_edges is not None or self.counts_per_turn:
             return 0
-        limit = chip.encoder.spacing + 4.0  # ticks a count
         step = 1 if self.count > self.told else -1
+        least = step * (chip.encoder.spacing + 4.0)  # ticks a count
         end_tick = self.cross_tick[0]
         end = self.cross_start[0]
         for crossing in range(self.crossings):
             start_tick = self.cross_tick[crossing]
             start = self.cross_start[crossing]
-            moved = step * self.cross_moved[crossing]
             ticks = self.cross_ticks[crossing]
-            if moved < 0.0 or moved * limit > ticks or step * (start - end) * limit > start_tick - end_tick:
+            needed = self.cross_moved[crossing] * least
+            if not 0.0 <= needed <= ticks or (start - end) * least > start_tick - end_tick:
                 return 0
             end_tick = start_tick + ticks
             end = start + self.cross_moved[crossing]
@@ -393,7 +393,7 @@ class DifferentialDrive(Plant):
         """
         left = self.left
         right = self.right
-        if left is None or right is None:
+        if left is None or right is None or min(self.next_tick, left.next_tick, right.next_tick) > tick:
             return 0
         begin = self.tick
         other = min(_other_tick(left), _other_tick(right))
