@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
-from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 
 LEFT = 0
 RIGHT = 1
+_SAMPLE_TICKS = SAMPLE_TICKS
 _MORE: tuple[str, ...] = ()  # what a subclass adds
 
 
@@ -44,9 +45,10 @@ class Plant:
 
         Where a chip has more to do it ends, with an advance to that tick or before. Returns 1 if it has done something.
         """
-        if self.left is not None and self.right is not None:
-            self.left.rest(tick)
-            self.right.rest(tick)
+        left, right = self.left, self.right
+        if left is not None and right is not None and tick - left.next_tick > _SAMPLE_TICKS:
+            left.rest(tick)
+            right.rest(tick)
         return 0
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:

@@ -29,7 +29,6 @@ cdef class HostPort:
     cdef int _write_ends(self, long long tick) noexcept
     cdef int _read_ends(self, long long tick) noexcept
     cdef void _record(self, int byte) noexcept
-    @cython.locals(found=bytearray, index=cython.int)
     cpdef bytes data_bytes(self)
     cdef void _word_is_over(self, long long tick) noexcept
     cpdef void expect(self, int words) noexcept

@@ -189,10 +189,7 @@ class HostPort:
 
     def data_bytes(self) -> bytes:
         """Those of the command in progress."""
-        found = bytearray()
-        for index in range(self.recorded):
-            found.append(self.record[index])
-        return bytes(found)
+        return bytes(self.record[: self.recorded])
 
     def _word_is_over(self, tick: int) -> None:
         self.low_next = 0
