@@ -118,8 +118,10 @@ class CompareOptions(Options, frozen=True, kw_only=True):
     def of_answers(self, file: str) -> CompareRule:
         """The comparison of robots at a port. Raises BadInput for one that cannot be made there."""
         kind = self.given("kind") if self.kind != "answers" else []
-        if other := self.given("from_time", "to_time") or kind:
-            raise BadInput(file, other[0], "is not for what was recorded at a port", "use --compare answers")
+        window = self.given("from_time", "to_time")
+        for option in (*window, *kind):
+            remedy = "leave it out" if option in window else "use --compare answers"
+            raise BadInput(file, option, "is not for what was recorded at a port", remedy)
         return self.rule if self.kind == "answers" else ANSWERS
 
     def described(self) -> str:

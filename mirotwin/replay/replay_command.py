@@ -162,6 +162,7 @@ def replay(options: ReplayOptions) -> int:
         what = "is not for a robot at a port, of which only answers are known"
         raise BadInput(file, "--expect", what, "leave it out: the answers are compared with the twin's")
     if desk.port:
+        compare.of_answers(file)  # refuses before anything is sent
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
         file = str(record_at_port(job, desk, options.out, options.force, options.quiet))

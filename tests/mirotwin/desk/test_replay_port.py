@@ -75,12 +75,22 @@ def test_a_run_is_sent_again_as_a_stream_is(mirotwin, tmp_path, monkeypatch):
     assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
 
 
-@pytest.mark.parametrize("option", [("--compare", "wheels"), ("--from", "1s"), ("--to", "2s")])
-def test_what_no_port_shows_cannot_be_compared(mirotwin, drive, option):
+@pytest.mark.parametrize(
+    ("option", "remedy"),
+    [
+        (("--compare", "wheels"), "use --compare answers"),
+        (("--from", "1s"), "leave it out"),
+        (("--compare", "answers", "--to", "2s"), "leave it out"),
+    ],
+)
+def test_what_no_port_shows_cannot_be_compared_and_nothing_is_sent(mirotwin, drive, option, remedy):
+    expected = f"{option[-2]}: is not for what was recorded at a port; {remedy}\n"
+    code, _, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", *option)
+    assert (code, err.count("\n"), expected in err) == (2, 1, True)
+    assert not (drive.parent / "runs").exists()
     mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", "--out", "desk")
     code, _, err = mirotwin("replay", "desk", *option)
-    assert code == 2
-    assert f"{option[0]}: is not for what was recorded at a port; use --compare answers" in err
+    assert (code, expected in err) == (2, True)
 
 
 def test_answers_are_compared_at_ports_only(mirotwin, finished):
