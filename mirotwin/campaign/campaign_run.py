@@ -20,6 +20,7 @@ from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine, choose_engine
+from mirotwin.shell.outputs import told_when_full
 from mirotwin.shell.program import (
     BAD_INPUT,
     DONE,
@@ -106,7 +107,8 @@ def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) 
         bar.to(tally.done)
 
     try:
-        tally = running.run(plan, results, workers, force=force, many=True, on_outcome=show)
+        with told_when_full(journal_path(results), "--out", "file"):
+            tally = running.run(plan, results, workers, force=force, many=True, on_outcome=show)
     except BaseException:
         if last is not None:
             where = f"{last.done} of {plan.runs} runs are in {journal_path(results)}"

@@ -57,6 +57,8 @@ def run_single(job: Work) -> RunOutcome:
         return RunOutcome(job.run, error=f"{error}")
     except ValueError as error:  # numbers with which nothing can be computed, a part that fails
         return RunOutcome(job.run, error=f"cannot be run: {error}")
+    except OSError as error:  # no room for its recording
+        return RunOutcome(job.run, error=error.strerror or f"{error}")
     except Exception as error:  # a fault of this program costs one run, too
         return RunOutcome(job.run, error=f"internal error: {type(error).__name__}: {error}")
 

@@ -259,14 +259,16 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
 
 
 @contextmanager
-def told_when_full(path: Path, option: str) -> Iterator[None]:
-    """A full disk becomes an OutputError that names the folder. It occurs on write, where the OSError names no file."""
+def told_when_full(path: Path | None, option: str, kind: str = "folder") -> Iterator[None]:
+    """A full disk becomes an OutputError that names the folder, or file. It occurs on write, where the OSError names
+    none. `path`: None where nothing is written.
+    """
     try:
         yield
     except OSError as error:
-        if error.errno not in FULL:
+        if path is None or error.errno not in FULL:
             raise
-        raise OutputError(path, _reason(error), _make_room("folder", option)) from None
+        raise OutputError(path, _reason(error), _make_room(kind, option)) from None
 
 
 def _make_room(kind: str, option: str) -> str:

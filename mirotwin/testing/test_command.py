@@ -26,7 +26,7 @@ from mirotwin.shell.options import (
     Seed,
     choose_engine,
 )
-from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
 from mirotwin.shell.program import (
     BAD_INPUT,
     DONE,
@@ -169,7 +169,8 @@ def test(options: TestOptions) -> int:
         left_out |= dict.fromkeys(outcome.left_out)
         _show(outcome, options.quiet, again)
         if options.pages and outcome.left:
-            _page(outcome.left)
+            with told_when_full(options.artifacts, "--artifacts"):
+                _page(outcome.left)
     if junit is not None:
         _write_junit(junit, outcomes, times_s, lines)
     code = _summary(outcomes)

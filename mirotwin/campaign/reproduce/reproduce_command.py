@@ -33,7 +33,7 @@ from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.held_signals import Hold, held_signals
 from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine, choose_engine
-from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
+from mirotwin.shell.outputs import OutputError, OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
 
@@ -77,7 +77,8 @@ def reproduce(options: ReproduceOptions) -> int:
         folder.keep = (ROWS,)
         found = _run(plan, workers, folder.part(ROWS), hold, quiet)
         shown = middle_seeds(by_label(found))
-        _record(recorded(plan, shown, lambda name: str(folder.part(name))), workers, hold, quiet)
+        jobs = recorded(plan, shown, lambda name: str(folder.part(name)))
+        _record(jobs, workers, folder, hold, quiet)
         for start in STARTS:
             _draw(start, folder, shown)
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
@@ -110,10 +111,14 @@ def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> l
     return found
 
 
-def _record(jobs: Sequence[Work], workers: Workers, hold: Hold, quiet: bool) -> None:
-    """The runs that are shown, once more, with their recordings."""
+def _record(jobs: Sequence[Work], workers: Workers, folder: OutputFolder, hold: Hold, quiet: bool) -> None:
+    """The runs that are shown, once more, with their recordings. Raises OutputError for one that cannot be written."""
     with ProgressBar("recording", len(jobs), quiet) as bar, hold.released():
-        for done, _ in enumerate(outcomes_of(jobs, workers), 1):
+        for done, outcome in enumerate(outcomes_of(jobs, workers), 1):
+            if outcome.verdict == "error":
+                raise OutputError(
+                    folder.path, outcome.error, "make room, or choose another folder with --out"
+                )
             bar.to(done)
 
 

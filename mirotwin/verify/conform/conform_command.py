@@ -29,7 +29,7 @@ from mirotwin.shell.options import (
     StackFrom,
     choose_engine,
 )
-from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
 from mirotwin.shell.program import (
     DONE,
     EXPECTATION_FAILED,
@@ -138,9 +138,10 @@ def conform(options: ConformOptions) -> int:
                 outcomes.append(outcome)
                 bar.to(len(outcomes))
                 if artifacts is not None:
-                    for name, text in outcome.cases:
-                        write_case(artifacts / name, text)
-                        leave_image(artifacts, firmware)
+                    with told_when_full(artifacts, "--artifacts"):
+                        for name, text in outcome.cases:
+                            write_case(artifacts / name, text)
+                            leave_image(artifacts, firmware)
         except BadInput as error:  # a robot that was lost: what was found before is told
             lost = error
     outcomes = with_faults(outcomes, rules)
