@@ -11,6 +11,10 @@ cdef double TICK_S, _LARGEST
 cdef int _MOST_CROSSINGS
 
 @cython.final
+cdef class Decay:
+    cdef double share[4098]
+
+@cython.final
 cdef class Winding:
     cdef public double current_a
     cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
@@ -18,7 +22,7 @@ cdef class Winding:
     cdef double ohm[6]
     cdef double tau[6]
     cdef long long row[6]
-    cdef double decay[4098]
+    cdef readonly Decay decay
 
     @cython.locals(longest=int)
     cpdef int after_load(self) except -1

@@ -16,6 +16,8 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from miro_exact import dmath
 from miro_exact.clock import NEVER_TICK
 from miro_exact.rng import Stream
@@ -31,7 +33,23 @@ TICK_S = 1.0 / 24e6
 _NEVER = NEVER_TICK
 _LARGEST = 1.7976931348623157e308
 _MOST_CROSSINGS = 16
+_KEPT = 8  # tables of decay: of 32 kB
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
+
+
+class Decay:
+    """What share of a current is left after each number of ticks, through diodes and then through transistors."""
+
+    NOT_STATE = ("share",)
+
+    def __init__(self, taus: tuple[float, float]) -> None:
+        self.share = [dmath.exp(-ticks / tau) for tau in taus for ticks in range(LONGEST_STEP + 1)]
+
+
+@lru_cache(_KEPT)
+def _decay(taus: tuple[float, float]) -> Decay:
+    """One for all windings with these time constants (in ticks): it takes longer to make than all else of a robot."""
+    return Decay(taus)
 
 
 class Winding:
@@ -70,12 +88,12 @@ class Winding:
         through_diodes = motor.resistance_ohm + params.battery.resistance_ohm
         through_transistors = through_diodes + params.bridge.drop_ohm
         ohms = (through_diodes, through_transistors)
-        taus = [motor.inductance_h / (ohm * TICK_S) for ohm in ohms]  # in ticks
-        self.decay = [dmath.exp(-ticks / tau) for tau in taus for ticks in range(LONGEST_STEP + 1)]
+        diode_tau, transistor_tau = (motor.inductance_h / (ohm * TICK_S) for ohm in ohms)
+        self.decay = _decay((diode_tau, transistor_tau))
         # Driving backward, off, driving forward; for each a current below zero, then one above it.
         self.volt = [-driven, -diodes, diodes, -diodes, diodes, driven]
         self.ohm = [through_transistors, *[through_diodes] * 4, through_transistors]
-        self.tau = [taus[1], taus[0], taus[0], taus[0], taus[0], taus[1]]
+        self.tau = [transistor_tau, *[diode_tau] * 4, transistor_tau]
         self.row = [LONGEST_STEP + 1, 0, 0, 0, 0, LONGEST_STEP + 1]  # of `decay`
         self.on_ticks = int(params.bridge.on_delay_s / TICK_S + 0.5)
         self.off_ticks = int(params.bridge.off_delay_s / TICK_S + 0.5)
@@ -144,7 +162,7 @@ class Winding:
             elif not emf_v < self.volt[kind]:
                 return 0.0  # blocked
         final = (self.volt[kind] - emf_v) / self.ohm[kind]
-        end = final + (start - final) * self.decay[self.row[kind] + ticks]
+        end = final + (start - final) * self.decay.share[self.row[kind] + ticks]
         goes_on = end >= 0.0 if kind & 1 else not end > 0.0
         if goes_on:
             self.current_a = end
