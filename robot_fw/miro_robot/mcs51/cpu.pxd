@@ -82,8 +82,7 @@ cdef class Cpu(Executor):
     @cython.locals(event='long long')
     cdef inline long long _next_look(self) noexcept
     @cython.final
-    @cython.locals(sooner=int)
-    cdef inline int _write_peripheral(self, int address, int value) except -1
+    cdef inline int _written(self, int address, int sooner) except -1
     @cython.final
     @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1

@@ -405,14 +405,12 @@ class Cpu(Executor):
         return self.register(address, self.start + 1)
 
     def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
-        """Only the one bit changes; the others keep what hardware may have set meanwhile."""
         if address & 0xCF == 0x80:
             port = (address - _P0) >> 4
             value = self.peripherals.ports.latches[port]
             self.write_port(port, value | mask if level else value & (0xFF ^ mask))
         else:
-            value = self.peripherals.read(address, self.cycles)
-            self._write_peripheral(address, value | mask if level else value & (0xFF ^ mask))
+            self._written(address, self.peripherals.write_bit(address, mask, level, self.cycles))
 
     def write_sfr(self, address: int, value: int) -> None:
         if address == _PCON:
@@ -420,10 +418,10 @@ class Cpu(Executor):
         elif address & 0xCF == 0x80:
             self.write_port((address - _P0) >> 4, value)
         else:
-            self._write_peripheral(address, value)
+            self._written(address, self.peripherals.write(address, value, self.cycles))
 
-    def _write_peripheral(self, address: int, value: int) -> None:
-        sooner = self.peripherals.write(address, value, self.cycles)
+    def _written(self, address: int, sooner: int) -> None:
+        """A register of the peripherals was; `sooner`: an event may come sooner by it."""
         if address in (_IE, _IP):
             self.marks = self.marks if self.peripherals.interrupts.in_service else 0
             self._block()

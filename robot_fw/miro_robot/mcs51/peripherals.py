@@ -374,6 +374,11 @@ class Peripherals:
             return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
         return _UNIMPLEMENTED
 
+    def write_bit(self, address: int, mask: int, level: int, cycle: int) -> int:
+        """As `write`, of one bit; the others keep what hardware has set meanwhile."""
+        value = self.read(address, cycle)
+        return self.write(address, value | mask if level else value & (0xFF ^ mask), cycle)
+
     def write(self, address: int, value: int, cycle: int) -> int:
         """A register that is no port; `cycle` is the first to see it. 0 if no event comes sooner by it."""
         self.sync(cycle)
@@ -397,18 +402,17 @@ class Peripherals:
         """A register of timers 0 and 1. 0 if no event comes sooner by it."""
         if not self.timer1_free:
             self.settle()
-        timers = self.timers
-        timers.sync(cycle)
+        self.timers.sync(cycle)
         sooner = 0
         if address == _TCON:
-            hastened = timers.write_control(value, cycle)
+            hastened = self.timers.write_control(value, cycle)
             if (value ^ self.external.control) & 0x0F:
                 self.external.write(value, cycle)
                 sooner = 1
         elif address == _TMOD:
-            hastened = timers.write_mode(value)
+            hastened = self.timers.write_mode(value)
         else:
-            hastened = timers.write(address - _TL0, value)
+            hastened = self.timers.write(address - _TL0, value)
         if hastened:
             self._note_timers()
         if not self.timer1_free:

@@ -24,22 +24,27 @@ cdef class Timers:
     cdef int on_pins
     cdef int steady
     cdef long long start[3]
-    cdef int count[3]
     cdef int top[3]
     cdef long long due
 
     @cython.locals(timer=int)
     cpdef void clear(self, long long cycle) noexcept
     cpdef void sync(self, long long cycle) noexcept
+    @cython.locals(part=int, mode=int)
     cdef void _set_mode(self, int tmod) noexcept
     @cython.locals(split=int, stands=int, open0=int, open1=int)
     cdef void _note_gates(self) noexcept
-    @cython.locals(counting=int, steady=int, changed=int, part=int)
+    @cython.locals(counting=int, steady=int, changed=int)
     cdef void _note_counting(self) noexcept
+    cdef void _turn(self, int part, int on) noexcept
     @cython.locals(overflow='long long')
     cdef inline void _begin(self, int part) noexcept
     cdef inline int mode(self, int timer) noexcept
     cdef inline int counts_pin(self, int timer) noexcept
+    @cython.locals(mode=int)
+    cdef inline int value(self, int part) noexcept
+    @cython.locals(mode=int)
+    cdef inline void _put(self, int part, int count) noexcept
     cdef inline int reload(self, int part) noexcept
     cdef int span(self, int part) noexcept
     cdef inline long long next_overflow(self, int part) noexcept
@@ -61,13 +66,9 @@ cdef class Timers:
     cdef void _pass(self, long long cycle) noexcept
     @cython.locals(beyond='long long', span='long long', overflows='long long')
     cdef void _pass_cycles(self, int part, long long cycle) noexcept
-    @cython.locals(fall='long long')
+    @cython.locals(fall='long long', count=int)
     cdef void _pass_fall(self, int part, long long cycle) noexcept
-    @cython.locals(mode=int)
-    cdef inline void _fetch(self, int timer) noexcept
-    @cython.locals(mode=int, count=int)
     cdef inline void _store(self, int timer) noexcept
-    cdef inline int _count(self, int part) noexcept
     cpdef void store(self) noexcept
     @cython.locals(timer=int)
     cdef void _overflowed(self, int part, long long overflows, long long cycle) noexcept

@@ -28,7 +28,7 @@ class Timers:
     """Timers 0 and 1. Index 0 and 1 are the timers, 2 is TH0 when mode 3 splits it off.
 
     A part that counts cycles is not stepped: it stands at `synced` - `start`, until it overflows. TL and TH follow when
-    they are read, written or saved (`store`).
+    it stops, and when they are read, written or saved (`store`).
     """
 
     STATE = {
@@ -44,7 +44,7 @@ class Timers:
     NOT_STATE = (
         "interrupts",
         *("counts_always", "counts_by_tr0", "counts_by_tr1", "counting", "on_pins", "steady"),
-        *("start", "count", "top", "due"),
+        *("start", "top", "due"),
     )  # all but the first follow from TMOD, TCON, the gates, TL and TH
 
     def __init__(self, interrupts: Interrupts) -> None:
@@ -65,7 +65,6 @@ class Timers:
         self.on_pins = 0  # a bit per part that counts falls of a pin
         self.steady = 0  # a bit per part that counts cycles
         self.start = [0] * 3  # cycle in which a part that counts cycles would have stood at 0
-        self.count = [0] * 3  # of the others, as wide as the mode makes it
         self.top = [0] * 3  # the count that overflows
         self.due = _NEVER  # no overflow and no fall that counts comes before this cycle
         self._set_mode(0)
@@ -95,8 +94,9 @@ class Timers:
         self.steady = 0
         self.due = _NEVER
         self.on_pins = self.counts_pin(0) | self.counts_pin(1) << 1
-        self._fetch(0)
-        self._fetch(1)
+        for part in range(3):
+            mode = 2 if part == 2 else self.mode(part)
+            self.top[part] = 0x2000 if mode == 0 else 0x10000 if mode == 1 else 0x100
         self._note_gates()
 
     def _note_gates(self) -> None:
@@ -122,17 +122,24 @@ class Timers:
             self.due = self.synced  # a fall may wait
         steady = counting & ~self.on_pins
         changed = steady ^ self.steady
-        for part in range(3 if changed else 0):
-            if changed >> part & 1:
-                if steady >> part & 1:
-                    self._begin(part)
-                else:
-                    self.count[part] = self.synced - self.start[part]
+        if changed & 1:
+            self._turn(0, steady & 1)
+        if changed & 2:
+            self._turn(1, steady & 2)
+        if changed & 4:
+            self._turn(2, steady & 4)
         self.steady = steady
+
+    def _turn(self, part: int, on: int) -> None:
+        """It begins to count cycles, or stops."""
+        if on:
+            self._begin(part)
+        else:
+            self._put(part, self.synced - self.start[part])
 
     def _begin(self, part: int) -> None:
         """From now on it counts cycles."""
-        self.start[part] = self.synced - self.count[part]
+        self.start[part] = self.synced - self.value(part)
         overflow = self.start[part] + self.top[part] - 1
         if overflow < self.due:
             self.due = overflow
@@ -142,6 +149,31 @@ class Timers:
 
     def counts_pin(self, timer: int) -> int:
         return (self.tmod >> (4 * timer + 2)) & 1
+
+    def value(self, part: int) -> int:
+        """The count in TL and TH, as wide as the mode makes it."""
+        if part == 2:
+            return self.th[0]
+        mode = self.mode(part)
+        if mode == 1:
+            return (self.th[part] << 8) | self.tl[part]
+        if mode == 0:
+            return (self.th[part] << 5) | (self.tl[part] & 0x1F)
+        return self.tl[part]
+
+    def _put(self, part: int, count: int) -> None:
+        """TL.7:5 are indeterminate in mode 0 (4316E section 2.9); chosen: they keep what was written there."""
+        mode = 2 if part == 2 else self.mode(part)
+        if mode == 1:
+            self.tl[part] = count & 0xFF
+            self.th[part] = count >> 8
+        elif mode == 0:
+            self.tl[part] = (self.tl[part] & 0xE0) | (count & 0x1F)
+            self.th[part] = count >> 5
+        elif part == 2:
+            self.th[0] = count
+        else:
+            self.tl[part] = count
 
     def reload(self, part: int) -> int:
         """The count that an overflow leaves."""
@@ -155,7 +187,7 @@ class Timers:
         """Cycle of the next overflow if nothing changes, or NEVER_TICK. A counter is known one edge ahead only."""
         if self.steady >> part & 1:
             return self.start[part] + self.top[part] - 1
-        if self.counting >> part & 1 and self.top[part] - self.count[part] == 1:
+        if self.counting >> part & 1 and self.top[part] - self.value(part) == 1:
             return self.next_fall(part)
         return _NEVER
 
@@ -199,8 +231,11 @@ class Timers:
             self.th[timer] = value
         else:
             self.tl[timer] = value
-        self._fetch(timer)
+        if self.steady >> timer & 1:
+            self._begin(timer)
         if self.mode(0) == 3:
+            if timer == 0 and self.steady & 4:
+                self._begin(2)
             return _TIMER0 | _TIMER1
         return _TIMER0 << (2 * timer) if self.counting >> timer & 1 else 0
 
@@ -262,48 +297,17 @@ class Timers:
     def _pass_fall(self, part: int, cycle: int) -> None:
         fall = self.edge_cycle[part]
         if self.synced <= fall < cycle:
-            self.count[part] += 1
-            if self.count[part] == self.top[part]:
-                self.count[part] = self.reload(part)
+            count = self.value(part) + 1
+            if count == self.top[part]:
+                count = self.reload(part)
                 self._overflowed(part, 1, fall)
-
-    def _fetch(self, timer: int) -> None:
-        """The count from TL and TH."""
-        mode = self.mode(timer)
-        if mode == 0:
-            self.top[timer] = 0x2000
-            self.count[timer] = (self.th[timer] << 5) | (self.tl[timer] & 0x1F)
-        elif mode == 1:
-            self.top[timer] = 0x10000
-            self.count[timer] = (self.th[timer] << 8) | self.tl[timer]
-        else:
-            self.top[timer] = 0x100
-            self.count[timer] = self.tl[timer]
-            if timer == 0:
-                self.top[2] = 0x100
-                self.count[2] = self.th[0]
-        if self.steady >> timer & 1:
-            self._begin(timer)
-        if timer == 0 and self.steady & 4:
-            self._begin(2)
+            self._put(part, count)
 
     def _store(self, timer: int) -> None:
-        """TL.7:5 are indeterminate in mode 0 (4316E section 2.9); chosen: they keep what was written there."""
-        mode = self.mode(timer)
-        count = self._count(timer)
-        if mode == 0:
-            self.tl[timer] = (self.tl[timer] & 0xE0) | (count & 0x1F)
-            self.th[timer] = count >> 5
-        elif mode == 1:
-            self.tl[timer] = count & 0xFF
-            self.th[timer] = count >> 8
-        else:
-            self.tl[timer] = count
-            if timer == 0 and mode == 3:
-                self.th[0] = self._count(2)
-
-    def _count(self, part: int) -> int:
-        return self.synced - self.start[part] if self.steady >> part & 1 else self.count[part]
+        if self.steady >> timer & 1:
+            self._put(timer, self.synced - self.start[timer])
+        if timer == 0 and self.steady & 4:
+            self._put(2, self.synced - self.start[2])
 
     def store(self) -> None:
         """Brings TL and TH up to where the counts are."""
