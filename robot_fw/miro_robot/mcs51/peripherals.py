@@ -377,7 +377,10 @@ class Peripherals:
     def write_bit(self, address: int, mask: int, level: int, cycle: int) -> int:
         """As `write`, of one bit; the others keep what hardware has set meanwhile."""
         value = self.read(address, cycle)
-        return self.write(address, value | mask if level else value & (0xFF ^ mask), cycle)
+        value = value | mask if level else value & (0xFF ^ mask)
+        if address == _TCON:
+            return self._write_timer(address, value, cycle)
+        return self.write(address, value, cycle)
 
     def write(self, address: int, value: int, cycle: int) -> int:
         """A register that is no port; `cycle` is the first to see it. 0 if no event comes sooner by it."""
