@@ -13,7 +13,7 @@ cdef class Executor(Core):
     @cython.locals(stopped=int)
     cpdef int run(self, long long until_cycle) except -1
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
-                   pc='long long', line='unsigned long long', row=int, op=int, first=int, second=int, address=int, value=int)
+                   pc='long long', line='unsigned long long', row=int, at='long long', address=int, value=int)
     cpdef int go_on(self, long long until_cycle) except -1
 
     @cython.final

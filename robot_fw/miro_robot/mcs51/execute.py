@@ -8,7 +8,8 @@ instruction's first cycle, `start`; results are written at the end of its last, 
 with `limit` once per instruction and knows nothing else about time.
 
 The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
-(`miro_exact.threaded`); what the head asks has to be rare.
+(`miro_exact.threaded`); what the head asks has to be rare. Operands are read where they are needed: `rom[at + 1]` and
+`rom[at + 2]`.
 """
 
 from __future__ import annotations
@@ -60,10 +61,8 @@ class Executor(Core):
                 pc = self.pc
                 continue
             self.at = pc
+            at = pc
             line = self.lines[pc]
-            op = rom[pc]
-            first = rom[pc + 1]
-            second = rom[pc + 2]
             if line & 0x1800:  # no opcode's: a breakpoint, or outside the image
                 if line & _BREAKPOINT:
                     self.stop = BREAKPOINT
@@ -79,28 +78,28 @@ class Executor(Core):
             if row == 0x00:  # NOP
                 pass
             elif row == 0x01:  # AJMP addr11
-                pc = (pc & 0xF800) | ((op & 0xE0) << 3) | first
+                pc = (pc & 0xF800) | ((rom[at] & 0xE0) << 3) | rom[at + 1]
             elif row == 0x02:  # LJMP addr16
-                pc = (first << 8) | second
+                pc = (rom[at + 1] << 8) | rom[at + 2]
             elif row == 0x03:  # RR A
                 self.a = (self.a >> 1) | ((self.a & 1) << 7)
             elif row == 0x04:  # INC A
                 self.a = (self.a + 1) & 0xFF
             elif row == 0x05:  # INC dir
-                self.write(first, (self.read_latched(first) + 1) & 0xFF)
+                self.write(rom[at + 1], (self.read_latched(rom[at + 1]) + 1) & 0xFF)
             elif row == 0x06:  # INC @Ri
-                address = iram[self.bank + (op & 1)]
+                address = iram[self.bank + (rom[at] & 1)]
                 iram[address] = (iram[address] + 1) & 0xFF
             elif row == 0x08:  # INC Rn
-                iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] + 1) & 0xFF
+                iram[self.bank + (rom[at] & 7)] = (iram[self.bank + (rom[at] & 7)] + 1) & 0xFF
             elif row == 0x10:  # JBC bit,rel
-                if self.latched_bit(first):
-                    self.write_bit(first, 0)
-                    pc = self.branch(pc, second)
+                if self.latched_bit(rom[at + 1]):
+                    self.write_bit(rom[at + 1], 0)
+                    pc = self.branch(pc, rom[at + 2])
             elif row == 0x11:  # ACALL addr11
-                pc = self.call(pc, (pc & 0xF800) | ((op & 0xE0) << 3) | first)
+                pc = self.call(pc, (pc & 0xF800) | ((rom[at] & 0xE0) << 3) | rom[at + 1])
             elif row == 0x12:  # LCALL addr16
-                pc = self.call(pc, (first << 8) | second)
+                pc = self.call(pc, (rom[at + 1] << 8) | rom[at + 2])
             elif row == 0x13:  # RRC A
                 value = self.a
                 self.a = (value >> 1) | (self.cy << 7)
@@ -108,31 +107,31 @@ class Executor(Core):
             elif row == 0x14:  # DEC A
                 self.a = (self.a - 1) & 0xFF
             elif row == 0x15:  # DEC dir
-                self.write(first, (self.read_latched(first) - 1) & 0xFF)
+                self.write(rom[at + 1], (self.read_latched(rom[at + 1]) - 1) & 0xFF)
             elif row == 0x16:  # DEC @Ri
-                address = iram[self.bank + (op & 1)]
+                address = iram[self.bank + (rom[at] & 1)]
                 iram[address] = (iram[address] - 1) & 0xFF
             elif row == 0x18:  # DEC Rn
-                iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] - 1) & 0xFF
+                iram[self.bank + (rom[at] & 7)] = (iram[self.bank + (rom[at] & 7)] - 1) & 0xFF
             elif row == 0x20:  # JB bit,rel
-                if self.read_bit(first):
-                    pc = self.branch(pc, second)
+                if self.read_bit(rom[at + 1]):
+                    pc = self.branch(pc, rom[at + 2])
             elif row == 0x22:  # RET
                 value = self.pop() << 8
                 pc = value | self.pop()
             elif row == 0x23:  # RL A
                 self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
             elif row == 0x24:  # ADD A,#imm
-                self.add(first, 0)
+                self.add(rom[at + 1], 0)
             elif row == 0x25:  # ADD A,dir
-                self.add(self.read(first), 0)
+                self.add(self.read(rom[at + 1]), 0)
             elif row == 0x26:  # ADD A,@Ri
-                self.add(iram[iram[self.bank + (op & 1)]], 0)
+                self.add(iram[iram[self.bank + (rom[at] & 1)]], 0)
             elif row == 0x28:  # ADD A,Rn
-                self.add(iram[self.bank + (op & 7)], 0)
+                self.add(iram[self.bank + (rom[at] & 7)], 0)
             elif row == 0x30:  # JNB bit,rel
-                if not self.read_bit(first):
-                    pc = self.branch(pc, second)
+                if not self.read_bit(rom[at + 1]):
+                    pc = self.branch(pc, rom[at + 2])
             elif row == 0x32:  # RETI
                 value = self.pop() << 8
                 pc = value | self.pop()
@@ -142,106 +141,106 @@ class Executor(Core):
                 self.a = ((value << 1) & 0xFF) | self.cy
                 self.cy = value >> 7
             elif row == 0x34:  # ADDC A,#imm
-                self.add(first, self.cy)
+                self.add(rom[at + 1], self.cy)
             elif row == 0x35:  # ADDC A,dir
-                value = self.read(first)  # which may be PSW: CY is taken after
+                value = self.read(rom[at + 1])  # which may be PSW: CY is taken after
                 self.add(value, self.cy)
             elif row == 0x36:  # ADDC A,@Ri
-                self.add(iram[iram[self.bank + (op & 1)]], self.cy)
+                self.add(iram[iram[self.bank + (rom[at] & 1)]], self.cy)
             elif row == 0x38:  # ADDC A,Rn
-                self.add(iram[self.bank + (op & 7)], self.cy)
+                self.add(iram[self.bank + (rom[at] & 7)], self.cy)
             elif row == 0x40:  # JC rel
                 if self.cy:
-                    pc = self.branch(pc, first)
+                    pc = self.branch(pc, rom[at + 1])
             elif row == 0x42:  # ORL dir,A
-                self.write(first, self.read_latched(first) | self.a)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) | self.a)
             elif row == 0x43:  # ORL dir,#imm
-                self.write(first, self.read_latched(first) | second)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) | rom[at + 2])
             elif row == 0x44:  # ORL A,#imm
-                self.a |= first
+                self.a |= rom[at + 1]
             elif row == 0x45:  # ORL A,dir
-                self.a |= self.read(first)
+                self.a |= self.read(rom[at + 1])
             elif row == 0x46:  # ORL A,@Ri
-                self.a |= iram[iram[self.bank + (op & 1)]]
+                self.a |= iram[iram[self.bank + (rom[at] & 1)]]
             elif row == 0x48:  # ORL A,Rn
-                self.a |= iram[self.bank + (op & 7)]
+                self.a |= iram[self.bank + (rom[at] & 7)]
             elif row == 0x50:  # JNC rel
                 if not self.cy:
-                    pc = self.branch(pc, first)
+                    pc = self.branch(pc, rom[at + 1])
             elif row == 0x52:  # ANL dir,A
-                self.write(first, self.read_latched(first) & self.a)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) & self.a)
             elif row == 0x53:  # ANL dir,#imm
-                self.write(first, self.read_latched(first) & second)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) & rom[at + 2])
             elif row == 0x54:  # ANL A,#imm
-                self.a &= first
+                self.a &= rom[at + 1]
             elif row == 0x55:  # ANL A,dir
-                self.a &= self.read(first)
+                self.a &= self.read(rom[at + 1])
             elif row == 0x56:  # ANL A,@Ri
-                self.a &= iram[iram[self.bank + (op & 1)]]
+                self.a &= iram[iram[self.bank + (rom[at] & 1)]]
             elif row == 0x58:  # ANL A,Rn
-                self.a &= iram[self.bank + (op & 7)]
+                self.a &= iram[self.bank + (rom[at] & 7)]
             elif row == 0x60:  # JZ rel
                 if self.a == 0:
-                    pc = self.branch(pc, first)
+                    pc = self.branch(pc, rom[at + 1])
             elif row == 0x62:  # XRL dir,A
-                self.write(first, self.read_latched(first) ^ self.a)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) ^ self.a)
             elif row == 0x63:  # XRL dir,#imm
-                self.write(first, self.read_latched(first) ^ second)
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) ^ rom[at + 2])
             elif row == 0x64:  # XRL A,#imm
-                self.a ^= first
+                self.a ^= rom[at + 1]
             elif row == 0x65:  # XRL A,dir
-                self.a ^= self.read(first)
+                self.a ^= self.read(rom[at + 1])
             elif row == 0x66:  # XRL A,@Ri
-                self.a ^= iram[iram[self.bank + (op & 1)]]
+                self.a ^= iram[iram[self.bank + (rom[at] & 1)]]
             elif row == 0x68:  # XRL A,Rn
-                self.a ^= iram[self.bank + (op & 7)]
+                self.a ^= iram[self.bank + (rom[at] & 7)]
             elif row == 0x70:  # JNZ rel
                 if self.a != 0:
-                    pc = self.branch(pc, first)
+                    pc = self.branch(pc, rom[at + 1])
             elif row == 0x72:  # ORL C,bit
-                self.cy |= self.read_bit(first)
+                self.cy |= self.read_bit(rom[at + 1])
             elif row == 0x73:  # JMP @A+DPTR
                 pc = self.fork((self.a + self.dptr) & 0xFFFF)
             elif row == 0x74:  # MOV A,#imm
-                self.a = first
+                self.a = rom[at + 1]
             elif row == 0x75:  # MOV dir,#imm
-                self.write(first, second)
+                self.write(rom[at + 1], rom[at + 2])
             elif row == 0x76:  # MOV @Ri,#imm
-                iram[iram[self.bank + (op & 1)]] = first
+                iram[iram[self.bank + (rom[at] & 1)]] = rom[at + 1]
             elif row == 0x78:  # MOV Rn,#imm
-                iram[self.bank + (op & 7)] = first
+                iram[self.bank + (rom[at] & 7)] = rom[at + 1]
             elif row == 0x80:  # SJMP rel
-                pc = self.branch(pc, first)
+                pc = self.branch(pc, rom[at + 1])
             elif row == 0x82:  # ANL C,bit
-                self.cy &= self.read_bit(first)
+                self.cy &= self.read_bit(rom[at + 1])
             elif row == 0x83:  # MOVC A,@A+PC
                 self.a = rom[(pc + self.a) & 0xFFFF]
             elif row == 0x84:  # DIV AB
                 self.divide()
             elif row == 0x85:  # MOV dst,src
-                self.write(second, self.read(first))
+                self.write(rom[at + 2], self.read(rom[at + 1]))
             elif row == 0x86:  # MOV dir,@Ri
-                self.write(first, iram[iram[self.bank + (op & 1)]])
+                self.write(rom[at + 1], iram[iram[self.bank + (rom[at] & 1)]])
             elif row == 0x88:  # MOV dir,Rn
-                self.write(first, iram[self.bank + (op & 7)])
+                self.write(rom[at + 1], iram[self.bank + (rom[at] & 7)])
             elif row == 0x90:  # MOV DPTR,#imm16
-                self.dptr = (first << 8) | second
+                self.dptr = (rom[at + 1] << 8) | rom[at + 2]
             elif row == 0x92:  # MOV bit,C
-                self.write_bit(first, self.cy)
+                self.write_bit(rom[at + 1], self.cy)
             elif row == 0x93:  # MOVC A,@A+DPTR
                 self.a = rom[(self.dptr + self.a) & 0xFFFF]
             elif row == 0x94:  # SUBB A,#imm
-                self.subtract(first)
+                self.subtract(rom[at + 1])
             elif row == 0x95:  # SUBB A,dir
-                self.subtract(self.read(first))
+                self.subtract(self.read(rom[at + 1]))
             elif row == 0x96:  # SUBB A,@Ri
-                self.subtract(iram[iram[self.bank + (op & 1)]])
+                self.subtract(iram[iram[self.bank + (rom[at] & 1)]])
             elif row == 0x98:  # SUBB A,Rn
-                self.subtract(iram[self.bank + (op & 7)])
+                self.subtract(iram[self.bank + (rom[at] & 7)])
             elif row == 0xA0:  # ORL C,/bit
-                self.cy |= self.read_bit(first) ^ 1
+                self.cy |= self.read_bit(rom[at + 1]) ^ 1
             elif row == 0xA2:  # MOV C,bit
-                self.cy = self.read_bit(first)
+                self.cy = self.read_bit(rom[at + 1])
             elif row == 0xA3:  # INC DPTR
                 self.dptr = (self.dptr + 1) & 0xFFFF
             elif row == 0xA4:  # MUL AB
@@ -253,98 +252,98 @@ class Executor(Core):
             elif row == 0xA5:  # undefined: runs as NOP (C2)
                 self.fault(_UNDEFINED_OPCODE)
             elif row == 0xA6:  # MOV @Ri,dir
-                value = self.read(first)
-                iram[iram[self.bank + (op & 1)]] = value
+                value = self.read(rom[at + 1])
+                iram[iram[self.bank + (rom[at] & 1)]] = value
             elif row == 0xA8:  # MOV Rn,dir
-                value = self.read(first)
-                iram[self.bank + (op & 7)] = value
+                value = self.read(rom[at + 1])
+                iram[self.bank + (rom[at] & 7)] = value
             elif row == 0xB0:  # ANL C,/bit
-                self.cy &= self.read_bit(first) ^ 1
+                self.cy &= self.read_bit(rom[at + 1]) ^ 1
             elif row == 0xB2:  # CPL bit
-                self.write_bit(first, self.latched_bit(first) ^ 1)
+                self.write_bit(rom[at + 1], self.latched_bit(rom[at + 1]) ^ 1)
             elif row == 0xB3:  # CPL C
                 self.cy ^= 1
             elif row == 0xB4:  # CJNE A,#imm,rel
-                pc = self.compare(pc, self.a, first, second)
+                pc = self.compare(pc, self.a, rom[at + 1], rom[at + 2])
             elif row == 0xB5:  # CJNE A,dir,rel
-                value = self.read(first)
-                pc = self.compare(pc, self.a, value, second)
+                value = self.read(rom[at + 1])
+                pc = self.compare(pc, self.a, value, rom[at + 2])
             elif row == 0xB6:  # CJNE @Ri,#imm,rel
-                pc = self.compare(pc, iram[iram[self.bank + (op & 1)]], first, second)
+                pc = self.compare(pc, iram[iram[self.bank + (rom[at] & 1)]], rom[at + 1], rom[at + 2])
             elif row == 0xB8:  # CJNE Rn,#imm,rel
-                pc = self.compare(pc, iram[self.bank + (op & 7)], first, second)
-            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one (C4)
+                pc = self.compare(pc, iram[self.bank + (rom[at] & 7)], rom[at + 1], rom[at + 2])
+            elif row == 0xC0:  # PUSH dir: SP counts rom[at + 1], so PUSH SP stores the new one (C4)
                 self.claim()
-                value = self.read(first)
+                value = self.read(rom[at + 1])
                 iram[self.sp] = value
             elif row == 0xC2:  # CLR bit
-                self.write_bit(first, 0)
+                self.write_bit(rom[at + 1], 0)
             elif row == 0xC3:  # CLR C
                 self.cy = 0
             elif row == 0xC4:  # SWAP A
                 self.a = ((self.a << 4) & 0xF0) | (self.a >> 4)
             elif row == 0xC5:  # XCH A,dir
-                value = self.read(first)
+                value = self.read(rom[at + 1])
                 address = self.a
                 self.a = value
-                self.write(first, address)
+                self.write(rom[at + 1], address)
             elif row == 0xC6:  # XCH A,@Ri
-                address = iram[self.bank + (op & 1)]
+                address = iram[self.bank + (rom[at] & 1)]
                 value = iram[address]
                 iram[address] = self.a
                 self.a = value
             elif row == 0xC8:  # XCH A,Rn
-                value = iram[self.bank + (op & 7)]
-                iram[self.bank + (op & 7)] = self.a
+                value = iram[self.bank + (rom[at] & 7)]
+                iram[self.bank + (rom[at] & 7)] = self.a
                 self.a = value
-            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped (C4)
+            elif row == 0xD0:  # POP dir: SP counts rom[at + 1], so POP SP ends with the byte popped (C4)
                 value = self.pop()
-                self.write(first, value)
+                self.write(rom[at + 1], value)
             elif row == 0xD2:  # SETB bit
-                self.write_bit(first, 1)
+                self.write_bit(rom[at + 1], 1)
             elif row == 0xD3:  # SETB C
                 self.cy = 1
             elif row == 0xD4:  # DA A
                 self.decimal_adjust()
             elif row == 0xD5:  # DJNZ dir,rel
-                value = (self.read_latched(first) - 1) & 0xFF
-                self.write(first, value)
+                value = (self.read_latched(rom[at + 1]) - 1) & 0xFF
+                self.write(rom[at + 1], value)
                 if value:
-                    pc = self.branch(pc, second)
+                    pc = self.branch(pc, rom[at + 2])
             elif row == 0xD6:  # XCHD A,@Ri
-                address = iram[self.bank + (op & 1)]
+                address = iram[self.bank + (rom[at] & 1)]
                 value = iram[address]
                 iram[address] = (value & 0xF0) | (self.a & 0x0F)
                 self.a = (self.a & 0xF0) | (value & 0x0F)
             elif row == 0xD8:  # DJNZ Rn,rel
-                value = (iram[self.bank + (op & 7)] - 1) & 0xFF
-                iram[self.bank + (op & 7)] = value
+                value = (iram[self.bank + (rom[at] & 7)] - 1) & 0xFF
+                iram[self.bank + (rom[at] & 7)] = value
                 if value:
-                    pc = self.branch(pc, first)
+                    pc = self.branch(pc, rom[at + 1])
             elif row == 0xE0:  # MOVX A,@DPTR
                 self.a = self.movx_read(self.dptr)
             elif row == 0xE2:  # MOVX A,@Ri
-                self.a = self.movx_read(self.page() | iram[self.bank + (op & 1)])
+                self.a = self.movx_read(self.page() | iram[self.bank + (rom[at] & 1)])
             elif row == 0xE4:  # CLR A
                 self.a = 0
             elif row == 0xE5:  # MOV A,dir
-                self.a = self.read(first)
+                self.a = self.read(rom[at + 1])
             elif row == 0xE6:  # MOV A,@Ri
-                self.a = iram[iram[self.bank + (op & 1)]]
+                self.a = iram[iram[self.bank + (rom[at] & 1)]]
             elif row == 0xE8:  # MOV A,Rn
-                self.a = iram[self.bank + (op & 7)]
+                self.a = iram[self.bank + (rom[at] & 7)]
             elif row == 0xF0:  # MOVX @DPTR,A
                 self.movx_write(self.dptr, self.a)
             elif row == 0xF2:  # MOVX @Ri,A
-                self.movx_write(self.page() | iram[self.bank + (op & 1)], self.a)
+                self.movx_write(self.page() | iram[self.bank + (rom[at] & 1)], self.a)
             elif row == 0xF4:  # CPL A
                 self.a ^= 0xFF
             elif row == 0xF5:  # MOV dir,A
-                self.write(first, self.a)
+                self.write(rom[at + 1], self.a)
             elif row == 0xF6:  # MOV @Ri,A
-                iram[iram[self.bank + (op & 1)]] = self.a
+                iram[iram[self.bank + (rom[at] & 1)]] = self.a
             elif row == 0xF8:  # MOV Rn,A
-                iram[self.bank + (op & 7)] = self.a
+                iram[self.bank + (rom[at] & 7)] = self.a
         self.pc = pc
         self.instructions = count
         return self.stop
