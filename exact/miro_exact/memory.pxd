@@ -17,10 +17,11 @@ cdef struct Place:
 cdef class Memory:
     cdef Place *places
     cdef Py_ssize_t number
-    cdef Place *spans  # what is put in one go: fields that are neighbours
+    cdef Place *spans  # what is copied in one go: fields that are neighbours
     cdef Py_ssize_t span_count
+    cdef Py_ssize_t *looked_at  # before packing: the places that are queues or may hold NaN
+    cdef Py_ssize_t looked_at_count
     cdef Py_ssize_t fixed  # bytes of all that are no queues
-    cdef bint queues  # whether there are any
     cdef readonly tuple names
     cdef object parts
     cdef bytes data
@@ -31,7 +32,7 @@ cdef class Memory:
     cpdef put(self)
     cdef int join(self) except -1
     cdef Py_ssize_t size(self) except -1
-    cdef int write(self, char *to) except -1
+    cdef void write(self, char *to) noexcept
     cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1
 
 

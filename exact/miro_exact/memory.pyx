@@ -64,7 +64,8 @@ cdef class Memory:
         cdef Place *place
         self.number = len(fields)
         self.places = <Place *>PyMem_Calloc(max(1, self.number), sizeof(Place))
-        if self.places == NULL:
+        self.looked_at = <Py_ssize_t *>PyMem_Calloc(max(1, self.number), sizeof(Py_ssize_t))
+        if self.places == NULL or self.looked_at == NULL:
             raise MemoryError
         self.parts = [field[0] for field in fields]
         self.names = tuple(field[1] for field in fields)
@@ -84,9 +85,11 @@ cdef class Memory:
             if end is None:
                 self.fixed += place.size * place.count
             else:
-                self.queues = True
                 place.end = <char *><size_t>end[0]
                 place.end_size = end[1]
+            if end is not None or code == "d":
+                self.looked_at[self.looked_at_count] = index
+                self.looked_at_count += 1
         self.join()
 
     cdef int join(self) except -1:
@@ -112,16 +115,22 @@ cdef class Memory:
     def __dealloc__(self):
         PyMem_Free(self.places)
         PyMem_Free(self.spans)
+        PyMem_Free(self.looked_at)
 
     cdef Py_ssize_t size(self) except -1:
-        cdef Py_ssize_t index, total = self.fixed
+        """Bytes of the fields. Raises DomainError for NaN, ValueError for a queue that is too long, with its name."""
+        cdef Py_ssize_t look, index, item, total = self.fixed
         cdef long long count
+        cdef double real
         cdef Place *place
-        if not self.queues:
-            return total
-        for index in range(self.number):
+        for look in range(self.looked_at_count):
+            index = self.looked_at[look]
             place = &self.places[index]
             if place.end == NULL:
+                for item in range(place.count):
+                    memcpy(&real, place.at + 8 * item, 8)
+                    if real != real:
+                        raise DomainError(f"{self.names[index]} is NaN")
                 continue
             count = length(place.end, place.end_size)
             if count < 0 or count > place.count:
@@ -130,36 +139,26 @@ cdef class Memory:
         return total
 
     cpdef bytes pack(self):
-        """The fields as flat bytes. Raises DomainError for NaN, with the name of the field."""
+        """The fields as flat bytes. Raises as `size` does."""
         cdef bytes data = PyBytes_FromStringAndSize(NULL, self.size())
         self.write(PyBytes_AS_STRING(data))
         return data
 
-    cdef int write(self, char *to) except -1:
-        """Puts the fields there; `size` says how many bytes they are."""
-        cdef Py_ssize_t index, item
-        cdef long long count
+    cdef void write(self, char *to) noexcept:
+        """Puts the fields there, after `size` has found them good."""
+        cdef Py_ssize_t index, count
         cdef unsigned int written
-        cdef double real
-        cdef Place *place
-        for index in range(self.number):
-            place = &self.places[index]
-            if place.end == NULL:
-                copy(to, place.at, place.size, place.count)
-                if place.code == c"d":
-                    for item in range(place.count):
-                        memcpy(&real, place.at + 8 * item, 8)
-                        if real != real:
-                            raise DomainError(f"{self.names[index]} is NaN")
-                to += place.size * place.count
-                continue
-            count = length(place.end, place.end_size)
-            written = <unsigned int>count
-            copy(to, <char *>&written, 4, 1)
-            to += 4
-            copy(to, place.at, place.size, count)
-            to += place.size * count
-        return 0
+        cdef Place *span
+        for index in range(self.span_count):
+            span = &self.spans[index]
+            count = span.count
+            if span.end != NULL:
+                count = length(span.end, span.end_size)
+                written = <unsigned int>count
+                copy(to, <char *>&written, 4, 1)
+                to += 4
+            copy(to, span.at, span.size, count)
+            to += span.size * count
 
     cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1:
         """Where what `pack` gave ends in `data`. Raises ValueError for bytes that cannot be put, and puts nothing."""
