@@ -19,12 +19,15 @@ cdef class Stream:
     cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
     cdef long long group
     cdef unsigned int draws[16]
+    cdef unsigned int least
 
     cdef void load(self, u64_t block) noexcept
     @cython.locals(four='unsigned int[16]', at='long long', lane=int)
     cdef void blocks(self, u64_t first, int count, unsigned int *words) noexcept
     @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, lane=int, _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
     cdef void _four_blocks(self, u64_t first, unsigned int *four) noexcept
+    @cython.locals(place=int)
+    cdef void _load_draws(self, long long group) noexcept
     cdef inline u64_t _draw(self, long long index) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1

@@ -87,6 +87,7 @@ class Stream:
         self.w0 = self.w1 = self.w2 = self.w3 = 0
         self.group = -1  # number of the 16 draws of `u32` that are in `draws`
         self.draws = [0] * 16
+        self.least = 0  # of them
 
     def __repr__(self) -> str:
         return f"Stream({self.seed}, {self.name!r})"
@@ -146,9 +147,15 @@ class Stream:
     def _draw(self, index: int) -> int:
         """`u32`; the sixteen draws that are worked out at once stay there as a cache."""
         if index >> 4 != self.group:
-            self.group = index >> 4
-            self._four_blocks(self.group << 2, self.draws)
+            self._load_draws(index >> 4)
         return self.draws[(index & 3) << 2 | (index >> 2) & 3]
+
+    def _load_draws(self, group: int) -> None:
+        self._four_blocks(group << 2, self.draws)
+        self.group = group
+        self.least = self.draws[0]
+        for place in range(1, 16):
+            self.least = min(self.least, self.draws[place])
 
     def below(self, index: int, threshold: int) -> bool:
         """True with probability threshold / 2^32 (threshold 0 .. 2^32); the draw is `u32(index)`."""
@@ -160,9 +167,16 @@ class Stream:
             raise ValueError(f"{self!r}: indices {index} .. {end} are outside 0 .. 2^56 - 1")
         if threshold == 0:
             return end
-        while index < end and self._draw(index) >= threshold:
-            index += 1
-        return index
+        while index < end:
+            if index >> 4 != self.group:
+                self._load_draws(index >> 4)
+            if self.least >= threshold:
+                index = (index >> 4) + 1 << 4
+            elif self._draw(index) >= threshold:
+                index += 1
+            else:
+                return index
+        return end
 
     def u64(self, index: int) -> int:
         """64 random bits."""

@@ -20,8 +20,8 @@ cdef class Pilot:
 
 cpdef check_answer(answer, tuple inner)
 cpdef check_estimate(estimate, tuple inner)
-@cython.locals(name=str)
 cdef dict _in_order(values, tuple declared)
+@cython.locals(known=cython.bint)
 cdef int _check_inner(values, tuple declared) except -1
 @cython.locals(real=double)
 cdef int _check(name, value) except -1

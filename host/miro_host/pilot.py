@@ -27,7 +27,7 @@ from miro_host.wheels import Wheels
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
 
-class WheelCommand(msgspec.Struct, frozen=True):
+class WheelCommand(msgspec.Struct, frozen=True, gc=False):
     """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the values that law and estimator name.
 
     `left`, `right` in 1/256 count per LM629 sample, for wheels whose radii are the nominal one times `left_factor` and
@@ -242,7 +242,10 @@ def _in_order(values: Mapping[str, float], declared: tuple[str, ...]) -> Mapping
 
 
 def _check_inner(values: Mapping[str, float], declared: tuple[str, ...]) -> None:
-    if len(values) != len(declared) or not all(name in values for name in declared):
+    known = len(values) == len(declared)
+    for name in declared:
+        known = known and name in values
+    if not known:
         raise ValueError(f"its inner values are {sorted(values)}, but INNER declares {sorted(declared)}")
     for name, value in values.items():
         _check(name, value)

@@ -3,7 +3,7 @@
 import msgspec
 
 
-class Posture(msgspec.Struct, frozen=True):
+class Posture(msgspec.Struct, frozen=True, gc=False):
     """Position and heading of the robot's centre in world axes, whose origin is the start of the reference.
 
     `theta_rad` is the heading against +X, counter-clockwise positive. A measurement is wrapped to (-pi, pi];

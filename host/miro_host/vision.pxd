@@ -2,20 +2,22 @@
 cimport cython
 from libc cimport math
 from miro_exact cimport dmath
+from miro_exact.rng cimport Stream
 
 cdef double _SIGMAS
 
 cpdef double error_of(double normal, double bound) except? -7.5
 @cython.locals(cells=double)
 cpdef double to_grid(double x, double step) except? -7.5
-@cython.locals(
-    position_m=double, pixel_m=double, x_m=double, y_m=double, theta_rad=double, right=double, up=double, turn=double
-)
 cpdef measure(true, tuple normals, errors)
+@cython.locals(position_m=double, pixel_m=double)
+cdef _measured(double x_m, double y_m, double theta_rad, double right, double up, double turn, errors)
 
 
 cdef class Vision:
     cdef readonly object errors, under_way
     cdef readonly int delay_frames
 
+    @cython.locals(first='long long', x_m=double, y_m=double, theta_rad=double, right=double, up=double, turn=double)
+    cpdef expose(self, tuple true, Stream noise, long long frame)
     cpdef frame(self, true, tuple normals)

@@ -13,6 +13,7 @@ import msgspec
 
 from miro_exact import dmath
 from miro_exact.domain import DomainError
+from miro_exact.rng import Stream
 from miro_exact.state import Rows
 from miro_host.posture import Posture
 
@@ -62,9 +63,14 @@ def measure(true: Posture, normals: tuple[float, float, float], errors: VisionEr
     `normals` are three standard normals for x, y and heading. Off by at most the bound plus half a pixel per
     axis, and by at most the heading bound.
     """
-    position_m, pixel_m = errors.position_m, errors.pixel_m
-    x_m, y_m, theta_rad = true.x_m, true.y_m, true.theta_rad
     right, up, turn = normals
+    return _measured(true.x_m, true.y_m, true.theta_rad, right, up, turn, errors)
+
+
+def _measured(
+    x_m: float, y_m: float, theta_rad: float, right: float, up: float, turn: float, errors: VisionErrors
+) -> Posture:
+    position_m, pixel_m = errors.position_m, errors.pixel_m
     return Posture(
         to_grid(x_m + error_of(right, position_m), pixel_m),
         to_grid(y_m + error_of(up, position_m), pixel_m),
@@ -95,6 +101,14 @@ class Vision:
         return (
             f"Vision({self.errors!r}, delay_frames={self.delay_frames}, under_way={list(self.under_way)!r})"
         )
+
+    def expose(self, true: tuple[float, float, float], noise: Stream, frame: int) -> Posture | None:
+        """The same of a robot at this position and heading, with the draws that belong to frame number `frame`."""
+        x_m, y_m, theta_rad = true
+        first = 3 * frame
+        right, up, turn = noise.gauss(first), noise.gauss(first + 1), noise.gauss(first + 2)
+        self.under_way.append(_measured(x_m, y_m, theta_rad, right, up, turn, self.errors))
+        return self.under_way.popleft()
 
     def frame(self, true: Posture | None, normals: tuple[float, float, float]) -> Posture | None:
         """Expose one frame; returns what the host gets at this tick: an older frame, or None.

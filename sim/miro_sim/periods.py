@@ -19,7 +19,7 @@ RobotId = tuple[int, int]
 """Network and slot of a robot."""
 
 
-class Axis(msgspec.Struct, frozen=True):
+class Axis(msgspec.Struct, frozen=True, gc=False):
     """One LM629 as an observer sees it, in the chip's own units.
 
     `desired_position` and `real_position` in counts (the desired one rounded down), `desired_velocity` in
@@ -36,7 +36,7 @@ class Axis(msgspec.Struct, frozen=True):
     commands: tuple[CommandRecord, ...] = ()
 
 
-class Control(msgspec.Struct, frozen=True):
+class Control(msgspec.Struct, frozen=True, gc=False):
     """What the controller made of one measurement: z_cmd after its limits, the wheel split, and the law's inner values.
 
     `left`, `right` in 1/256 count per LM629 sample, before the control noise of the scenario; `inner` by name, as the
@@ -52,7 +52,7 @@ class Control(msgspec.Struct, frozen=True):
     estimate: dict[str, float] = {}
 
 
-class RobotPeriod(msgspec.Struct, frozen=True):
+class RobotPeriod(msgspec.Struct, frozen=True, gc=False):
     """One robot in one control period.
 
     `truth` has an unwrapped heading. `measurement` is None while the vision delay still fills or a frame
@@ -75,7 +75,7 @@ class RobotPeriod(msgspec.Struct, frozen=True):
     right: Axis
 
 
-class Period(msgspec.Struct, frozen=True):
+class Period(msgspec.Struct, frozen=True, gc=False):
     """Control period `index`, which begins at `tick`; `digest` (hex) chains the states up to its end.
 
     `actions`: what was done to robots and radios meanwhile, as a script or a caller wanted it.

@@ -20,7 +20,7 @@ DEAD_S = 0.028
 """3 ms of computing, 1 ms of key-up, 24 ms on the air in a network of three robots."""
 
 
-class EstimatorInput(msgspec.Struct, frozen=True):
+class EstimatorInput(msgspec.Struct, frozen=True, gc=False):
     """What an estimator is given at `t_s` after the start of the reference.
 
     `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
@@ -40,7 +40,7 @@ class EstimatorInput(msgspec.Struct, frozen=True):
     dead_s: float = DEAD_S
 
 
-class Estimate(msgspec.Struct, frozen=True):
+class Estimate(msgspec.Struct, frozen=True, gc=False):
     """A posture and the time it is to be compared with the reference at.
 
     `left_factor`, `right_factor` are the radii of the wheels over the nominal one: the command is divided by them.

@@ -30,7 +30,7 @@ from miro_host.telemetry_receiver import LastTelemetry
 NOTHING: Mapping[str, float] = {}
 
 
-class LawInput(msgspec.Struct, frozen=True):
+class LawInput(msgspec.Struct, frozen=True, gc=False):
     """What a law is given in one control period.
 
     `t_s` is the time since the start of the reference at which `reference` was evaluated; `path` gives the reference at
@@ -49,7 +49,7 @@ class LawInput(msgspec.Struct, frozen=True):
     telemetry: LastTelemetry | None = None
 
 
-class Accelerations(msgspec.Struct, frozen=True):
+class Accelerations(msgspec.Struct, frozen=True, gc=False):
     """An answer for the integrator of equation (15): z_cmd' in m/s2 and rad/s2, held for one period."""
 
     v_dot_m_s2: float
@@ -57,7 +57,7 @@ class Accelerations(msgspec.Struct, frozen=True):
     inner: Mapping[str, float] = NOTHING
 
 
-class Velocities(msgspec.Struct, frozen=True):
+class Velocities(msgspec.Struct, frozen=True, gc=False):
     """An answer that is z_cmd itself, in m/s and rad/s; the limits of velocity and of its rate apply."""
 
     v_m_s: float
@@ -111,7 +111,7 @@ class Law(Remembering, Generic[P]):
         raise NotImplementedError(f"{type(self).__name__} has no method `step`")
 
 
-class Errors(msgspec.Struct, frozen=True):
+class Errors(msgspec.Struct, frozen=True, gc=False):
     """Where the reference is, seen from the robot, as Kanayama et al. (ICRA 1990) define it.
 
     x ahead, y to the left, theta anticlockwise in (-pi, pi]. They do not depend on where the origin of the world is.

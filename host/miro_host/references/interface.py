@@ -20,7 +20,7 @@ TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
 Cm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 
 
-class Reference(msgspec.Struct, frozen=True):
+class Reference(msgspec.Struct, frozen=True, gc=False):
     """One instant of a reference trajectory.
 
     `w_*` are turning rates in rad/s and rad/s2. `rho_m`, `phi_rad` are the polar coordinates of the posture;

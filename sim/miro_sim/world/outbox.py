@@ -9,8 +9,6 @@ is saved, but no part of the digest: a run does not depend on when it was announ
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import msgspec
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -24,7 +22,7 @@ LONGEST_BYTES = 1 << 20
 """Of one transmission: 18 minutes on the air."""
 
 
-class Waiting(NamedTuple):
+class Waiting(msgspec.Struct, frozen=True, gc=False):
     """A transmission that waits; `origin` is STATION or INJECTED."""
 
     sent: Transmission
@@ -100,8 +98,9 @@ class Outbox:
         if not count or self.waiting[count - 1].sent.end_tick <= sent.tick:  # a long script comes in order
             self.waiting.append(Waiting(sent, INJECTED))
             return
-        for old, origin in self.waiting:
-            if _overlap(old, sent) and (origin == INJECTED or old.tick < sent.tick):
+        for one in self.waiting:
+            old = one.sent
+            if _overlap(old, sent) and (one.origin == INJECTED or old.tick < sent.tick):
                 busy = f"is busy from tick {old.tick} to {old.end_tick}"
                 size = len(sent.data)
                 raise ValueError(
@@ -136,13 +135,14 @@ class Outbox:
     def after_load(self) -> None:
         """Raises ValueError unless each transmission holds a byte at least and none begins within another."""
         free_tick = 0
-        for place, (sent, origin) in enumerate(self.waiting):
+        for place, one in enumerate(self.waiting):
+            sent = one.sent
             if sent.tick < free_tick or not sent.data:
                 raise ValueError(
                     f"{len(sent.data)} characters wait for tick {sent.tick}, behind tick {free_tick}"
                 )
             free_tick = sent.end_tick
-            self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), origin)
+            self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), one.origin)
 
 
 def _overlap(one: Transmission, other: Transmission) -> bool:

@@ -167,7 +167,7 @@ def _control(command: WheelCommand) -> Control:
 
 def _axis(chip: Lm629) -> Axis:
     commands = tuple([(tick, opcode, data.hex()) for tick, opcode, data in chip.commands])
-    chip.commands.clear()
+    del chip.commands[:]
     profile = chip.trajectory
     return Axis(
         profile.position >> 16,

@@ -81,13 +81,12 @@ class GaussianSight:
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """See `Sight`."""
-        found = []
-        first = 3 * self.frame
-        for body, vision, stream in zip(self.bodies, self.visions, self.streams, strict=True):
-            draws = stream.gauss(first), stream.gauss(first + 1), stream.gauss(first + 2)
-            found.append(vision.frame(Posture(*body.drive.pose_at(tick)), draws))
+        frame = self.frame
         self.frame += 1
-        return found
+        return [
+            vision.expose(body.drive.pose_at(tick), stream, frame)
+            for body, vision, stream in zip(self.bodies, self.visions, self.streams, strict=True)
+        ]
 
     def counts(self) -> dict[str, int]:
         """See `Sight`."""
