@@ -165,6 +165,7 @@ def make_machine(
     """The machine that was asked for. Raises BadInput, and errors of the files read."""
     pieces = _pieces(options)
     pins = _pins(options)
+    start = _start(image, options)
     try:
         return BareMachine(
             image,
@@ -177,7 +178,7 @@ def make_machine(
             gap_ticks=_ticks(options.stdin_gap, options) or 0,
             live=live,
             pins=pins,
-            start=_start(image, options),
+            start=start,
         )
     except ValueError as error:
         raise BadInput(

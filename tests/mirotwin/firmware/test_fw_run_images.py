@@ -25,9 +25,14 @@ XRAM = ("--code-in-xram",)
 def test_a_program_that_does_not_begin_at_0_is_named_with_the_place_where_it_does(mirotwin, program):
     code, _, err = mirotwin("fw", "run", program, *XRAM)
     assert code == 2
-    assert f"{program}: has no byte at 0x0000, and the processor starts there; give --start 0x8000" in err
+    assert err.startswith(
+        f"mirotwin: error: {program}: has no byte at 0x0000, and the processor starts there; give"
+    )
+    assert "give --start 0x8000" in err
     code, _, err = mirotwin("fw", "run", program, *XRAM, "--start", "0x9000")
     assert (code, "has no byte at 0x9000, and --start names it" in err) == (2, True)
+    code, _, err = mirotwin("fw", "run", program, *XRAM, "--start", "nowhere")
+    assert (code, err.startswith(f"mirotwin: error: {program}: --start: no symbol nowhere")) == (2, True)
 
 
 def test_it_runs_from_there(mirotwin, program):
