@@ -67,8 +67,10 @@ cdef class Board(Bus):
     @cython.locals(earliest_tick=cython.longlong, latest_tick=cython.longlong, next_tick=cython.longlong)
     cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
-    @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
+    @cython.locals(stopped=cython.int)
     cpdef int run(self, long long until_tick) except -1
+    @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
+    cpdef int go_on(self, long long until_tick) except -1
     @cython.final
     cdef inline long long _next_interrupt(self, Lm629 chip) noexcept
     @cython.locals(now=cython.longlong)

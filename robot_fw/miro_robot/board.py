@@ -183,9 +183,15 @@ class Board(Bus):
 
     def run(self, until_tick: int) -> int:
         """Moves the whole robot on to `until_tick`. Returns 0, or the CPU's reason for stopping early."""
+        self.cpu.begin_run()
+        stopped = self.go_on(until_tick)
+        self.cpu.end_run()
+        return stopped
+
+    def go_on(self, until_tick: int) -> int:
+        """A piece of a run, between `begin_run` and `end_run` of the CPU."""
         stopped = 0
         cpu = self.cpu
-        cpu.begin_run()
         while not stopped and cpu.cycles * CYCLE_TICKS < until_tick:
             horizon = min(until_tick, self._next_interrupt(self.left), self._next_interrupt(self.right))
             self.horizon = horizon
@@ -194,7 +200,6 @@ class Board(Bus):
             if stopped == _REPLAN:
                 stopped = 0
         self.horizon = -1
-        cpu.end_run()
         return stopped
 
     def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:

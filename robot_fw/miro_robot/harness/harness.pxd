@@ -56,10 +56,13 @@ cdef class Harness:
     cdef int _character(self, int value, int bad_stop, long long tick) except -1
     cdef int _reset(self, long long tick) except -1
     cdef int _set_reset(self, int level) except -1
+    @cython.locals(stopped=int)
     cdef int _move(self, long long until) except -1
+    cdef int _go_on(self, long long until) except -1
     @cython.locals(stopped=int)
     cdef int _run(self, long long until) except -1
     @cython.locals(latest='long long')
     cdef int _settle(self, long long tick) except -1
+    @cython.locals(cpu=Cpu, stopped=int, asleep=int)
     cdef bint _falls_asleep(self, long long until) except -1
     cdef bint _faulted(self) noexcept

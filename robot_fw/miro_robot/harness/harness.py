@@ -167,7 +167,7 @@ class Harness:
         """Puts the machine back and sends what the program has read. Returns DONE, STOPPED or AWAKE."""
         first = self._begin(program)
         tick = self.begin_tick + _LEAD + first * 10 * self.bit_ticks
-        waiting = 0
+        waiting = first
         for place in range(first, program.count):
             flaws = program.flaws[place]
             pause = program.pauses[place]
@@ -265,10 +265,17 @@ class Harness:
         return 1 if stopped or self.oracle.code else 0
 
     def _move(self, until: int) -> int:
+        self.cpu.begin_run()
+        stopped = self._go_on(until)
+        self.cpu.end_run()
+        return stopped
+
+    def _go_on(self, until: int) -> int:
+        """A piece of a run, between `begin_run` and `end_run` of the CPU."""
         self.now_tick = until
         if self.board is not None:
-            return self.board.run(until)
-        return self.cpu.run((until + 11) // 12)
+            return self.board.go_on(until)
+        return self.cpu.go_on((until + 11) // 12)
 
     def _settle(self, tick: int) -> int:
         """Until the firmware sleeps and the oracle waits for nothing."""
@@ -284,12 +291,18 @@ class Harness:
 
     def _falls_asleep(self, until: int) -> bool:
         """Whether it does before `until`; no longer than that."""
-        while self.now_tick < until:
-            if self._run(self.now_tick + _LOOK):
-                return False
-            if self.cpu.idle or self.cpu.powered_down:
-                return True
-        return False
+        cpu = self.cpu
+        stopped = 0
+        asleep = 0
+        cpu.begin_run()
+        while self.now_tick < until and not stopped and not asleep:
+            stopped = self._go_on(self.now_tick + _LOOK)
+            cpu.peripherals.sync(cpu.cycles)  # tells of all characters up to now
+            self.oracle.look(self.now_tick)
+            stopped = stopped or self.oracle.code
+            asleep = cpu.idle or cpu.powered_down
+        cpu.end_run()
+        return asleep != 0 and not stopped
 
     def _faulted(self) -> bool:
         return self.board is not None and self.board.fault_count > 0

@@ -11,6 +11,7 @@ from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import FastOracle
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
+from miro_robot.harness.oracle import LiveOracle
 from miro_robot.harness.program import BYTES, FRAMES, SESSION, Program
 from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.plant import Plant
@@ -109,6 +110,34 @@ def played(harness, data, edges, how):
 @example(data=b"\x0a\x00\x00", edges=b"\x00", how=SESSION)
 def test_short_cuts_of_a_harness_change_nothing_that_a_run_shows(harness, step_by_step, data, edges, how):
     assert played(harness, data, edges, how) == played(step_by_step, data, edges, how)
+
+
+class Looks(LiveOracle):
+    """Notes when it is asked to look."""
+
+    NOT_STATE = (*LiveOracle.NOT_STATE, "ticks")
+
+    def __init__(self):
+        super().__init__()
+        self.ticks = []
+
+    def begin(self, tick):
+        self.ticks = []
+
+    def look(self, tick):
+        self.ticks.append(tick)
+
+
+@pytest.mark.parametrize("data", [bytes(5), bytes(60), bytes(5) + b"\x0a\x07" + bytes(60)], ids=len)
+def test_an_oracle_looks_at_the_same_ticks_however_an_input_begins(data):
+    ticks = []
+    for probe in (None, Probe()):
+        board = board_with(load_hex(image_path()))
+        board.probe = probe
+        harness = Harness(board, board.cpu, Looks(), BIT_TICKS, board)
+        harness.play(program(data))
+        ticks.append(harness.oracle.ticks)
+    assert ticks[0] == ticks[1]
 
 
 def test_other_maps_get_the_edges_of_the_opening_too(harness, step_by_step):
