@@ -8,8 +8,7 @@ from rich.console import Console, RenderableType
 from rich.text import Text
 
 from miro_exact.bad_input import one_line
-
-PIPE_COLUMNS = 200
+from mirotwin.shell.pairs import PIPE_COLUMNS
 
 
 class _Plain(Console):
