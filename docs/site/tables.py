@@ -59,6 +59,8 @@ def key_sections(root: type) -> Iterator[str]:
             inside = f"{path}.{name}".lstrip(".")
             waiting += [(inside, one) for one in below]
             value = "table, below" if below else value_of(field.type)
+            low, high = getattr(struct, "WITHIN", {}).get(name, (None, None))
+            value += f" (>= {low:g}, <= {high:g})" if low is not None else ""
             yield f"| `{name}` | {value} | {default_of(field)} |"
         yield ""
 

@@ -9,33 +9,15 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import msgspec
+from miro_sim.ranges import Ranged, Ranges
 
 GRAVITY_M_S2 = 9.81
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 MIN_MOTOR_S = 1e-4
 """The plant steps by a PWM period, 85 us: the speed of a quicker motor would grow from step to step."""
 
-Ranges = dict[str, tuple[float, float]]
-"""Lowest and highest value of each number of a table, far beyond any robot of this size."""
 
-
-class _Bounded(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Numbers that lie in their ranges, WITHIN.
-
-    With them what follows is finite, and speeds, currents and places are within those that a saved world may have.
-    """
-
-    WITHIN: ClassVar[Ranges] = {}
-
-    def __post_init__(self) -> None:
-        for name, (low, high) in self.WITHIN.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
-
-
-class Motor(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Motor(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A DC motor with precious-metal commutation: Faulhaber 2224 006 SR."""
 
     WITHIN: ClassVar[Ranges] = {
@@ -53,7 +35,7 @@ class Motor(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     friction_nm: float = 0.2e-3  # Coulomb, at the motor shaft: torque constant times 29 mA
 
 
-class Bridge(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Bridge(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """L298 with external fast diodes: total drop (source + sink) = drop_v + drop_ohm * |current|.
 
     The line goes through the sheet's typical saturations: source 1.35 V and sink 1.2 V at 1 A, 2.0 V and 1.7 V at 2 A.
@@ -79,7 +61,7 @@ class Bridge(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     off_delay_s: float = 2.6e-6
 
 
-class Battery(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Battery(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Six NiCd cells. Each motor sees the internal resistance by itself (no mutual sag)."""
 
     WITHIN: ClassVar[Ranges] = {
@@ -91,7 +73,7 @@ class Battery(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     resistance_ohm: float = 0.15
 
 
-class Chassis(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Chassis(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Two driven wheels on one axle through the centre of mass, two low-friction skids."""
 
     WITHIN: ClassVar[Ranges] = {
@@ -125,7 +107,7 @@ class Chassis(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     )
 
 
-class OpticalEncoder(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line.
 
     With `index_pulse` it has a third channel, low for the one count in a turn that begins it (A = B = 0 there).
@@ -139,7 +121,7 @@ class OpticalEncoder(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=
     index_pulse: bool = False
 
 
-class Tyre(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Tyre(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
 
     WITHIN: ClassVar[Ranges] = {
@@ -149,7 +131,7 @@ class Tyre(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
     grip: float | None = None  # coefficient of friction; rubber on a painted board about 0.8
 
 
-class RollingBall(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RollingBall(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The ball that the robot rests on beside its wheels (paper, section V-A): friction against its way on the ground.
 
     It carries `load_share` of the weight, which the wheels then do not press with. 0.03 m and a fifth: chosen.
@@ -166,7 +148,7 @@ class RollingBall(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     behind_m: float = 0.03  # behind the axle, on the middle line; negative: in front
 
 
-class Disturbance(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Disturbance(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A force along the robot's axis (forward) and a yaw torque (counter-clockwise) on its body.
 
     Added up: a constant, a sine from tick 0 on, and noise, which is drawn again every period within +- the bound.
@@ -195,7 +177,7 @@ class Disturbance(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return any(getattr(self, name) for name in self.__struct_fields__ if name != "period_s")
 
 
-class DriveParams(_Bounded, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DriveParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything `DifferentialDrive` needs to know about a robot."""
 
     motor: Motor = Motor()

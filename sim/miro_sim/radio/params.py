@@ -6,7 +6,7 @@ Chances are thresholds of a 32-bit draw: a probability times 2^32.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 
@@ -18,6 +18,7 @@ from miro_sim.radio.probability import (
     rate_threshold,
     threshold,
 )
+from miro_sim.ranges import Ranged, Ranges
 
 LinkState = Literal["up", "down", "noise"]
 UP, DOWN, NOISE = 0, 1, 2
@@ -37,41 +38,33 @@ SLICER_ONE = 65_536
 """Half the distance of mark and space at the discriminator, in the units of the slicer's threshold."""
 
 ProfileName = Annotated[str, msgspec.Meta(max_length=40)]
-WITHIN = {
-    "latency_s": (0.0, 0.030),
-    "jitter_s": (0.0, 0.030),
-    "keyup_s": (0.0, 0.030),
-    "bit_error_rate": (0.0, 0.5),
-    "eb_n0_db": (-20.0, 60.0),
-    "channel": (0, 999),
-    "baud_offset_ppm": (-50_000, 50_000),
-    "crystal_offset_ppm": (-50_000, 50_000),
-    "false_starts_hz": (0.0, 9600.0),
-    "lost_character_rate": (0.0, 1.0),
-    "lost_frames": (0.0, 1.0),
-    "good_to_bad": (0.0, 1.0),
-    "bad_to_good": (0.0, 1.0),
-    "every_s": (0.000105, 1e6),
-    "length_s": (0.000105, 1e6),
-    "settle_s": (0.000105, 1.0),
-    "offset": (-1.0, 1.0),
-}
 
 
-class _Ranged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Numbers that are in their range, see WITHIN, or None."""
+class _OfRadio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Parameters of a radio; a name means the same in each of its tables."""
 
-    def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            value = getattr(self, name)
-            if value is None or name not in WITHIN:
-                continue
-            low, high = WITHIN[name]
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
+    WITHIN: ClassVar[Ranges] = {
+        "latency_s": (0.0, 0.030),
+        "jitter_s": (0.0, 0.030),
+        "keyup_s": (0.0, 0.030),
+        "bit_error_rate": (0.0, 0.5),
+        "eb_n0_db": (-20.0, 60.0),
+        "channel": (0, 999),
+        "baud_offset_ppm": (-50_000, 50_000),
+        "crystal_offset_ppm": (-50_000, 50_000),
+        "false_starts_hz": (0.0, 9600.0),
+        "lost_character_rate": (0.0, 1.0),
+        "lost_frames": (0.0, 1.0),
+        "good_to_bad": (0.0, 1.0),
+        "bad_to_good": (0.0, 1.0),
+        "every_s": (0.000105, 1e6),
+        "length_s": (0.000105, 1e6),
+        "settle_s": (0.000105, 1.0),
+        "offset": (-1.0, 1.0),
+    }
 
 
-class Bursts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Bursts(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Gilbert-Elliott: chances a bit time of going bad and good again, and the error rate while it is bad."""
 
     good_to_bad: float
@@ -97,7 +90,7 @@ class Bursts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return threshold(self.bad_to_good)
 
 
-class Dropouts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Dropouts(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Times without a carrier: mean time from the end of one to the next, and mean length."""
 
     every_s: float
@@ -122,7 +115,7 @@ class Dropouts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return mean_threshold(self.length_s)
 
 
-class SlicerParams(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SlicerParams(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An AC-coupled slicer: its time constant, and the offset of the carriers in units of the deviation."""
 
     settle_s: float = 0.004
@@ -139,7 +132,7 @@ class SlicerParams(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return (2 * Fraction(repr(float(self.offset))) * SLICER_ONE + 1) // 2
 
 
-class Radio(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Radio(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
 
     `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
