@@ -3,15 +3,13 @@ from miro_exact cimport dmath
 from miro_sim.pitch cimport rays, scene, sensor
 
 cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _BAND
-cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _EDGES, _V, _LOW, _HIGH, _ALONG_U, _RAYS
+cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _EDGES, _V, _LOW, _HIGH, _CROSSED_U, _CROSSED_V, _RAYS
 cdef long long _HALF_UM, _TOP_UM
 
 @cython.locals(low=int, high=int)
 cdef inline bint _inside(int box, int every, int some) noexcept
 @cython.locals(low=int, high=int)
 cdef inline bint _outside(int box, int every, int some) noexcept
-@cython.locals(within=int, sample=int)
-cdef inline int _between(int* samples, int low, int high) noexcept
 @cython.locals(most='long long')
 cdef bint _enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
 @cython.locals(latest='long long')
@@ -26,8 +24,8 @@ cdef class Camera:
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
     cdef object boxes
-    cdef int sets, field_sets, side, black, span_first, span_end, first, samples, above, below, fall_u, fall_v
-    cdef bint spread_u, spread_v
+    cdef int sets, field_sets, side, black, span_first, span_end, first, samples, upper, lower, above, below
+    cdef int fall_u, fall_v
     cdef int team_paint[10]
     cdef int identity_paint[10]
     cdef long long drift_um[10]
@@ -76,12 +74,12 @@ cdef class Camera:
     cdef void _find_span(self, int body, int row, int first, int end) noexcept
     @cython.locals(place=int, edges=int, x='long long', y='long long', u='long long', v='long long',
                    beside_u='long long', beside_v='long long')
-    cdef long long _beside(self, int body, int pixel) noexcept
+    cdef inline long long _beside(self, int body, int pixel) noexcept
     @cython.locals(rays=rays.Rays, at=int, place=int, cosine='long long', sine='long long', shift_u='long long',
                    shift_v='long long', line=int, corner=int, column=int, x='long long', y='long long')
     cdef void _find_corners(self, int body, int row, int left, int right) noexcept
-    @cython.locals(a=int, b=int, c=int, d=int, e=int, f=int, g=int, h=int, i=int, j=int, corner='long long',
-                   lane='long long', u=int, v=int, high=int)
+    @cython.locals(edges='int *', a=int, b=int, c=int, d=int, e=int, f=int, g=int, h=int, i=int, j=int,
+                   corner='long long', lane='long long', u=int, v=int, high=int)
     cdef void _encode(self, int at, int first, int end) noexcept
     @cython.locals(at=int, above='long long', below='long long', joined='long long', column='long long',
                    lane='long long', a=int, b=int, c=int, d=int)
@@ -96,16 +94,23 @@ cdef class Camera:
     cdef long long _alone(self, int place, int pixel, int every, int some) noexcept
     @cython.locals(low=int, high=int, crossed=int)
     cdef inline int _within(self, int place, int box, int every, int some) noexcept
-    @cython.locals(low_u=int, high_u=int, low_v=int, high_v=int, inside_u=int, within=int, sample=int)
-    cdef int _count(self, int at, int along_u, int along_v) noexcept
+    @cython.locals(u=int, v=int, low_u=int, high_u=int, low_v=int, high_v=int, inside_u=int, within=int, sample=int)
+    cdef int _count(self, int at, int crossed) noexcept
+    @cython.locals(within=int)
+    cdef int _count_along(self, int* corners, int at, int crossed) noexcept
+    @cython.locals(a=int, b=int, c=int, d=int, upper=int, lower=int, beyond=int, column=int, p=int, by=int, at=int,
+                   above=int, below=int)
+    cdef int _count_beyond(self, int* corners, int edge) noexcept
     @cython.locals(near=int, a=int, b=int, c=int, d=int, least_u=int, most_u=int, least_v=int, most_v=int, low_u=int,
-                   high_u=int, low_v=int, high_v=int, along_u=bint, along_v=bint, within=int, u=int, v=int)
+                   high_u=int, low_v=int, high_v=int, crossed=int, within=int, u=int, v=int)
     cdef int _entered(self, int place, int pixel, int every, int some, int on_top) noexcept
     @cython.locals(x='long long', y='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
     @cython.locals(fall_u='long long', fall_v='long long', most='long long', middle='long long', around='long long')
     cdef int _across(self, int within, long long u, long long v, long long around_u, long long around_v) noexcept
-    @cython.locals(u='long long', v='long long', entered=int, sample=int)
+    @cython.locals(fall_u='long long', fall_v='long long', u='long long', v='long long', low_u='long long',
+                   high_u='long long', low_v='long long', high_v='long long', most='long long', low='long long',
+                   high='long long', entered=int, sample=int)
     cdef int _count_entering(self) noexcept
     @cython.locals(a=int, b=int, c=int, d=int, column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int* corners) noexcept

@@ -39,7 +39,7 @@ _TOP, _TEAM, _IDENTITY, _REACH, _BASE = 0, 1, 2, 3, 4  # rectangles in a robot's
 _EDGES = 20  # of a robot at an instant: for each rectangle the last u before it and the last u in it, then v
 _V = 10
 _LOW, _HIGH = 0x401, 0x802  # bits of a code for the edges of the first rectangle
-_ALONG_U = 0x3FF  # bits for edges of u
+_CROSSED_U, _CROSSED_V = 0x3, 0xC00  # both edges along an axis
 _RAYS = 1200  # after the edges of all robots: where those rays begin that may meet one
 _OUT = -1
 _FAR_UM = 1 << 29
@@ -64,8 +64,8 @@ class Camera:
         *("field_sets", "side", "black", "boxes", "robots", "team_paint", "identity_paint", "x", "y"),
         *("cos", "sin", "shift_u", "shift_v", "edges", "near_low", "near_high", "drift_um"),
         *("span_first", "span_end", "corner_u", "corner_v", "code", "every", "some", "always", "ever"),
-        *("covered", "total", "first", "samples", "above", "below", "fall_u", "fall_v"),
-        *("spread_u", "spread_v", "u", "v", "seen", "height_um"),
+        *("covered", "total", "first", "samples", "upper", "lower", "above", "below", "fall_u", "fall_v"),
+        *("u", "v", "seen", "height_um"),
     )
 
     def __init__(
@@ -111,12 +111,12 @@ class Camera:
         self.total = [0] * 4096
         self.first = 0
         self.samples = 16
+        self.upper = -1
+        self.lower = -1
         self.above = 0
         self.below = 0
         self.fall_u = 0
         self.fall_v = 0
-        self.spread_u = False
-        self.spread_v = False
         self.u = [0] * 16
         self.v = [0] * 16
         self.seen = [0] * 96
@@ -193,8 +193,8 @@ class Camera:
         drop = self.rays.height_um - _TOP_UM
         x = _TOP_UM * (self.x[place] - self.rays.x_um) // drop
         y = _TOP_UM * (self.y[place] - self.rays.y_um) // drop
-        self._surround(place, at, _LOW & _ALONG_U, (x * cosine + y * sine) >> 15)
-        self._surround(place, at + _V, _LOW & ~_ALONG_U, (y * cosine - x * sine) >> 15)
+        self._surround(place, at, _LOW & _CROSSED_U, (x * cosine + y * sine) >> 15)
+        self._surround(place, at + _V, _LOW & _CROSSED_V, (y * cosine - x * sine) >> 15)
 
     def _surround(self, place: int, at: int, low: int, fall: int) -> None:
         """The edges that depend on the fall, along u or along v; `low`: the bit of the top's lower one."""
@@ -333,43 +333,20 @@ class Camera:
 
     def _encode(self, at: int, first: int, end: int) -> None:
         """The codes of corners: bit k tells whether u is beyond edge k, bit 10 + k the same of v."""
-        a, b, c, d, e = (
-            self.edges[at + 9],
-            self.edges[at + 8],
-            self.edges[at + 7],
-            self.edges[at + 6],
-            self.edges[at + 5],
-        )
-        f, g, h, i, j = (
-            self.edges[at + 4],
-            self.edges[at + 3],
-            self.edges[at + 2],
-            self.edges[at + 1],
-            self.edges[at],
-        )
-        for corner in range(first, end, 8):  # as many together
-            for lane in range(8):
+        edges = self.edges
+        a, b, c, d, e = edges[at + 9], edges[at + 8], edges[at + 7], edges[at + 6], edges[at + 5]
+        f, g, h, i, j = edges[at + 4], edges[at + 3], edges[at + 2], edges[at + 1], edges[at]
+        for corner in range(first, end, 4):  # as many together
+            for lane in range(4):
                 u = self.corner_u[corner + lane]
                 high = 2 * (2 * (2 * (2 * (u > a) + (u > b)) + (u > c)) + (u > d)) + (u > e)
                 high = 2 * (2 * (2 * (2 * high + (u > f)) + (u > g)) + (u > h)) + (u > i)
                 self.code[corner + lane] = 2 * high + (u > j)
         at += _V
-        a, b, c, d, e = (
-            self.edges[at + 9],
-            self.edges[at + 8],
-            self.edges[at + 7],
-            self.edges[at + 6],
-            self.edges[at + 5],
-        )
-        f, g, h, i, j = (
-            self.edges[at + 4],
-            self.edges[at + 3],
-            self.edges[at + 2],
-            self.edges[at + 1],
-            self.edges[at],
-        )
-        for corner in range(first, end, 8):
-            for lane in range(8):
+        a, b, c, d, e = edges[at + 9], edges[at + 8], edges[at + 7], edges[at + 6], edges[at + 5]
+        f, g, h, i, j = edges[at + 4], edges[at + 3], edges[at + 2], edges[at + 1], edges[at]
+        for corner in range(first, end, 4):
+            for lane in range(4):
                 v = self.corner_v[corner + lane]
                 high = 2 * (2 * (2 * (2 * (v > a) + (v > b)) + (v > c)) + (v > d)) + (v > e)
                 high = 2 * (2 * (2 * (2 * high + (v > f)) + (v > g)) + (v > h)) + (v > i)
@@ -380,16 +357,16 @@ class Camera:
 
         `always` and `ever`: the same over all instants.
         """
-        for column in range(left, right, 8):
-            for lane in range(8):
+        for column in range(left, right, 4):
+            for lane in range(4):
                 self.always[column + lane] = -1
                 self.ever[column + lane] = 0
         for at in range(self.sets):
             above = (2 * at + (row & 1)) * _LINE
             below = (2 * at + (~row & 1)) * _LINE
             joined = at * _LINE
-            for column in range(left, right, 8):
-                for lane in range(8):
+            for column in range(left, right, 4):
+                for lane in range(4):
                     a, b = self.code[above + column + lane], self.code[above + column + lane + 1]
                     c, d = self.code[below + column + lane], self.code[below + column + lane + 1]
                     self.every[joined + column + lane] = a & b & c & d
@@ -445,9 +422,9 @@ class Camera:
         """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
         self.above = (2 * at + (row & 1)) * _LINE + column
         self.below = (2 * at + (~row & 1)) * _LINE + column
-        self.spread_u = self.spread_v = False
         if self.sets != self.field_sets:
             self.first, self.samples = 8 * (at // self.field_sets), 8
+            self.upper, self.lower = self.first // 8 - 1, 0 - self.first // 8
 
     def _alone(self, place: int, pixel: int, every: int, some: int) -> int:
         """The samples of an instant where one robot may be seen, by how many see what; -1 if that does not tell."""
@@ -479,35 +456,45 @@ class Camera:
             return 0
         low, high = _LOW << 2 * box, _HIGH << 2 * box
         crossed = ((every & low) | (some & high)) ^ low
-        if crossed == 0:
-            return self.samples
-        return self._count(_EDGES * place + 2 * box, crossed & _ALONG_U, crossed & ~_ALONG_U)
+        return self._count(_EDGES * place + 2 * box, crossed >> 2 * box) if crossed else self.samples
 
-    def _count(self, at: int, along_u: int, along_v: int) -> int:
-        """How many samples lie between edges; along an axis that is 0 all do."""
-        if along_u and not self.spread_u:
-            self._spread(self.u, self.corner_u)
-            self.spread_u = True
-        if along_v and not self.spread_v:
-            self._spread(self.v, self.corner_v)
-            self.spread_v = True
-        low_u, high_u = (
-            self.edges[at] - self.corner_u[self.above],
-            self.edges[at + 1] - self.corner_u[self.above],
-        )
-        if not along_v:
-            return _between(self.u, low_u, high_u)
-        low_v, high_v = (
-            self.edges[at + _V] - self.corner_v[self.above],
-            self.edges[at + _V + 1] - self.corner_v[self.above],
-        )
-        if not along_u:
-            return _between(self.v, low_v, high_v)
+    def _count(self, at: int, crossed: int) -> int:
+        """How many samples lie in a rectangle; `crossed`: its edges on both sides of which they lie."""
+        if not crossed & _CROSSED_V:
+            return self._count_along(self.corner_u, at, crossed)
+        if not crossed & _CROSSED_U:
+            return self._count_along(self.corner_v, at + _V, crossed >> _V)
+        self._spread(self.u, self.corner_u)
+        self._spread(self.v, self.corner_v)
+        u, v = self.corner_u[self.above], self.corner_v[self.above]
+        low_u, high_u = self.edges[at] - u, self.edges[at + 1] - u
+        low_v, high_v = self.edges[at + _V] - v, self.edges[at + _V + 1] - v
         within = 0
         for sample in range(16):
             inside_u = (self.u[sample] > low_u) & (self.u[sample] <= high_u)
             within += inside_u & (self.v[sample] > low_v) & (self.v[sample] <= high_v)
         return within
+
+    def _count_along(self, corners: list[int], at: int, crossed: int) -> int:
+        """The same where edges are crossed along one axis only."""
+        within = self._count_beyond(corners, self.edges[at]) if crossed & 1 else self.samples
+        return within - self._count_beyond(corners, self.edges[at + 1]) if crossed & 2 else within
+
+    def _count_beyond(self, corners: list[int], edge: int) -> int:
+        """How many samples lie beyond an edge: those that `_spread` would find there."""
+        a = corners[self.above]
+        b, c, d = corners[self.above + 1] - a, corners[self.below] - a, corners[self.below + 1] - a
+        edge = 64 * (edge - a) + 63
+        upper, lower = self.upper, self.lower
+        beyond = 0
+        for column in range(4):
+            p = 2 * column + 1
+            by = 8 * c + p * (d - b - c)
+            at = 8 * p * b + by
+            above = (at > edge) + (at + 2 * by > edge)
+            below = (at + 4 * by > edge) + (at + 6 * by > edge)
+            beyond += (above & upper) + (below & lower)
+        return beyond
 
     def _entered(self, place: int, pixel: int, every: int, some: int, on_top: int) -> int:
         """How many samples see any of a robot, `on_top` of them its top."""
@@ -527,11 +514,9 @@ class Camera:
         low_v, high_v = self.edges[_RAYS + _V], self.edges[_RAYS + _V + 1]
         if most_u <= low_u or least_u > high_u or most_v <= low_v or least_v > high_v:
             return 0
-        within = self.samples
-        along_u = least_u <= low_u or most_u > high_u
-        along_v = least_v <= low_v or most_v > high_v
-        if along_u or along_v:
-            within = self._count(_RAYS, along_u, along_v)
+        crossed = (least_u <= low_u) + 2 * (most_u > high_u)
+        crossed |= (least_v <= low_v) + 2 * (most_v > high_v) << _V
+        within = self._count(_RAYS, crossed) if crossed else self.samples
         u, v = (least_u + most_u) >> 1, (least_v + most_v) >> 1
         return self._across(within, u, v, most_u - u, most_v - v) if within else 0
 
@@ -558,14 +543,19 @@ class Camera:
         return self._count_entering()
 
     def _count_entering(self) -> int:
-        """How many samples see any of a robot, one by one."""
+        """How many samples see any of a robot, one by one: as `_enters`."""
         self._spread(self.u, self.corner_u)
         self._spread(self.v, self.corner_v)
-        self.spread_u = self.spread_v = True
+        fall_u, fall_v = self.fall_u, self.fall_v
         u, v = self.corner_u[self.above], self.corner_v[self.above]
+        low_u, high_u = self.edges[_RAYS] - u, self.edges[_RAYS + 1] - u
+        low_v, high_v = self.edges[_RAYS + _V] - v, self.edges[_RAYS + _V + 1] - v
+        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
+        low, high = -most - u * fall_v + v * fall_u, most - u * fall_v + v * fall_u
         entered = 0
         for sample in range(16):
-            if _enters(u + self.u[sample], v + self.v[sample], self.fall_u, self.fall_v):
+            u, v = self.u[sample], self.v[sample]
+            if low_u < u <= high_u and low_v < v <= high_v and low <= u * fall_v - v * fall_u <= high:
                 entered += 1
         return entered
 
@@ -659,14 +649,6 @@ def _outside(box: int, every: int, some: int) -> bool:
     """Whether all lie beyond the same side of it."""
     low, high = _LOW << 2 * box, _HIGH << 2 * box
     return ((some & low) | (every & high)) != low
-
-
-def _between(samples: list[int], low: int, high: int) -> int:
-    """How many of 16 samples are above `low` and not above `high`."""
-    within = 0
-    for sample in range(16):
-        within += (samples[sample] > low) - (samples[sample] > high)
-    return within
 
 
 def _um(metres: float) -> int:
