@@ -63,7 +63,7 @@ cdef class Camera:
                    drift='long long')
     cdef void _bound(self, int body) noexcept
     @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
-    cdef _draw(self, int left, int top, int width, int height, unsigned char[::1] out)
+    cdef _draw(self, int left, int top, int width, int height, bytearray out)
     @cython.locals(column=int, total='long long')
     cdef void _put_robots(self, int row, int first, int end, int at) noexcept
     @cython.locals(width=int, height=int, at=int, pixel=int, most='long long', body=int)

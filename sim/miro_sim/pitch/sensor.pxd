@@ -13,7 +13,7 @@ cdef class Sensor:
     cdef int scale
     cdef readonly int reach, side
     cdef short kept, half
-    cdef short taps[144]
+    cdef short taps[72]
     cdef short gamma[4096]
     cdef short luma_noise[4096]
     cdef short chroma_noise[4096]
@@ -25,9 +25,6 @@ cdef class Sensor:
     cdef short noise_y[352]
     cdef short noise_cb[352]
     cdef short noise_cr[352]
-    cdef unsigned char byte_y[352]
-    cdef unsigned char byte_cb[352]
-    cdef unsigned char byte_cr[352]
     cdef unsigned int words[448]
 
     cpdef begin(self, long long frame, long long tick, int samples)
@@ -35,13 +32,15 @@ cdef class Sensor:
     cdef void put(self, int column, long long total, long long light) noexcept
     @cython.locals(value='long long')
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(first='long long', column='long long')
-    cdef void write(self, int row, int left, int width, unsigned char[::1] out, int at) noexcept
+    @cython.locals(first='long long')
+    cdef void write(self, int row, int left, int width, bytearray out, int at) except *
     @cython.locals(block='long long', part='long long', at='long long', word='unsigned int', last='unsigned int')
     cdef void _draw_noise(self, unsigned long long first, long long column, int blocks) noexcept
-    @cython.locals(kept=short, half=short, sums='short[16]', first='long long', lane='long long', value=short)
-    cdef void _quantise(self, short* values, short* noise, unsigned char* out, long long left, long long width) noexcept
-    @cython.locals(first='long long', lane='long long', step='long long', sums='int[16]', bend=short)
+    @cython.locals(kept=short, half=short, found='short[16]', first='long long', column='long long', lane='long long',
+                   value=short)
+    cdef void _quantise(self, short* values, short* noise, long long left, long long width, unsigned char* out,
+                        long long at) noexcept
+    @cython.locals(first='long long', lane='long long', step='long long', sums='int[8]', bend=short)
     cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept

@@ -81,7 +81,7 @@ class Sensor:
     NOT_STATE = (
         *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "kept", "half"),
         *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr"),
-        *("noise_y", "noise_cb", "noise_cr", "byte_y", "byte_cb", "byte_cr", "words"),
+        *("noise_y", "noise_cb", "noise_cr", "words"),
     )
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
@@ -92,9 +92,9 @@ class Sensor:
         self.offset = math.floor(settings.offset * 4095.0 + 0.5)
         taps = _taps(settings.chroma_bandwidth_hz)
         self.reach = len(taps) - 1
-        self.taps = [0] * 144  # each for 16 pixels
-        for place in range(16, 16 * len(taps)):
-            self.taps[place] = taps[place // 16]
+        self.taps = [0] * 72  # each for 8 pixels
+        for place in range(8, 8 * len(taps)):
+            self.taps[place] = taps[place // 8]
         self.jitter = math.floor(settings.line_jitter_px * 256.0 + 0.5)
         self.side = self.reach + (1 if self.jitter else 0)
         lost = 8 - settings.bits
@@ -116,9 +116,6 @@ class Sensor:
         self.noise_y = [0] * 352
         self.noise_cb = [0] * 352
         self.noise_cr = [0] * 352
-        self.byte_y = [0] * 352
-        self.byte_cb = [0] * 352
-        self.byte_cr = [0] * 352
         self.words = [0] * 448
 
     def __repr__(self) -> str:
@@ -161,14 +158,9 @@ class Sensor:
         self._soften(self.cr, self.soft_cr, left, width)
         first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS + left // 3
         self._draw_noise(first, left - left % 3, (left % 3 + width + 2) // 3)
-        self._quantise(self.y, self.noise_y, self.byte_y, left, width)
-        self._quantise(self.soft_cb, self.noise_cb, self.byte_cb, left, width)
-        self._quantise(self.soft_cr, self.noise_cr, self.byte_cr, left, width)
-        for column in range(left + _PAD, left + width + _PAD):
-            out[at] = self.byte_y[column]
-            out[at + 1] = self.byte_cb[column]
-            out[at + 2] = self.byte_cr[column]
-            at += 3
+        self._quantise(self.y, self.noise_y, left, width, out, at)
+        self._quantise(self.soft_cb, self.noise_cb, left, width, out, at + 1)
+        self._quantise(self.soft_cr, self.noise_cr, left, width, out, at + 2)
 
     def _draw_noise(self, first: int, column: int, blocks: int) -> None:
         """The noise of pixels from `column` on, three a block: 12 bits of a word for each of Y, Cb, Cr."""
@@ -182,20 +174,24 @@ class Sensor:
                 self.noise_cb[at] = self.chroma_noise[word >> 12 & 4095]
                 self.noise_cr[at] = self.chroma_noise[word >> 24 | (last >> 4 * part & 15) << 8]
 
-    def _quantise(self, values: list[int], noise: list[int], out: list[int], left: int, width: int) -> None:
-        """Values with four fraction bits as the grabber's bytes: rounded, limited, then the bits that it has."""
+    def _quantise(
+        self, values: list[int], noise: list[int], left: int, width: int, out: bytearray, at: int
+    ) -> None:
+        """Values with four fraction bits as each third byte from `at` on: rounded, limited, then the bits there are."""
         kept, half = self.kept, self.half
-        sums = [0] * 16
-        for first in range(left + _PAD, left + width + _PAD, 16):  # as many pixels together
+        found = [0] * 16
+        for first in range(0, width, 16):  # as many pixels together
+            column = left + _PAD + first
             for lane in range(16):
-                sums[lane] = values[first + lane] + noise[first + lane] + 8
+                found[lane] = values[column + lane] + noise[column + lane] + 8
             for lane in range(16):
-                value = sums[lane] >> 4
+                value = found[lane] >> 4
                 value = 0 if value < 0 else value
                 value = 255 if value > 255 else value
-                sums[lane] = (value & kept) + half
-            for lane in range(16):
-                out[first + lane] = sums[lane]
+                found[lane] = (value & kept) + half
+            for lane in range(min(16, width - first)):
+                out[at] = found[lane]
+                at += 3
 
     def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
         """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border.
@@ -207,17 +203,17 @@ class Sensor:
                 values[_PAD - 1 - step] = values[_PAD]
             if left + width + self.reach > _WIDTH:
                 values[_PAD + _WIDTH + step] = values[_PAD + _WIDTH - 1]
-        sums = [0] * 16
-        for first in range(left + _PAD, left + width + _PAD, 16):  # as many pixels together
-            for lane in range(16):
+        sums = [0] * 8
+        for first in range(left + _PAD, left + width + _PAD, 8):  # as many pixels together
+            for lane in range(8):
                 sums[lane] = values[first + lane] << 16
             for step in range(1, self.reach + 1):
-                for lane in range(16):
+                for lane in range(8):
                     bend = (
                         values[first - step + lane] + values[first + step + lane] - 2 * values[first + lane]
                     )
-                    sums[lane] += bend * self.taps[16 * step + lane]
-            for lane in range(16):
+                    sums[lane] += bend * self.taps[8 * step + lane]
+            for lane in range(8):
                 soft[first + lane] = sums[lane] >> 16
 
     def _shake(self, row: int, left: int, width: int) -> None:
