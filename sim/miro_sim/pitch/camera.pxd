@@ -36,8 +36,8 @@ cdef class Camera:
     cdef long long shift_u[60]
     cdef long long shift_v[60]
     cdef int edges[1220]
-    cdef int near_low[60]
-    cdef int near_high[60]
+    cdef int near_low[10]
+    cdef int near_high[10]
     cdef int corner_u[4224]
     cdef int corner_v[4224]
     cdef int code[4224]
@@ -84,16 +84,13 @@ cdef class Camera:
     @cython.locals(at=int, above='long long', below='long long', joined='long long', column='long long',
                    lane='long long', a=int, b=int, c=int, d=int)
     cdef void _join(self, int row, int left, int right) noexcept
-    @cython.locals(pixel=int, at=int, total='long long', part='long long')
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
-    @cython.locals(paint=int)
-    cdef inline long long _steady(self, int body, int pixel, int every, int some) noexcept
-    cdef inline void _turn(self, int row, int column, int at) noexcept
-    @cython.locals(scene=scene.Scene, behind=int, on_top=int, entered=int, team=int, identity=int, body=int,
+    @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, team=int, identity=int,
                    total='long long')
-    cdef long long _alone(self, int place, int pixel, int every, int some) noexcept
-    @cython.locals(low=int, high=int, crossed=int)
-    cdef inline int _within(self, int place, int box, int every, int some) noexcept
+    cdef long long _alone(self, int body, int row, int column) noexcept
+    @cython.locals(low=int, high=int, within=int, at=int, every=int, some=int, crossed=int, edges=int)
+    cdef int _within(self, int body, int row, int column, int box) noexcept
+    cdef inline void _turn(self, int row, int column, int at) noexcept
     @cython.locals(u=int, v=int, low_u=int, high_u=int, low_v=int, high_v=int, inside_u=int, within=int, sample=int)
     cdef int _count(self, int at, int crossed) noexcept
     @cython.locals(within=int)
@@ -101,9 +98,11 @@ cdef class Camera:
     @cython.locals(a=int, b=int, c=int, d=int, upper=int, lower=int, beyond=int, column=int, p=int, by=int, at=int,
                    above=int, below=int)
     cdef int _count_beyond(self, int* corners, int edge) noexcept
-    @cython.locals(near=int, a=int, b=int, c=int, d=int, least_u=int, most_u=int, least_v=int, most_v=int, low_u=int,
-                   high_u=int, low_v=int, high_v=int, crossed=int, within=int, u=int, v=int)
-    cdef int _entered(self, int place, int pixel, int every, int some, int on_top) noexcept
+    @cython.locals(every=int, some=int, near=int, entered=int, at=int, inside=bint)
+    cdef int _entered(self, int body, int row, int column, int on_top) noexcept
+    @cython.locals(a=int, b=int, c=int, d=int, least_u=int, most_u=int, least_v=int, most_v=int, low_u=int, high_u=int,
+                   low_v=int, high_v=int, crossed=int, within=int, u=int, v=int)
+    cdef int _enter(self, int place, int pixel) noexcept
     @cython.locals(x='long long', y='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
     @cython.locals(fall_u='long long', fall_v='long long', most='long long', middle='long long', around='long long')

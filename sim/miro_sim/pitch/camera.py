@@ -95,8 +95,8 @@ class Camera:
         self.shift_u = [0] * 60
         self.shift_v = [0] * 60
         self.edges = [0] * 1220
-        self.near_low = [0] * 60
-        self.near_high = [0] * 60
+        self.near_low = [0] * 10
+        self.near_high = [0] * 10
         self.drift_um = [0] * 10
         self.span_first = 0
         self.span_end = 0
@@ -159,6 +159,7 @@ class Camera:
             raise ValueError(f"no robot {identity} of team {team} has colours")
         self.team_paint[body] = NUMBERS[TEAMS[team]]
         self.identity_paint[body] = NUMBERS[IDENTITIES[identity]]
+        self.near_low[body] = self.near_high[body] = 0
         for at in range(self.sets):
             field = at // self.field_sets
             share = (at % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
@@ -185,7 +186,6 @@ class Camera:
         cosine, sine = self.cos[place], self.sin[place]
         self.shift_u[place] = self.x[place] * cosine + self.y[place] * sine
         self.shift_v[place] = self.y[place] * cosine - self.x[place] * sine
-        self.near_low[place] = self.near_high[place] = 0
         at = _EDGES * place
         for box, (low_u, high_u, low_v, high_v) in enumerate(self.boxes):
             self.edges[at + 2 * box], self.edges[at + 2 * box + 1] = low_u - 1, high_u
@@ -206,9 +206,9 @@ class Camera:
         self.edges[at + 2 * _BASE] = (-_HALF_UM - fall + margin) * drop // camera + 1
         self.edges[at + 2 * _BASE + 1] = (_HALF_UM - fall - margin) * drop // camera
         if fall > -margin:
-            self.near_low[place] |= low
+            self.near_low[place // _SETS] |= low
         if fall < margin:
-            self.near_high[place] |= low << 1
+            self.near_high[place // _SETS] |= low << 1
 
     def _bound(self, body: int) -> None:
         """How far, at most, a place of the robot is at any instant from where it is at the middle one."""
@@ -381,42 +381,50 @@ class Camera:
         if self.covered[index]:
             self.covered[index] = _UNSURE
             return
-        self.covered[index] = _SURE
-        pixel = row * _WIDTH + column
-        total = self._steady(body, pixel, self.always[column], self.ever[column])
-        if total < 0:
-            total = 0
-            for at in range(self.sets):
-                self._turn(row, column, at)
-                part = self._alone(
-                    body * _SETS + at, pixel, self.every[at * _LINE + column], self.some[at * _LINE + column]
-                )
-                if part < 0:
-                    self.covered[index] = _UNSURE
-                    return
-                total += part
-        self.total[index] = total
+        self.total[index] = self._alone(body, row, column)
+        self.covered[index] = _SURE if self.total[index] >= 0 else _UNSURE
 
-    def _steady(self, body: int, pixel: int, every: int, some: int) -> int:
-        """The samples of a pixel at all instants, if all see the same of the robot; else -1."""
-        if not _inside(_TOP, every, some):
-            if not _outside(_TOP, every, some) or not _inside(_BASE, every, some):
+    def _alone(self, body: int, row: int, column: int) -> int:
+        """The samples of a pixel where one robot may be seen, by how many see what; -1 if that does not tell."""
+        scene = self.scene
+        whole = 16 * self.field_sets
+        total = 0
+        on_top = self._within(body, row, column, _TOP)
+        if on_top < whole:
+            pixel = row * _WIDTH + column
+            behind = scene.behind(pixel)
+            entered = self._entered(body, row, column, on_top)
+            if entered == 0:
+                return scene.total[pixel] * self.field_sets
+            if (entered < whole and behind == _MIXED) or scene.shows_ball(pixel):
                 return -1
-            self.scene.behind(pixel)
-            if self.scene.shows_ball(pixel):
-                return -1
-            paint = self.side
-        elif _inside(_TEAM, every, some):
-            paint = self.team_paint[body]
-        elif not _outside(_TEAM, every, some):
-            return -1
-        elif _inside(_IDENTITY, every, some):
-            paint = self.identity_paint[body]
-        elif not _outside(_IDENTITY, every, some):
-            return -1
-        else:
-            paint = self.black
-        return 16 * self.field_sets * self.scene.packed[paint]
+            if entered < whole:
+                total = (whole - entered) * scene.packed[behind]
+            total += (entered - on_top) * scene.packed[self.side]
+        if on_top:
+            team = self._within(body, row, column, _TEAM)
+            identity = self._within(body, row, column, _IDENTITY) if team < on_top else 0
+            total += team * scene.packed[self.team_paint[body]]
+            total += identity * scene.packed[self.identity_paint[body]]
+            total += (on_top - team - identity) * scene.packed[self.black]
+        return total
+
+    def _within(self, body: int, row: int, column: int, box: int) -> int:
+        """How many samples of all instants lie in a rectangle."""
+        if _outside(box, self.always[column], self.ever[column]):
+            return 0
+        if _inside(box, self.always[column], self.ever[column]):
+            return 16 * self.field_sets
+        low, high = _LOW << 2 * box, _HIGH << 2 * box
+        within = 0
+        for at in range(self.sets):
+            every, some = self.every[at * _LINE + column], self.some[at * _LINE + column]
+            if not _outside(box, every, some):
+                crossed = ((every & low) | (some & high)) ^ low
+                self._turn(row, column, at)
+                edges = _EDGES * (body * _SETS + at) + 2 * box
+                within += self._count(edges, crossed >> 2 * box) if crossed else self.samples
+        return within
 
     def _turn(self, row: int, column: int, at: int) -> None:
         """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
@@ -425,38 +433,6 @@ class Camera:
         if self.sets != self.field_sets:
             self.first, self.samples = 8 * (at // self.field_sets), 8
             self.upper, self.lower = self.first // 8 - 1, 0 - self.first // 8
-
-    def _alone(self, place: int, pixel: int, every: int, some: int) -> int:
-        """The samples of an instant where one robot may be seen, by how many see what; -1 if that does not tell."""
-        scene = self.scene
-        on_top = self._within(place, _TOP, every, some)
-        total = 0
-        if on_top < self.samples:
-            behind = scene.behind(pixel)
-            entered = self._entered(place, pixel, every, some, on_top)
-            if entered == 0 and self.samples == 16:
-                return scene.total[pixel]
-            if (entered < self.samples and behind == _MIXED) or scene.shows_ball(pixel):
-                return -1
-            if entered < self.samples:
-                total = (self.samples - entered) * scene.packed[behind]
-            total += (entered - on_top) * scene.packed[self.side]
-        if on_top:
-            team = self._within(place, _TEAM, every, some)
-            identity = self._within(place, _IDENTITY, every, some) if team < on_top else 0
-            body = place // _SETS
-            total += team * scene.packed[self.team_paint[body]]
-            total += identity * scene.packed[self.identity_paint[body]]
-            total += (on_top - team - identity) * scene.packed[self.black]
-        return total
-
-    def _within(self, place: int, box: int, every: int, some: int) -> int:
-        """How many samples lie in a rectangle."""
-        if _outside(box, every, some):
-            return 0
-        low, high = _LOW << 2 * box, _HIGH << 2 * box
-        crossed = ((every & low) | (some & high)) ^ low
-        return self._count(_EDGES * place + 2 * box, crossed >> 2 * box) if crossed else self.samples
 
     def _count(self, at: int, crossed: int) -> int:
         """How many samples lie in a rectangle; `crossed`: its edges on both sides of which they lie."""
@@ -496,13 +472,25 @@ class Camera:
             beyond += (above & upper) + (below & lower)
         return beyond
 
-    def _entered(self, place: int, pixel: int, every: int, some: int, on_top: int) -> int:
-        """How many samples see any of a robot, `on_top` of them its top."""
-        near = self.near_low[place]
-        if ((every & near) | (some & self.near_high[place])) == near or _outside(_REACH, every, some):
+    def _entered(self, body: int, row: int, column: int, on_top: int) -> int:
+        """How many samples of all instants see any of a robot, `on_top` of them its top."""
+        every, some = self.always[column], self.ever[column]
+        near = self.near_low[body]
+        if ((every & near) | (some & self.near_high[body])) == near:
             return on_top
         if _inside(_BASE, every, some):
-            return self.samples
+            return 16 * self.field_sets
+        entered = 0
+        for at in range(self.sets):
+            every, some = self.every[at * _LINE + column], self.some[at * _LINE + column]
+            if not _outside(_REACH, every, some):
+                self._turn(row, column, at)
+                inside = _inside(_BASE, every, some)
+                entered += self.samples if inside else self._enter(body * _SETS + at, row * _WIDTH + column)
+        return entered
+
+    def _enter(self, place: int, pixel: int) -> int:
+        """How many samples of an instant see any of a robot: as `_enters`."""
         self._fall(place, pixel)
         a, b = self.corner_u[self.above], self.corner_u[self.above + 1]
         c, d = self.corner_u[self.below], self.corner_u[self.below + 1]
