@@ -88,13 +88,14 @@ cdef class Camera:
     @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, team=int, identity=int,
                    total='long long')
     cdef long long _alone(self, int body, int row, int column) noexcept
+    cdef inline int _within(self, int body, int row, int column, int box) noexcept
     @cython.locals(low=int, high=int, within=int, at=int, every=int, some=int, crossed=int, edges=int)
-    cdef int _within(self, int body, int row, int column, int box) noexcept
+    cdef int _count_within(self, int body, int row, int column, int box) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept
     @cython.locals(u=int, v=int, low_u=int, high_u=int, low_v=int, high_v=int, inside_u=int, within=int, sample=int)
-    cdef int _count(self, int at, int crossed) noexcept
+    cdef inline int _count(self, int at, int crossed) noexcept
     @cython.locals(within=int)
-    cdef int _count_along(self, int* corners, int at, int crossed) noexcept
+    cdef inline int _count_along(self, int* corners, int at, int crossed) noexcept
     @cython.locals(a=int, b=int, c=int, d=int, upper=int, lower=int, beyond=int, column=int, p=int, by=int, at=int,
                    above=int, below=int)
     cdef int _count_beyond(self, int* corners, int edge) noexcept

@@ -415,6 +415,10 @@ class Camera:
             return 0
         if _inside(box, self.always[column], self.ever[column]):
             return 16 * self.field_sets
+        return self._count_within(body, row, column, box)
+
+    def _count_within(self, body: int, row: int, column: int, box: int) -> int:
+        """The same, instant by instant."""
         low, high = _LOW << 2 * box, _HIGH << 2 * box
         within = 0
         for at in range(self.sets):
