@@ -30,9 +30,9 @@ def on_the_path():
 
 @pytest.fixture(scope="module")
 def images(tmp_path_factory):
-    """Both firmwares, built by the example's Makefile."""
+    """Both firmwares, built by the example's Makefile in a folder whose name has a space."""
     folder = shutil.copytree(
-        EXAMPLE, tmp_path_factory.mktemp("slip") / "it", ignore=shutil.ignore_patterns("build")
+        EXAMPLE, tmp_path_factory.mktemp("slip") / "a dimmer", ignore=shutil.ignore_patterns("build")
     )
     children.run(["make", "-s", "-C", folder], check=True)
     return {name: load_hex(folder / "build" / f"{name}.ihx") for name in ("dimmer", "mended")}
