@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import InputError
 from miro_protocol import pcapng_reader, stream
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
+from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, Transmission, character_ticks
 from mirotwin.recording.capture import recorded
 from mirotwin.recording.capture.detect import TIMED
@@ -50,7 +52,7 @@ def open_source(given: Input, format: str, tell: Callable[[str], None], directio
     if format == "recording":
         return Source(given.label, format, recorded.transmissions(given, robots, tell), robots)
     if format == "stream":
-        return Source(given.label, format, _stream(given), robots)
+        return Source(given.label, format, _stream(given, tell), robots)
     pieces = _raw(given) if format == "raw" else _hex(given)
     return Source(given.label, format, _contiguous(pieces, direction), robots)
 
@@ -88,9 +90,23 @@ def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]
         raise failure
 
 
-def _stream(given: Input) -> Iterator[Transmission]:
-    for entry in stream.Reader(_lines(given), given.label):
-        yield stream.characters(entry, given.label)
+def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
+    reader = stream.Reader(_lines(given), given.label)
+    crystal_hz = 0
+    for entry in reader:
+        sent = stream.characters(entry, given.label)
+        if not crystal_hz:
+            crystal_hz = _crystal_hz(reader.header)
+            if crystal_hz != TICKS_PER_SECOND:
+                units = f"ticks of its {crystal_hz} Hz crystal are told in those of {TICKS_PER_SECOND} Hz"
+                tell(f"{given.label}: {units}")
+        yield msgspec.structs.replace(sent, tick=sent.tick * TICKS_PER_SECOND // crystal_hz)
+
+
+def _crystal_hz(header: Header) -> int:
+    """What a tick of the file is a period of; of a case for a bare processor its own crystal, if it names one."""
+    named = (header.bare or {}).get("crystal_hz")
+    return named if type(named) is int and named > 0 else TICKS_PER_SECOND
 
 
 def _lines(given: Input) -> Iterator[str]:

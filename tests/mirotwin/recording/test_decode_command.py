@@ -272,3 +272,26 @@ def test_a_closed_standard_stream_is_named(closed, name):
     found = children.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
     assert found.returncode == 2
     assert re.fullmatch(rb"mirotwin: error: " + name + rb":? is closed; .*\n", found.stderr)
+
+
+def test_ticks_of_another_crystal_are_told_as_those_of_24_megahertz(mirotwin, tmp_path):
+    case = tmp_path / "case.stream"
+    case.write_text(
+        "# mirotwin stream 2\n#: [bare]\n#: crystal_hz = 11059200\n11059200 > c0\n22118401 > c0\n"
+    )
+    code, out, err = mirotwin("decode", case, "--json")
+    ticks = [(row["tick"], row["time_s"]) for row in map(json.loads, out.splitlines()) if "tick" in row]
+    assert (code, ticks) == (0, [(24_000_000, 1.0), (48_000_002, 48_000_002 / 24e6)])
+    units = f"mirotwin: {case}: ticks of its 11059200 Hz crystal are told in those of 24000000 Hz"
+    assert units in err.splitlines()
+    code, _, err = mirotwin("export", case, "--out", tmp_path / "case.pcapng", "-q")
+    assert (code, err.count("11059200 Hz")) == (0, 1)
+    assert "   48000002      2.0000 " in mirotwin("decode", tmp_path / "case.pcapng")[1]
+
+
+@pytest.mark.parametrize("crystal", ['"fast"', "24000000", "0", "true"])
+def test_a_crystal_that_says_nothing_changes_no_tick(mirotwin, tmp_path, crystal):
+    case = tmp_path / "case.stream"
+    case.write_text(f"# mirotwin stream 2\n#: [bare]\n#: crystal_hz = {crystal}\n11059200 > c0\n")
+    _, out, err = mirotwin("decode", case, "--json")
+    assert (json.loads(out.splitlines()[1])["tick"], "Hz" in err) == (11_059_200, False)
