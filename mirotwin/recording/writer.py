@@ -15,23 +15,7 @@ from typing import Protocol
 from zlib import crc32
 
 import msgspec
-from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
 from mirotwin.recording.rows import Chunk, joined_crc
 
@@ -44,7 +28,7 @@ _CHUNK = struct.Struct(
 _BEFORE_DATA = _CHUNK.size - 9  # what a chunk's length counts besides its data
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of entries
 _ENTRY = 16  # bytes: time, offset
-_FOOTER = struct.Struct("<BQQQ")  # what the summary's CRC takes in of the footer
+_CRC = 4  # bytes
 
 
 class Writable(Protocol):
@@ -67,45 +51,50 @@ class McapWriter:
         self._end = 0  # of the file, without the open chunk
         self._checksum = 0  # of all up to there
         self._failed = False
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._attachments: list[AttachmentIndex] = []
-        self._metadata: list[MetadataIndex] = []
-        self._chunks: list[ChunkIndex] = []
+        self._schemas: list[bytes] = []  # the records, which stand in the summary, too
+        self._channels: list[bytes] = []
+        self._attachments: list[bytes] = []  # their indexes, and so on
+        self._metadata: list[bytes] = []
+        self._chunks: list[bytes] = []
         self._counts: dict[int, int] = {}  # messages by channel
         self._times: list[int] = []  # of the first and last message of each chunk
         self.chunk = Chunk(CHUNK_SIZE, self._end_chunk)
         self._chunk_checksum = 0  # of what is in the file
-        self._put(MAGIC + _bytes(Header(profile, library)))
+        self._put(MAGIC + _record(Opcode.HEADER, _text(profile), _text(library)))
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Adds a file; its times are 0."""
         self._end_chunk()
-        offset = self._end
-        self._put(_bytes(Attachment(0, 0, name, media_type, data)))
-        length = self._end - offset
-        self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
+        offset, names = self._end, _text(name) + _text(media_type)
+        content = struct.pack("<QQ", 0, 0) + names + struct.pack("<Q", len(data)) + data
+        self._put(_record(Opcode.ATTACHMENT, content, struct.pack("<I", crc32(content))))
+        numbers = struct.pack("<5Q", offset, self._end - offset, 0, 0, len(data))
+        self._attachments.append(_record(Opcode.ATTACHMENT_INDEX, numbers, names))
 
     def add_metadata(self, name: str, content: dict[str, str]) -> None:
         """Adds a table of texts."""
         self._end_chunk()
         offset = self._end
-        self._put(_bytes(Metadata(name, content)))
-        self._metadata.append(MetadataIndex(offset, self._end - offset, name))
+        table = b"".join(_text(key) + _text(value) for key, value in content.items())
+        self._put(_record(Opcode.METADATA, _text(name), _sized(table)))
+        numbers = struct.pack("<QQ", offset, self._end - offset)
+        self._metadata.append(_record(Opcode.METADATA_INDEX, numbers, _text(name)))
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Adds a schema and returns its number."""
-        schema = Schema(len(self._schemas) + 1, data, encoding, name)
-        self._schemas.append(schema)
-        self.chunk.add_record(_bytes(schema))
-        return schema.id
+        number = len(self._schemas) + 1
+        texts = _text(name) + _text(encoding) + _sized(data)
+        self._schemas.append(_record(Opcode.SCHEMA, struct.pack("<H", number), texts))
+        self.chunk.add_record(self._schemas[-1])
+        return number
 
     def add_channel(self, topic: str, encoding: str, schema: int) -> int:
         """Adds a channel and returns its number."""
-        channel = Channel(len(self._channels) + 1, topic, encoding, {}, schema)
-        self._channels.append(channel)
-        self.chunk.add_record(_bytes(channel))
-        return channel.id
+        number = len(self._channels) + 1
+        texts = _text(topic) + _text(encoding) + _sized(b"")
+        self._channels.append(_record(Opcode.CHANNEL, struct.pack("<HH", number, schema), texts))
+        self.chunk.add_record(self._channels[-1])
+        return number
 
     def add_message(self, channel: int, time_ns: int, message: msgspec.Struct | msgspec.Raw) -> None:
         """Adds a message: a struct, or JSON as `msgspec.Raw`; `time_ns` is both when it was logged and published."""
@@ -120,42 +109,35 @@ class McapWriter:
     def finish(self) -> None:
         """Writes the end of the file: summary and footer."""
         self._end_chunk()
-        self._put(_bytes(DataEnd(self._checksum)))
+        self._put(_record(Opcode.DATA_END, struct.pack("<I", self._checksum)))
         start = self._end
         summary, offsets = b"", b""
         for opcode, group in self._summary():
-            records = b"".join(_bytes(record) for record in group)
-            offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(records)))
+            records = b"".join(group)
+            place = struct.pack("<BQQ", opcode, start + len(summary), len(records))
+            offsets += _record(Opcode.SUMMARY_OFFSET, place)
             summary += records
-        offset_start = start + len(summary)
-        head = _FOOTER.pack(Opcode.FOOTER, 20, start, offset_start)
-        checksum = crc32(head, crc32(offsets, crc32(summary)))
-        self._put(summary + offsets + _bytes(Footer(start, offset_start, checksum)) + MAGIC)
+        footer = _record(Opcode.FOOTER, struct.pack("<QQI", start, start + len(summary), 0))[:-_CRC]
+        checksum = crc32(footer, crc32(offsets, crc32(summary)))
+        self._put(summary + offsets + footer + struct.pack("<I", checksum) + MAGIC)
         self._stream.flush()
 
-    def _summary(self) -> list[tuple[Opcode, list[McapRecord]]]:
+    def _summary(self) -> list[tuple[Opcode, list[bytes]]]:
         """The groups of the summary section, in the order of the library's writer."""
         messages = 0
         for count in self._counts.values():
             messages += count
-        statistics = Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
-            channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
-            message_count=messages,
-            message_end_time=max(self._times, default=0),
-            message_start_time=min(self._times, default=0),
-            metadata_count=len(self._metadata),
-            schema_count=len(self._schemas),
-        )
+        lists = self._channels, self._attachments, self._metadata, self._chunks
+        times = min(self._times, default=0), max(self._times, default=0)
+        counts = struct.pack("<QH4I", messages, len(self._schemas), *map(len, lists))
+        numbers = counts + struct.pack("<QQ", *times)
         return [
-            (Opcode.SCHEMA, [*self._schemas]),
-            (Opcode.CHANNEL, [*self._channels]),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, [*self._chunks]),
-            (Opcode.ATTACHMENT_INDEX, [*self._attachments]),
-            (Opcode.METADATA_INDEX, [*self._metadata]),
+            (Opcode.SCHEMA, self._schemas),
+            (Opcode.CHANNEL, self._channels),
+            (Opcode.STATISTICS, [_record(Opcode.STATISTICS, numbers, _by_channel(self._counts))]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
         ]
 
     def _end_chunk(self) -> None:
@@ -175,10 +157,11 @@ class McapWriter:
             self._counts[channel] = self._counts.get(channel, 0) + len(entries) // _ENTRY
         self._put(rows)
         self._times += (chunk.first_ns, chunk.last_ns)
-        length = len(head) + size
-        self._chunks.append(
-            ChunkIndex(length, start, "", size, chunk.last_ns, len(rows), offsets, chunk.first_ns, size)
-        )
+        place = struct.pack("<4Q", chunk.first_ns, chunk.last_ns, start, len(head) + size)
+        sizes = struct.pack(
+            "<QIQQ", len(rows), 0, size, size
+        )  # in between is the name of a compression: none
+        self._chunks.append(_record(Opcode.CHUNK_INDEX, place, _by_channel(offsets), sizes))
         chunk.begin()
         self._chunk_checksum = 0
 
@@ -222,7 +205,19 @@ class McapWriter:
             raise
 
 
-def _bytes(record: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    record.write(builder)
-    return bytes(builder.end())  # type: ignore[no-untyped-call]
+def _record(opcode: Opcode, *parts: bytes) -> bytes:
+    content = b"".join(parts)
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+def _sized(data: bytes) -> bytes:
+    """Data after its length."""
+    return struct.pack("<I", len(data)) + data
+
+
+def _text(text: str) -> bytes:
+    return _sized(text.encode())
+
+
+def _by_channel(numbers: dict[int, int]) -> bytes:
+    return _sized(b"".join(struct.pack("<HQ", *pair) for pair in numbers.items()))
