@@ -37,11 +37,11 @@ class Remembering:
 
     def check_memory(self) -> None:
         """Raises ValueError for an attribute that is missing, declared nowhere, or not of its type."""
-        attributes = vars(self)
+        attributes, state, fixed = self.__dict__, self.STATE, self.NOT_STATE
         for name in attributes:
-            if name not in self.STATE and name not in self.NOT_STATE:
+            if name not in fixed and name not in state:
                 raise ValueError(f"attribute {name!r} is neither in STATE nor in NOT_STATE")
-        for name, code in self.STATE.items():
+        for name, code in state.items():
             if name not in attributes:
                 raise ValueError(f"attribute {name!r} is in STATE and was never set")
             check(name, code, attributes[name])

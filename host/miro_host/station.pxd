@@ -1,7 +1,7 @@
 # C layout of miro_host.station.
 cimport cython
 
-cdef int _FASTEST, _SEQ_MODULUS, _XOR_OUT
+cdef int _SEQ_MODULUS, _XOR_OUT
 
 
 cdef class Station:

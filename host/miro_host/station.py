@@ -10,10 +10,10 @@ from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, VELOCI
 from miro_protocol.whitening import STRING
 
 _WIDE = 8  # bytes of a value in a saved service frame
-_FASTEST = VELOCITY[0].high
+_LOWEST, _HIGHEST = VELOCITY[0].low, VELOCITY[0].high
 _SEQ_MODULUS = SEQ_MODULUS
 _XOR_OUT = crc.XOR_OUT
-assert all((field.size, field.low, field.high) == (2, -_FASTEST, _FASTEST) for field in VELOCITY)
+assert all((field.size, field.low, field.high) == (2, _LOWEST, _HIGHEST) for field in VELOCITY)
 
 
 def _split_service(frame: ServiceFrame) -> tuple[int, int, bytes]:
@@ -105,7 +105,7 @@ class Station:
             if type(pair) is not tuple or len(pair) != 2:
                 return False
             for value in pair:
-                if type(value) is not int or not -_FASTEST <= value <= _FASTEST:
+                if type(value) is not int or value < _LOWEST or value > _HIGHEST:
                     return False
                 word = value
                 self._frame[end] = word & 0xFF

@@ -20,3 +20,7 @@ cdef class Body:
     @cython.final
     @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
     cdef inline int _roll(self) except -1
+    @cython.locals(v=double, w=double, time_s=double, half=double, chord_m=double, sine=double, cosine=double)
+    cpdef tuple pose_after(self, long long ticks)
+    @cython.locals(left_m_s=double, right_m_s=double)
+    cpdef tuple velocity(self)

@@ -87,6 +87,8 @@ cdef class DifferentialDrive(Plant):
     cdef readonly RoughBody rough
 
     cpdef attach(self, Lm629 left, Lm629 right)
+    cpdef tuple pose_at(self, long long tick)
+    cpdef tuple velocity_at(self, long long tick)
     cpdef int after_load(self) except -1
     cpdef advance(self, long long tick)
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)

@@ -42,3 +42,6 @@ cdef class RoughBody(Body):
     cdef int _drag(self, double most) except -1
     @cython.locals(half=double, shrink=double, sine=double, cosine=double)
     cdef void _glide(self, double forward_m, double left_m, double turn_rad) except *
+    @cython.locals(time_s=double, half=double, way_s=double, sine=double, cosine=double)
+    cpdef tuple pose_after(self, long long ticks)
+    cpdef tuple velocity(self)

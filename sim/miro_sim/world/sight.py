@@ -81,12 +81,12 @@ class GaussianSight:
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """See `Sight`."""
-        frame = self.frame
+        found = []
+        for place in range(len(self.visions)):
+            vision, noise, drive = self.visions[place], self.streams[place], self.bodies[place].drive
+            found.append(vision.expose(drive.pose_at(tick), noise, self.frame))
         self.frame += 1
-        return [
-            vision.expose(body.drive.pose_at(tick), stream, frame)
-            for body, vision, stream in zip(self.bodies, self.visions, self.streams, strict=True)
-        ]
+        return found
 
     def counts(self) -> dict[str, int]:
         """See `Sight`."""
