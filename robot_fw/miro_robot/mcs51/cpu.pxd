@@ -11,7 +11,6 @@ cdef int _STOP_REQUESTED, _REPLAN
 cdef int _WIRE_FULL
 cdef int _P0, _PCON, _IE, _IP
 cdef int _SMOD, _PD, _IDL
-cdef int _HIGH
 cdef int _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES
 cdef int _FLOATING
@@ -65,7 +64,7 @@ cdef class Cpu(Executor):
     @cython.locals(now='long long', event='long long')
     cdef int boundary(self) except -1
     @cython.final
-    @cython.locals(peripherals=Peripherals, earliest='long long', source=int)
+    @cython.locals(peripherals=Peripherals, earliest='long long', source=int, sources=int)
     cdef inline int _attend(self, long long now) except -1
     @cython.final
     cdef inline int _watch_main_loop(self, long long now) except -1
@@ -76,7 +75,6 @@ cdef class Cpu(Executor):
     @cython.final
     cdef inline int _block(self) except -1
     @cython.final
-    @cython.locals(peripherals=Peripherals)
     cdef inline int _expect(self, long long earliest) except -1
     @cython.final
     @cython.locals(event='long long')

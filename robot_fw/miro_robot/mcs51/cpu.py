@@ -53,7 +53,6 @@ _STOP_REQUESTED = 1
 _WIRE_FULL = WIRE_FULL
 _P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
-_HIGH = 2  # in `in_service`: a routine that nothing interrupts
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
 _FLOATING = 0xFF  # what an undriven external bus reads as (X4)
@@ -256,7 +255,8 @@ class Cpu(Executor):
         """Whether only a reset or a new input can make it execute another instruction."""
         if self.powered_down:
             return True
-        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _NEVER
+        sources = self.peripherals.interrupts.enabled()
+        return bool(self.idle) and self.peripherals.next_event(self.cycles, sources) == _NEVER
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -303,6 +303,8 @@ class Cpu(Executor):
             if self.stop_asleep and (self.powered_down or self.next_event >= _NEVER):
                 self.stop = ASLEEP
                 return 1
+            if not self._taken_over():  # nor will it be at a mark
+                event = self.next_event if self.next_event < self.until else self.until
             self.idle_cycles += event - now
             self.cycles = event
         self.limit = event
@@ -329,7 +331,8 @@ class Cpu(Executor):
                 self._enter(source)
                 return 1
             earliest = now
-        self.next_event = peripherals.next_event(earliest)
+        sources = peripherals.interrupts.enabled() if self.idle else peripherals.interrupts.open()
+        self.next_event = peripherals.next_event(earliest, sources)
         if self.next_event <= now:  # all of now is done: nothing that is due may hold time up
             self.next_event = now + 1
         return 0
@@ -379,11 +382,7 @@ class Cpu(Executor):
 
     def _expect(self, earliest: int) -> None:
         """What is due next may have changed; nothing that the pins ask for has."""
-        peripherals = self.peripherals
-        if peripherals.interrupts.in_service & _HIGH and not self.idle:
-            self.next_event = peripherals.ports.next_cycle  # no interrupt before RETI, which looks again
-        else:
-            self.next_event = peripherals.next_event(earliest)
+        self.next_event = self.peripherals.next_event(earliest, self.peripherals.interrupts.open())
         self.limit = 0 if self.stop or self.txd.full else self._next_look()
 
     # Special function registers
@@ -440,7 +439,8 @@ class Cpu(Executor):
             self.next_event = 0
         elif value & _IDL:
             self.idle = 1
-            if self.stop_asleep:  # an event that has become later must not keep it awake
+            if self.stop_asleep or self.peripherals.interrupts.in_service:
+                # An event that has become later must not keep it awake; what was not waited for may end its sleep.
                 self.next_event = 0
         self.limit = 0
 

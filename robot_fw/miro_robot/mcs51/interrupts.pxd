@@ -15,9 +15,11 @@ cdef class Interrupts:
     cpdef void clear(self) noexcept
     cpdef void ask(self, int source, long long cycle) noexcept
     cpdef void withdraw(self, int source, long long cycle) noexcept
-    @cython.locals(enabled=int, source=int, chosen=int, latched='long long')
+    cdef inline int enabled(self) noexcept
+    cdef int open(self) noexcept
+    @cython.locals(waiting=int, source=int, chosen=int, latched='long long')
     cpdef int choose(self, long long boundary) noexcept
-    @cython.locals(enabled=int, source=int, earliest='long long', boundary='long long')
+    @cython.locals(waiting=int, source=int, earliest='long long', boundary='long long')
     cpdef long long next_boundary(self, long long now) noexcept
     cpdef void enter(self, int source) noexcept
     cpdef void leave(self) noexcept

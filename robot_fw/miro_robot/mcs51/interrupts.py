@@ -65,33 +65,39 @@ class Interrupts:
         if self.until[source] == _NEVER:
             self.until[source] = cycle
 
+    def enabled(self) -> int:
+        """Sources that IE lets interrupt, a bit each."""
+        return self.ie if self.ie & 0x80 else 0
+
+    def open(self) -> int:
+        """Those of them that what is in service lets interrupt."""
+        if self.in_service & 2:
+            return 0
+        return self.enabled() & self.ip if self.in_service else self.enabled()
+
     def choose(self, boundary: int) -> int:
         """The source whose LCALL begins in cycle `boundary`, or -1."""
-        enabled = self.ie & self.asked
-        if not enabled or not self.ie & 0x80 or self.in_service & 2:
-            return -1
+        waiting = self.open() & self.asked
         latched = boundary - 2
         chosen = -1
-        for source in range(6):
-            if (enabled >> source) & 1 and self.since[source] <= latched < self.until[source]:
+        for source in range(6 if waiting else 0):
+            if (waiting >> source) & 1 and self.since[source] <= latched < self.until[source]:
                 if (self.ip >> source) & 1:
                     return source  # the first of the high level wins over every low one
-                if chosen < 0 and not self.in_service:
+                if chosen < 0:
                     chosen = source
         return chosen
 
     def next_boundary(self, now: int) -> int:
         """The first cycle >= `now` in which `choose` may find something among the flags known, or NEVER_TICK."""
-        enabled = self.ie & self.asked
-        if not enabled or not self.ie & 0x80 or self.in_service & 2:
-            return _NEVER
+        waiting = self.open() & self.asked
         earliest = _NEVER
-        for source in range(6):
-            if not (enabled >> source) & 1:
+        for source in range(6 if waiting else 0):
+            if not (waiting >> source) & 1:
                 continue
             if self.until[source] <= now - 2:
                 self.asked &= ~(1 << source)
-            elif not self.in_service or (self.ip >> source) & 1:
+            else:
                 boundary = max(self.since[source] + 2, now)
                 if boundary - 2 < self.until[source] and boundary < earliest:
                     earliest = boundary

@@ -58,8 +58,8 @@ cdef class Peripherals:
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
-    @cython.locals(event='long long', enabled=int, flag='long long')
-    cpdef long long next_event(self, long long now) except *  # Cython 3.2 writes -1 wrongly in a final class
+    @cython.locals(event='long long', flag='long long')
+    cpdef long long next_event(self, long long now, int sources) except *  # Cython 3.2 writes -1 wrongly in a final class
     @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
     cdef int clock_serial(self) except -1

@@ -192,23 +192,25 @@ class Peripherals:
         tx = timer2 if self.timer2.control & _TCLK else ticks1
         self.uart.pulse(rx, tx, 12 * cycle + _S5P2)
 
-    def next_event(self, now: int) -> int:
-        """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or NEVER_TICK."""
+    def next_event(self, now: int, sources: int) -> int:
+        """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or NEVER_TICK.
+
+        `sources`, as bits of IE: whose flags are waited for; that of the serial port always, which the bus is told of.
+        """
         event = self.interrupts.next_boundary(now)
         if self.ports.next_cycle < event:
             event = self.ports.next_cycle
-        enabled = self.interrupts.ie
-        if self.frozen or not enabled & 0x80:
+        if self.frozen:
             return event
-        if enabled & _BOTH_TIMERS:
-            flag = self.timers.next_flag(enabled) + 2
+        if sources & _BOTH_TIMERS:
+            flag = self.timers.next_flag(sources) + 2
             if flag < event:
                 event = flag
-        if enabled & _TIMER2:
+        if sources & _TIMER2:
             flag = self.timer2.next_flag() + 2
             if flag < event:
                 event = flag
-        if enabled & _SERIAL:
+        if self.interrupts.enabled() & _SERIAL:
             if self.serial_wait < 0:
                 self.settle()
             if self.serial_wait < _STOPPED:
@@ -421,7 +423,7 @@ class Peripherals:
         if not self.timer1_free:
             self.clock_serial()
             return 1
-        return sooner | hastened & self.interrupts.ie
+        return sooner | hastened & self.interrupts.open()
 
     def _note_timers(self) -> None:
         """A flag of timers 0 and 1 may come at another time."""

@@ -12,6 +12,8 @@ cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
 cdef int _ROLLOVERS, _COUNTER_BITS
 cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_BIT, _LAST_ACTION
 
+cdef long long _flag_tick(long long tick) noexcept
+
 @cython.final
 cdef class Uart:
     cdef Bus bus

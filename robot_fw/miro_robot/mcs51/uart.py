@@ -39,6 +39,11 @@ _LAST_BIT = 9  # the start bit is 0
 _LAST_ACTION = _LAST_BIT * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of a character
 
 
+def _flag_tick(tick: int) -> int:
+    """When RI shows that the last vote was taken at `tick`: with the next S3P1 (U6)."""
+    return (tick + 7) // 12 * 12 + 4
+
+
 class Uart:
     """Serial port. `rxd` and `txd` are the wires; `latch` bits 0 and 1 are P3.0 and P3.1, which gate them."""
 
@@ -332,7 +337,7 @@ class Uart:
             self.rx_bits |= bit << (number - 1)
         elif number == _LAST_BIT:
             self.rx_frame = self.rx_bits | (bit << 8)
-            self.rx_done = (now + 7) // 12 * 12 + 4
+            self.rx_done = _flag_tick(now)
             if not self.nine_bits():
                 self.rx_count = 0
         else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now (U7)
@@ -351,13 +356,13 @@ class Uart:
         self.bus.byte_received(self.received, last, tick)
 
     def ri_tick(self) -> int:
-        """A tick before which RI will not go up, NEVER_TICK if no character can come."""
+        """A tick before which RI will not go up: where the next character shows, NEVER_TICK if none can come."""
         if self.rx_done != _NEVER:
             return self.rx_done
         if self.rx_count > _LAST_ACTION:  # a nine-bit frame without its stop bit: no other begins before that
             return self.rx_next + (_LAST_ACTION + _ROLLOVERS - self.rx_count) * self.rx_period
         if self.rx_count:
-            return self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period
+            return _flag_tick(self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period)
         if not self.scon & _REN or not self.latch & 1:
             return _NEVER
         before = self.rx_next - self.rx_period
@@ -368,9 +373,11 @@ class Uart:
             )  # it fell while another clock was running, or none: the next 16x tick finds it
         if fall > self.rxd.settled_tick:
             fall = self.rxd.settled_tick
-        if fall < self.rx_next:
+        if fall <= self.rx_next:
             fall = self.rx_next
-        return fall + _LAST_ACTION * self.rx_period if fall < _STOPPED else _NEVER
+        else:
+            fall += (self.rx_next - fall) % self.rx_period
+        return _flag_tick(fall + _LAST_ACTION * self.rx_period) if fall < _STOPPED else _NEVER
 
     def check_times(self, tick: int) -> None:
         """Raises ValueError unless the port goes on at `tick`: what it sends comes after the edges on TXD."""
