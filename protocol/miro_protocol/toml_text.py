@@ -1,5 +1,6 @@
 """Reading TOML: a document that cannot be used is one error, whatever `tomllib` makes of it."""
 
+import copy
 import math
 import re
 import tomllib
@@ -30,6 +31,8 @@ TYPE_NAMES = {
 """What msgspec calls types, in the words of TOML."""
 _KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
+_NAMED = "[...]"
+_STEP = re.compile(r"\.?[^.\[\]]+|\[(?:\d+|\.\.\.)\]")
 _PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
 
 
@@ -102,14 +105,41 @@ def struct_of(table: Any, kind: type[T]) -> T:
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
-        raise _misfit(f"{error}") from None
-
-
-def _misfit(message: str) -> TomlError:
-    """What msgspec found, in the words of the file."""
+        message = f"{error}"
     found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
     assert found is not None
-    what, path = found[1], found[2] or ""
+    raise _misfit(found[1], _with_names(found[2] or "", table, kind, message))
+
+
+def _with_names(path: str, table: Any, kind: type, message: str) -> str:
+    """The path with the keys that are names: msgspec writes [...] for each. One alone has the same fault."""
+    if _NAMED not in path:
+        return path
+    at = whole = copy.deepcopy(table)
+    for step in _STEP.findall(path):
+        key: Any = int(step[1:-1]) if step[1:-1].isdigit() and step[0] == "[" else step.lstrip(".")
+        if step == _NAMED:
+            inside = dict(at)
+            for key, value in inside.items():
+                at.clear()
+                at[key] = value
+                if _fault(whole, kind) == message:
+                    break
+            path = path.replace(_NAMED, f".{key}", 1).lstrip(".")
+        at = at[key]
+    return path
+
+
+def _fault(table: Any, kind: type) -> str:
+    try:
+        msgspec.convert(table, kind)
+    except msgspec.ValidationError as error:
+        return f"{error}"
+    return ""
+
+
+def _misfit(what: str, path: str) -> TomlError:
+    """What msgspec found, in the words of the file."""
     field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", what)
     if field is not None:
         place = f"{path}.{field[2]}" if path else field[2]

@@ -207,7 +207,7 @@ def same_colour(text):
         ),
         (lambda text: "", ": colours: this key is missing"),
         (lambda text: "[colours]\n", ": colours: there is no colour; sample"),
-        (lambda text: text.replace("spread", "sprawl", 1), ": colours[...].sprawl: unknown key"),
+        (lambda text: text.replace("spread", "sprawl", 1), ": colours.yellow.sprawl: unknown key"),
     ],
 )
 def test_colours_that_cannot_be_used_are_named_with_file_and_key(mirotwin, seen, tmp_path, change, expected):

@@ -194,6 +194,19 @@ def test_names_of_other_columns_are_no_factors():
             plan_of(f'scenario = "fig6"\n[factor."{name}"]\na = []\n')
 
 
+@pytest.mark.parametrize(
+    ("levels", "expected"),
+    [
+        ("own = []\nlate = { firmware = 'own' }", r"factor.image.late: expected a list, got a table"),
+        ("own = []\nlate = ['a=1', 2]", r"factor.image.late\[1\]: expected a string, got a whole number"),
+        ("own = 3\nlate = 4", r"factor.image.own: expected a list, got a whole number"),
+    ],
+)
+def test_a_level_that_cannot_be_used_is_named(levels, expected):
+    with pytest.raises(BadInput, match=f"^c.toml: {expected}"):
+        parse(f'scenario = "fig6"\n[factor.more]\nown = []\n[factor.image]\n{levels}\n', Path("c.toml"))
+
+
 def test_a_setting_of_a_key_that_the_campaign_varies_would_have_no_effect_and_is_refused():
     text = 'scenario = "fig6"\n[grid]\nnetwork.radio.bit_error_rate = [0.0, 1e-3]\n'
     expected = "the campaign varies network.radio.bit_error_rate, this would have no effect"
