@@ -29,7 +29,7 @@ cdef class RoughBody(Body):
     @cython.locals(grip=double, axle=double, left_rub=double, right_rub=double, left_push=double, right_push=double,
                    sideways=double, inertia=double, hub=double, before=double, left_stands=cython.bint,
                    right_stands=cython.bint, left_back=double, left_ahead=double, right_back=double,
-                   right_ahead=double, left_held=cython.bint)
+                   right_ahead=double, left_held=cython.bint, changed=double, speeds=double, signed=cython.bint)
     cdef int _dissipate(self, double most_left, double most_right, double step_s) except -1
     @cython.locals(rest=double)
     cdef double _grip_left_n(self, double along_n) except? -7.5

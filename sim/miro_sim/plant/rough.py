@@ -13,9 +13,10 @@ friction impulses that leave the least kinetic energy (maximum dissipation), eac
              taken from the step before
     ball     friction * load of the ball * time, in any direction; against its way over the ground
 
-A few sweeps over wheel, wheel, ball and axle; each part is solved exactly while the others hold still, so each lowers
-the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel without `grip` has all that
-it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the ball does not carry.
+A few sweeps over wheel, wheel, ball and axle, until one changes nothing; each part is solved exactly while the others
+hold still, so each lowers the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel
+without `grip` has all that it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the
+ball does not carry.
 
 Backlash: the wheel has no mass, so while the teeth do not touch it goes with the ground and the shaft turns alone.
 Teeth that touch again do not bounce. They touch at the end of the step in which the play is used up, at most one
@@ -189,6 +190,7 @@ class RoughBody(Body):
             self.left_rad_s += (
                 self._rub_nms - left_rub - self.left_m_rad * (self._push_ns - left_push)
             ) / inertia
+            changed = abs(self._rub_nms - left_rub) + abs(self._push_ns - left_push)
             left_rub = self._rub_nms
             left_push = self._push_ns
             hub = self.v_m_s + self.half_track_m * self.w_rad_s
@@ -206,6 +208,7 @@ class RoughBody(Body):
             self.right_rad_s += (
                 self._rub_nms - right_rub - self.right_m_rad * (self._push_ns - right_push)
             ) / inertia
+            changed += abs(self._rub_nms - right_rub) + abs(self._push_ns - right_push)
             right_rub = self._rub_nms
             right_push = self._push_ns
             if self.ball_n > 0.0:
@@ -213,6 +216,12 @@ class RoughBody(Body):
             before = sideways
             sideways = min(axle, max(-axle, before - self.mass_kg * self.u_m_s))
             self.u_m_s = self.u_m_s + (sideways - before) / self.mass_kg
+            if changed + abs(sideways - before) == 0.0 and self.ball_n == 0.0:
+                # The other sweeps would change nothing but the sign of a zero.
+                speeds = self.v_m_s * self.w_rad_s * self.left_rad_s * self.right_rad_s
+                signed = self.u_m_s != 0.0 or -axle < sideways < axle  # this one is set below
+                if signed and speeds * left_rub * left_push * right_rub * right_push * sideways != 0.0:
+                    break
         self.left_force_n = left_push / step_s
         self.right_force_n = right_push / step_s
         if -axle < sideways < axle:

@@ -4,6 +4,7 @@ import math
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -38,6 +39,7 @@ ROLLING = DriveParams(tyre=Tyre(grip=10.0), ball=RollingBall(load_share=0.0))
 SPEEDS = st.floats(-400.0, 400.0)
 WAYS = st.floats(-2.0, 2.0)
 TURNS = st.floats(-40.0, 40.0)
+FAST = st.one_of(st.floats(0.01, 2.0), st.floats(-2.0, -0.01))
 IMPULSES = st.floats(-2e-6, 2e-6)
 TICKS = st.integers(1, 2048)
 MAGNITUDES = ((100, 100), (0, 0), (-100, -60), (40, 128))
@@ -73,6 +75,21 @@ def test_a_push_gives_no_more_energy_than_to_shafts_without_any_friction(
     free = moving(params, left + push_left / inertia, right + push_right / inertia, v, u, w)
     one.push(push_left, push_right, ticks)
     assert one.kinetic_energy_j() <= free.kinetic_energy_j() * (1.0 + 1e-15)
+
+
+@pytest.mark.parametrize("kind", ["slip", "ice", "stiction", "load friction", "slip, play and load friction"])
+@settings(max_examples=60)
+@given(FAST, FAST, FAST, WAYS, FAST, st.lists(st.tuples(IMPULSES, IMPULSES, TICKS), max_size=8))
+def test_sweeps_that_end_where_nothing_changes_end_as_all_of_them_do(kind, left, right, v, u, w, pushes):
+    params = KINDS[kind]
+    weightless = msgspec.structs.replace(
+        params, ball=RollingBall(friction=1e-60)
+    )  # with a ball all sweeps are done
+    bodies = [moving(each, 150.0 * left, 150.0 * right, v, u, 5.0 * w) for each in (params, weightless)]
+    for push in pushes:
+        for one in bodies:
+            one.push(*push)
+        assert values(bodies[0]) == values(bodies[1])
 
 
 @pytest.mark.parametrize("kind", KINDS)
