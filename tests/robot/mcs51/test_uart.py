@@ -7,7 +7,7 @@ import itertools
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import NEVER_TICK
@@ -351,6 +351,47 @@ ACTIONS = st.lists(
 )
 SIXTEENTHS = st.one_of(st.integers(1, 40), st.sampled_from([7, 8, 9, 16, 24, 25, 32, 40, 48, 80, 144]))
 NOISE = st.lists(st.tuples(SIXTEENTHS, st.integers(-3, 3)), min_size=30, max_size=120)
+
+
+MUTED = """
+MOV SCON,#50h
+MOV R6,#{}
+wait:
+MOV R7,#0
+DJNZ R7,$
+DJNZ R6,wait
+CLR P3.0
+MOV R6,#{}
+DJNZ R6,$
+SETB P3.0
+"""
+"""The latch of P3.0 holds RXD low for a while."""
+INTERVALS = st.integers(1, 400) | st.builds(
+    lambda bits, odd: bits * BIT + odd, st.integers(1, 9), st.integers(-700, 700)
+)
+
+
+@settings(max_examples=80, derandomize=True)
+@given(
+    intervals=st.lists(INTERVALS, min_size=1, max_size=30),
+    scon=st.sampled_from(("50h", "70h", "0D0h")),
+    muted=st.just("") | st.builds(MUTED.format, st.integers(1, 20), st.integers(1, 255)),
+)
+@example([2000, 300, 1500, 10 * BIT], "50h", "")
+@example([5000, 9 * BIT, BIT // 2, 3 * BIT], "50h", "")
+@example([23_000, BIT], "50h", MUTED.format(4, 200))
+def test_a_run_in_one_piece_receives_what_a_run_cycle_by_cycle_receives(intervals, scon, muted):
+    whole, pieces = (
+        cpu_with("MOV R0,#30h\n" + TIMER2_9600 + muted + RECEIVER.format(scon=scon)) for _ in range(2)
+    )
+    for cpu in (whole, pieces):
+        for number, tick in enumerate(itertools.accumulate(intervals)):
+            cpu.rxd.append(tick, number & 1)
+    until = sum(intervals) // 12 + 3000
+    whole.run(until)
+    while pieces.cycles < until:
+        pieces.run(pieces.cycles + 1)
+    assert snapshot(whole) == snapshot(pieces)
 
 
 def bit_ticks(configuration):
