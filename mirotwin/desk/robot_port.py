@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import SimpleNamespace, TracebackType
 from typing import TYPE_CHECKING, Any, NoReturn, cast
+from urllib.parse import urlsplit
 
 import msgspec
 import serial
@@ -393,7 +394,21 @@ class RobotPort:
         raise NotObservable(f"`{name}` of a robot's world")
 
 
+def _check_address(url: str) -> None:
+    """Refuses a network address without a port: what pyserial says of it is a fault of its own."""
+    scheme = url.partition("://")[0].lower()
+    if scheme not in ("socket", "rfc2217"):
+        return
+    with suppress(ValueError):  # letters, or beyond 65535
+        if urlsplit(url).port is not None:
+            return
+    raise PortError(
+        url, "", "names no port", f"write {scheme}://HOST:PORT, such as {scheme}://127.0.0.1:7000"
+    )
+
+
 def _opened(url: str) -> Any:
+    _check_address(url)
     more: dict[str, Any] = {"write_timeout": BLOCKED_S}
     address = url
     if "://" not in url:

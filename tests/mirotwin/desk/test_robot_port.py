@@ -188,6 +188,10 @@ def test_a_port_that_the_system_refuses_is_told_with_a_remedy(monkeypatch, numbe
         ("/dev/nothing", "there is no such port"),
         ("socket://127.0.0.1:1", "cannot be opened"),
         ("nonsense://x", "cannot be opened"),
+        ("socket://127.0.0.1", "names no port; write socket://HOST:PORT, such as socket://127.0.0.1:7000"),
+        ("socket://127.0.0.1:abc", "names no port; write socket://HOST:PORT"),
+        ("socket://127.0.0.1:99999", "names no port; write socket://HOST:PORT"),
+        ("RFC2217://127.0.0.1?logging=debug", "names no port; write rfc2217://HOST:PORT"),
         ("miro://nothing", "cannot be opened"),
     ],
 )
