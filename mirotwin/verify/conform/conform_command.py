@@ -63,21 +63,27 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     COMMAND = "conform"
     image: Annotated[str | None, Argument("[IMAGE.ihx]", NAME)] = None
     ids: Annotated[
-        tuple[str, ...], Option("--rule", metavar="ID", help="A rule to try, such as P12; may be repeated.")
+        tuple[str, ...],
+        Option("--rule", metavar="ID", help="A rule to try, such as P12; may be repeated.", apart="explain"),
     ] = ()
     long: Annotated[bool, Option(help="Also try the rules that take minutes of virtual time.")] = False
-    listing: Annotated[bool, Option("--list", help="List the rules and try none.")] = False
-    everything: Annotated[bool, ALL.saying("Of rules that are not judged, a line each.")] = False
+    listing: Annotated[bool, Option("--list", help="List the rules and try none.", apart="explain")] = False
+    everything: Annotated[bool, ALL.saying("Of rules that are not judged, a line each.", apart="explain")] = (
+        False
+    )
     explain: Annotated[
         str | None,
         Option(metavar="ID", help="Show what happened in the trial of one rule, and try no other."),
     ] = None
-    as_json: Annotated[bool, JSON.saying("One line of JSON a rule instead of the table.")] = False
-    junit: Annotated[Path | None, JUNIT] = None
+    as_json: Annotated[
+        bool, JSON.saying("One line of JSON a rule instead of the table.", apart="explain")
+    ] = False
+    junit: Annotated[Path | None, JUNIT.saying(JUNIT.help, apart="explain")] = None
     artifacts: Annotated[
         Path | None,
         ARTIFACTS.saying(
-            "Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced."
+            "Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced.",
+            apart="explain",
         ),
     ] = None
     seed: Annotated[int, SEED.saying("Seed of the noise between keyed frames.")] = 0

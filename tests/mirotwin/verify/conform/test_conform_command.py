@@ -181,3 +181,13 @@ def test_a_rule_that_a_scenario_names_and_is_not_there_is_refused(mirotwin):
     assert code == 2
     assert "conforms_to=P99" in err
     assert "there is no rule 'P99'" in err
+
+
+@pytest.mark.parametrize(
+    "given",
+    [("--rule", "P30"), ("--all",), ("--json",), ("--junit", "a.xml"), ("--artifacts", "a"), ("--list",)],
+)
+def test_the_trial_of_one_rule_is_shown_alone(mirotwin, given):
+    code, out, err = mirotwin("conform", "--explain", "P44", *given)
+    assert (code, out) == (2, "")
+    assert f"{given[0]} does not go with --explain." in err
