@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.dmath import wrap_pi
+from miro_exact.domain import DomainError
+from miro_exact.rng import Stream
 from miro_host.posture import Posture
 from miro_host.vision import NO_ERRORS, Vision, VisionErrors, measure, to_grid
 
@@ -67,3 +69,17 @@ def test_errors_name_what_is_wrong_with_them(name):
         VisionErrors(**{name: -1e-3})
     with pytest.raises(ValueError, match="delay_frames"):
         Vision(ERRORS, -1)
+
+
+@given(POSTURES, st.integers(0, 10**6))
+def test_an_exposure_is_a_frame_with_the_three_draws_of_its_number(true, number):
+    noise, exposed, framed = Stream(1997, "camera"), Vision(ERRORS, 0), Vision(ERRORS, 0)
+    draws = tuple(noise.gauss(3 * number + axis) for axis in range(3))
+    seen = exposed.expose((true.x_m, true.y_m, true.theta_rad), noise, number)
+    assert seen == framed.frame(true, draws)
+
+
+@pytest.mark.parametrize("x", [math.inf, -math.inf, math.nan])
+def test_what_is_nowhere_is_on_no_grid(x):
+    with pytest.raises(DomainError, match="beyond any grid"):
+        to_grid(x, 0.004375)

@@ -34,18 +34,7 @@ class StraightLine(msgspec.Struct, frozen=True):
         if self.start_x_m != 0.0 or self.start_y_m != 0.0:
             at = Posture(self.start_x_m + s * cos, self.start_y_m + s * sin, angle)
             return with_polar_form(at, v, 0.0, v_dot, 0.0)
-        return Reference(
-            posture=Posture(s * cos, s * sin, angle),
-            v_m_s=v,
-            w_rad_s=0.0,
-            v_dot_m_s2=v_dot,
-            w_dot_rad_s2=0.0,
-            rho_m=s,
-            phi_rad=angle,
-            rho_rate_m_s=v,
-            phi_rate_rad_s=0.0,
-            rho_accel_m_s2=v_dot,
-        )
+        return Reference(Posture(s * cos, s * sin, angle), v, 0.0, v_dot, 0.0, s, angle, v, 0.0, v_dot)
 
     def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """A line that does not end in time leads on for ever."""

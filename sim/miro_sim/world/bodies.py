@@ -34,8 +34,6 @@ class Bodies:
     def begin(self, tick: int, until_tick: int) -> None:
         """A piece begins at `tick`: robots that may touch in it note where they are, from when they may."""
         self.looks = []
-        if not self.pairs:
-            return
         at = {}
         for robot in self.robots:
             at[robot] = _posture(robot, tick)

@@ -3,13 +3,17 @@ cimport cython
 from miro_host.station cimport Station
 from miro_sim.radio.downlink cimport Downlink
 from miro_sim.radio.uplink cimport Uplink
+from miro_host.telemetry_receiver cimport TelemetryReceiver
+from miro_sim.world.outbox cimport Outbox
 from miro_sim.world.robot cimport Robot
 
 cdef long long SETTLE_TICKS
 
 
 cdef class Network:
-    cdef readonly object spec, index, telemetry, actions, outbox, log
+    cdef readonly object spec, index, actions, log
+    cdef readonly TelemetryReceiver telemetry
+    cdef readonly Outbox outbox
     cdef public object sight
     cdef readonly Station station
     cdef readonly Downlink downlink

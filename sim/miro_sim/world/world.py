@@ -289,8 +289,9 @@ class World:
         """Where everything meets next, going to `tick`."""
         next_tick = min(tick, (self.index + 1) * CONTROL_PERIOD_TICKS)
         for network in self.networks:
-            action_tick = network.actions.next_after(self.tick)
-            next_tick = min(next_tick, action_tick)
+            if network.actions.waiting:
+                action_tick = network.actions.next_after(self.tick)
+                next_tick = min(next_tick, action_tick)
         return next_tick
 
     def run_piece(self, tick: int) -> None:
@@ -302,7 +303,8 @@ class World:
             network.send_due(tick)
         for network in self.networks:
             network.settle(tick)
-        self.bodies.begin(self.tick, tick)
+        if self.bodies.pairs:
+            self.bodies.begin(self.tick, tick)
         self.tick = tick
         for network in self.networks:
             self.stopped = network.run(tick) or self.stopped

@@ -2,6 +2,10 @@
 
 import pytest
 
+from miro_protocol.decoder import TelemetryDecoder
+from miro_protocol.frames import TelemetryFrame, encode, seal
+from miro_protocol.table import TELEMETRY
+from miro_protocol.transmission import Transmission
 from miro_robot.event_log import EventLog
 from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
 
@@ -36,6 +40,26 @@ def test_a_cursor_on_a_pc_may_leave_out_characters():
         (1, "answer", 11),
     ]
     assert [event.what for _, event in without.read(heard=False)] == ["answer"]
+
+
+def test_what_a_pc_sent_and_was_answered_are_events_when_its_log_is_read():
+    log = host_log()
+    cursor = Cursor(log)
+    (answer,) = TelemetryDecoder().feed(encode(TelemetryFrame(seq=3, slot=2), 3), 1000)
+    log.note(Transmission(5, ">", b"ab", 0, (1,)))
+    log.note(answer)
+    assert [event for _, event in cursor.read(heard=False)] == [
+        Event(tick=5, what="sent", data=b"ab", good_stop=False),
+        Event(tick=answer.last_tick + 7, what="answer", value=2, frame=answer),
+    ]
+
+
+def test_an_answer_that_no_robot_gives_is_of_no_slot():
+    log = host_log()
+    cursor = Cursor(log)
+    (answer,) = TelemetryDecoder().feed(seal(TELEMETRY, bytes([2 << 6, 0xC0, *[0] * 8])), 0)
+    log.note(answer)
+    assert [event.value for _, event in cursor.read()] == [-1]
 
 
 def test_a_cursor_on_a_robot_may_leave_out_characters():
