@@ -80,7 +80,7 @@ cdef class Board(Bus):
     cpdef port_written(self, int port, int latch, long long tick)
     @cython.final
     @cython.locals(changed=cython.int)
-    cdef int _set_pins(self, int port, int levels, long long tick) except -1
+    cdef inline int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.final
     @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, broken=cython.int, too=cython.int)
     cdef inline bint _only_levels(self, long long tick) except -1
@@ -91,7 +91,9 @@ cdef class Board(Bus):
     cdef int _put_address(self, int address, long long start) except -1
     cpdef fault(self, int kind, int pc, long long tick)
     @cython.final
-    cdef int _drive_bridge(self, long long tick) except -1
+    cdef inline int _drive_bridge(self, long long tick) except -1
+    @cython.final
+    cdef int _set_bridge(self, long long tick, int side, Lm629 chip) except -1
     @cython.final
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
     cdef int _drive_interrupts(self, long long tick) except -1
@@ -102,7 +104,7 @@ cdef class Board(Bus):
     cdef inline int _strobes(self, int pins) noexcept
     @cython.final
     @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, at_left=cython.int, at_right=cython.int, levels=cython.int, due=cython.longlong)
-    cdef int _drive_chips(self, long long tick) except -1
+    cdef inline int _drive_chips(self, long long tick) except -1
     @cython.final
     @cython.locals(busy_writes=cython.longlong)
     cdef inline int _watch_bus(self, int both_drive, long long tick) except -1

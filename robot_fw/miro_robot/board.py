@@ -285,13 +285,14 @@ class Board(Bus):
     def _drive_bridge(self, tick: int) -> None:
         """L298: EN = PWM magnitude, IN1/IN2 = sign."""
         if self.left.pwm != self.bridge_enable[0] or self.left.sign != self.bridge_sign[0]:
-            self.bridge_enable[0] = self.left.pwm
-            self.bridge_sign[0] = self.left.sign
-            self.plant.set_bridge(tick, 0, self.left.pwm, 1 - self.left.sign)
+            self._set_bridge(tick, 0, self.left)
         if self.right.pwm != self.bridge_enable[1] or self.right.sign != self.bridge_sign[1]:
-            self.bridge_enable[1] = self.right.pwm
-            self.bridge_sign[1] = self.right.sign
-            self.plant.set_bridge(tick, 1, self.right.pwm, 1 - self.right.sign)
+            self._set_bridge(tick, 1, self.right)
+
+    def _set_bridge(self, tick: int, side: int, chip: Lm629) -> None:
+        self.bridge_enable[side] = chip.pwm
+        self.bridge_sign[side] = chip.sign
+        self.plant.set_bridge(tick, side, chip.pwm, 1 - chip.sign)
 
     def _drive_interrupts(self, tick: int) -> None:
         """HI of each LM629 to the CPU pins that it is wired to."""

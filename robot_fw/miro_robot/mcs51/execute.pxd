@@ -7,6 +7,7 @@ cdef int _UNDEFINED_OPCODE
 cdef int _STACK_OVERFLOW
 cdef int _STACK_UNDERFLOW
 cdef int _MOV_DATA
+cdef int _CORE
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):

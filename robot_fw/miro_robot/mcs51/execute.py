@@ -22,6 +22,7 @@ _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
 _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
 _MOV_DATA = 0x75
+_CORE = 0xD0  # the core's registers that have bits (PSW, ACC, B) lie from here on
 _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 
 REACHED, STOPPED, BREAKPOINT, WIRE_FULL = range(4)  # why a run ended
@@ -414,7 +415,12 @@ class Executor(Core):
         self.user_flags = value & 0x22
 
     def read_bit(self, bit: int) -> int:
-        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read(bit & 0xF8)
+        if bit < 0x80:
+            byte = self.iram[0x20 + (bit >> 3)]
+        elif bit < _CORE:
+            byte = self.read_sfr(bit & 0xF8)
+        else:
+            byte = self.read_register(bit & 0xF8)
         return (byte >> (bit & 7)) & 1
 
     def latched_bit(self, bit: int) -> int:
@@ -426,6 +432,8 @@ class Executor(Core):
             address = 0x20 + (bit >> 3)
             kept = self.iram[address] & (0xFF ^ (1 << (bit & 7)))
             self.iram[address] = kept | (level << (bit & 7))
+        elif bit < _CORE:
+            self.write_sfr_bit(bit & 0xF8, 1 << (bit & 7), level)
         else:
             self.write_register_bit(bit & 0xF8, 1 << (bit & 7), level)
 

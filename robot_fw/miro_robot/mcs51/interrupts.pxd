@@ -16,7 +16,7 @@ cdef class Interrupts:
     cpdef void ask(self, int source, long long cycle) noexcept
     cpdef void withdraw(self, int source, long long cycle) noexcept
     cdef inline int enabled(self) noexcept
-    cdef int open(self) noexcept
+    cdef inline int open(self) noexcept
     @cython.locals(waiting=int, source=int, chosen=int, latched='long long')
     cpdef int choose(self, long long boundary) noexcept
     @cython.locals(waiting=int, source=int, earliest='long long', boundary='long long')

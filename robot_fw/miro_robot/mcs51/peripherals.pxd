@@ -79,7 +79,7 @@ cdef class Peripherals:
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cdef int _read_rarely(self, int address, long long cycle) noexcept
-    @cython.locals(value=int)
+    @cython.locals(timers=bint, value=int)
     cdef int write_bit(self, int address, int mask, int level, long long cycle) except -1
     @cython.locals(sooner=int)
     cpdef int write(self, int address, int value, long long cycle) except -1

@@ -378,11 +378,11 @@ class Peripherals:
 
     def write_bit(self, address: int, mask: int, level: int, cycle: int) -> int:
         """As `write`, of one bit; the others keep what hardware has set meanwhile."""
-        value = self.read(address, cycle)
+        self.sync(cycle)
+        timers = address == _TCON  # what programs do most
+        value = self.timers.control | self.external.control if timers else self.read(address, cycle)
         value = value | mask if level else value & (0xFF ^ mask)
-        if address == _TCON:
-            return self._write_timer(address, value, cycle)
-        return self.write(address, value, cycle)
+        return self._write_timer(_TCON, value, cycle) if timers else self.write(address, value, cycle)
 
     def write(self, address: int, value: int, cycle: int) -> int:
         """A register that is no port; `cycle` is the first to see it. 0 if no event comes sooner by it."""
