@@ -26,7 +26,8 @@ cdef class Regions:
     cpdef int find(self, bytearray pixels, int width, int height) except -1
     cpdef object region(self, int index)
     cpdef (double, double) centroid(self, int index)
-    @cython.locals(data='unsigned char *', table='unsigned char *', width=int, at=int, runs=int, row=int, column=int, before=int, kind=int)
+    @cython.locals(data='unsigned char *', table='unsigned char *', width='long long',
+                   at='long long', runs='long long', row=int, column='long long', before=int, kind=int)
     cdef void find_runs(self, bytearray pixels) noexcept
     @cython.locals(above=int, run=int, row=int, other=int)
     cdef void merge(self) noexcept

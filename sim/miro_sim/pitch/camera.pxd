@@ -25,7 +25,7 @@ cdef class Camera:
     cdef readonly sensor.Sensor sensor
     cdef object boxes
     cdef int sets, field_sets, side, black, span_first, span_end, first, samples, upper, lower, above, below
-    cdef int fall_u, fall_v
+    cdef int fall_u, fall_v, covered_first, covered_end
     cdef int team_paint[10]
     cdef int identity_paint[10]
     cdef long long drift_um[10]
@@ -64,8 +64,8 @@ cdef class Camera:
     cdef void _bound(self, int body) noexcept
     @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, bytearray out)
-    @cython.locals(column=int, total='long long')
-    cdef void _put_robots(self, int row, int first, int end, int at) noexcept
+    @cython.locals(column=int, sure=bint, total='long long')
+    cdef void _put_robots(self, int row, int at) noexcept
     @cython.locals(width=int, height=int, at=int, pixel=int, most='long long', body=int)
     cdef void _cover(self, int top, int bottom, int first, int end) noexcept
     @cython.locals(at=int, row=int, left=int, right=int, column=int)
@@ -84,6 +84,7 @@ cdef class Camera:
     @cython.locals(at=int, above='long long', below='long long', joined='long long', column='long long',
                    lane='long long', a=int, b=int, c=int, d=int)
     cdef void _join(self, int row, int left, int right) noexcept
+    @cython.locals(total='long long')
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
     @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, team=int, identity=int,
                    total='long long')

@@ -64,7 +64,8 @@ class Camera:
         *("field_sets", "side", "black", "boxes", "robots", "team_paint", "identity_paint", "x", "y"),
         *("cos", "sin", "shift_u", "shift_v", "edges", "near_low", "near_high", "drift_um"),
         *("span_first", "span_end", "corner_u", "corner_v", "code", "every", "some", "always", "ever"),
-        *("covered", "total", "first", "samples", "upper", "lower", "above", "below", "fall_u", "fall_v"),
+        *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
+        *("above", "below", "fall_u", "fall_v"),
         *("u", "v", "seen", "height_um"),
     )
 
@@ -108,6 +109,8 @@ class Camera:
         self.always = [0] * 352
         self.ever = [0] * 352
         self.covered = [0] * 4096
+        self.covered_first = 0
+        self.covered_end = 0
         self.total = [0] * 4096
         self.first = 0
         self.samples = 16
@@ -247,16 +250,16 @@ class Camera:
             self._cover(above, below, first, end)
             for row in range(above, below):
                 self.scene.show(self.sensor, row, first, end, self.field_sets)
-                self._put_robots(row, first, end, (row - above) * (end - first))
+                self._put_robots(row, (row - above) * (end - first) - first)
                 self.sensor.write(row, left, width, out, 3 * width * (row - top))
 
-    def _put_robots(self, row: int, first: int, end: int, at: int) -> None:
-        """Those pixels of a line in which a robot may be seen; `at`: where the line begins in the band."""
-        for column in range(first, end):
-            if self.covered[at]:
-                total = self.total[at] if self.covered[at] == _SURE else self._samples(row, column)
+    def _put_robots(self, row: int, at: int) -> None:
+        """Those pixels of a line in which a robot may be seen; `at`: where column 0 would be in the band."""
+        for column in range(self.covered_first, self.covered_end):
+            if self.covered[at + column]:
+                sure = self.covered[at + column] == _SURE
+                total = self.total[at + column] if sure else self._samples(row, column)
                 self.sensor.put(column, total, self.scene.light(row * _WIDTH + column))
-            at += 1
 
     # ---- one robot
 
@@ -265,6 +268,7 @@ class Camera:
         width, height = end - first, bottom - top
         for at in range(width * height):
             self.covered[at] = 0
+        self.covered_first, self.covered_end = _WIDTH, 0
         pixel = (top + height // 2) * _WIDTH + first + width // 2
         most = (width + height + 6) * self.rays.spread_um  # neighbours are no further apart than two spreads
         for body in range(self.robots):
@@ -278,6 +282,8 @@ class Camera:
         at = 0 - first
         for row in range(top, bottom):
             left, right = self.span_first, self.span_end
+            self.covered_first = min(self.covered_first, left)
+            self.covered_end = max(self.covered_end, right)
             self._find_span(body, row + 1, first, end if row + 1 < bottom else first)
             self._find_corners(body, row + 1, min(left, self.span_first), max(right, self.span_end))
             self._join(row, left, right)
@@ -381,11 +387,16 @@ class Camera:
         if self.covered[index]:
             self.covered[index] = _UNSURE
             return
-        self.total[index] = self._alone(body, row, column)
-        self.covered[index] = _SURE if self.total[index] >= 0 else _UNSURE
+        total = self._alone(body, row, column)
+        if total != 0:
+            self.covered[index] = _SURE if total > 0 else _UNSURE
+            self.total[index] = total
 
     def _alone(self, body: int, row: int, column: int) -> int:
-        """The samples of a pixel where one robot may be seen, by how many see what; -1 if that does not tell."""
+        """The samples of a pixel where one robot may be seen, by how many see what.
+
+        0 if none sees the robot: no paint is. -1 if what they see is not told by how many there are.
+        """
         scene = self.scene
         whole = 16 * self.field_sets
         total = 0
@@ -395,7 +406,7 @@ class Camera:
             behind = scene.behind(pixel)
             entered = self._entered(body, row, column, on_top)
             if entered == 0:
-                return scene.total[pixel] * self.field_sets
+                return 0
             if (entered < whole and behind == _MIXED) or scene.shows_ball(pixel):
                 return -1
             if entered < whole:
