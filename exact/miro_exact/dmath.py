@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# No divisor below is ever zero.
 """Elementary functions from + - * / alone, so that every machine gives the same bits.
 
 The method is that of fdlibm (Sun Microsystems 1993): reduce the argument by a split constant, evaluate a
