@@ -34,8 +34,9 @@ cdef class Stream:
     cpdef u64_t next_below(self, long long index, long long end, u64_t threshold) except? 1
     cpdef u64_t u64(self, long long index) except? 1
     cdef u64_t pair(self, u64_t kind, long long index) except? 1
-    @cython.locals(word=u64_t, part=int)
     cpdef int bit(self, long long index) except -1
+    @cython.locals(part=int)
+    cpdef u64_t bits(self, long long index) except? 1
     cpdef double uniform(self, long long index) except? -1.0
     @cython.locals(draw=u64_t, magnitude=u64_t, low=u64_t, cell=int, above=int, half=int, fraction=double, middle=double, place=double, z=double)
     cpdef double gauss(self, long long index) except? -1000.0

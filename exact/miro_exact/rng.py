@@ -193,19 +193,21 @@ class Stream:
 
     def bit(self, index: int) -> int:
         """One random bit, 0 or 1."""
+        return (self.bits(index) >> (index & 31)) & 1
+
+    def bits(self, index: int) -> int:
+        """The 32 random bits to which `bit(index)` belongs, the one of the lowest index lowest."""
         if index < 0 or index >= _INDICES:
             raise ValueError(f"{self!r}: index {index} is outside 0 .. 2^56 - 1")
         self.load(_BITS | (index >> 7))
         part = (index >> 5) & 3
         if part == 0:
-            word = self.w0
-        elif part == 1:
-            word = self.w1
-        elif part == 2:
-            word = self.w2
-        else:
-            word = self.w3
-        return (word >> (index & 31)) & 1
+            return self.w0
+        if part == 1:
+            return self.w1
+        if part == 2:
+            return self.w2
+        return self.w3
 
     def uniform(self, index: int) -> float:
         """A multiple of 2^-53 in [0, 1): the upper 53 bits of `u64(index)`, exact."""

@@ -25,19 +25,19 @@ cdef class Band:
     cdef bint chained
     cdef Transmitter alone
     cdef int known
-    cdef long long change
+    cdef long long alone_until, change_tick
     cdef readonly list transmitters
 
     cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
-    @cython.locals(sent='long long', alone=Transmitter)
+    @cython.locals(sent='long long')
     cdef int level(self, long long tick) except -1
-    @cython.locals(change='long long')
-    cdef long long next_change(self, long long tick) except? -1
+    @cython.locals(alone=Transmitter, line=Line)
+    cdef int _follow(self, long long sent) except -1
     @cython.locals(
         transmitter=Transmitter, line=Line, slot='long long', level=int, keyed=int, carriers=int, wrong=cython.bint,
-        threshold='unsigned long long', change='long long', own_edge='long long',
+        threshold='unsigned long long', change='long long', own_edge='long long', one_alone=cython.bint,
     )
     cdef int _look(self, long long sent) except -1
     @cython.locals(transmitter=Transmitter)

@@ -50,9 +50,10 @@ class Band:
     STATE = {"link_state": ("i", 0, NOISE), "transmitters": [Transmitter]}
     NOT_STATE = (
         "alone",
+        "alone_until",
         "burst_threshold",
         "chained",
-        "change",
+        "change_tick",
         "errors",
         "known",
         "latency",
@@ -75,9 +76,12 @@ class Band:
         self.burst_threshold = params.burst_threshold
         self.chained = params.bursts is not None or params.dropouts is not None
         self.transmitters: list[Transmitter] = []
-        self.alone: Transmitter | None = None  # on the air with nothing that disturbs it, up to `change`
-        self.known = 1  # the level else
-        self.change = -_NEVER
+        self.known = 1  # the answer before `change_tick`
+        self.change_tick = 0
+        self.alone: Transmitter | None = (
+            None  # before `alone_until`, on the air with nothing that disturbs it
+        )
+        self.alone_until = -_NEVER
 
     def add(self, robot: int, line: Line) -> None:
         line.unread = False
@@ -91,25 +95,26 @@ class Band:
         return limit
 
     def level(self, tick: int) -> int:
-        """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error."""
-        sent = tick - self.latency
-        if sent >= self.change:
-            self._look(sent)
-        alone = self.alone
-        if alone is None:
-            return self.known
-        alone.last_edge = max(alone.last_edge, alone.line.edge_at(sent))
-        return alone.line.level_at(sent)
+        """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error. It stays up to `change_tick`."""
+        if tick >= self.change_tick:
+            sent = tick - self.latency
+            if sent < self.alone_until:
+                self._follow(sent)
+            else:
+                self._look(sent)
+        return self.known
 
-    def next_change(self, tick: int) -> int:
-        """The first tick after `tick`, where the level was just asked for, at which it may be another."""
-        change = self.change
-        if self.alone is not None:
-            change = min(change, self.alone.line.next_edge(tick - self.latency))
-        return change + self.latency
+    def _follow(self, sent: int) -> None:
+        """One robot is alone on the air, and its wire has an edge after the last query."""
+        alone = self.alone
+        assert alone is not None
+        line = alone.line
+        alone.last_edge = line.edge_at(sent)
+        self.known = line.level_at(sent)
+        self.change_tick = min(line.next_edge(sent), self.alone_until) + self.latency
 
     def _look(self, sent: int) -> None:
-        """Finds what the level is from `sent` up to `change`: that of `alone`, or else `known`."""
+        """Mixes all wires, and finds up to when what was found holds."""
         slot = sent // _BIT
         level = 1
         keyed = carriers = 0
@@ -136,9 +141,9 @@ class Band:
             change = min(change, (slot + 1) * _BIT)
         elif keyed:
             change = min(change, self.errors.next_below(slot + 1, change // _BIT + 1, threshold) * _BIT)
-        if keyed != 1 or wrong or self.chained or self.link_state != _UP:
-            self.alone = None
-            change = min(change, own_edge)
+        one_alone = keyed == 1 and not wrong and not self.chained and self.link_state == _UP
+        self.alone_until = change if one_alone else -_NEVER
+        change = min(change, own_edge)
         self.known = (level ^ 1) | 2 if wrong else level
         if self.link_state == _NOISE:
             slot = (sent + self.latency) // _BIT
@@ -146,7 +151,7 @@ class Band:
             change = min(change, (slot + 1) * _BIT - self.latency)
         elif self.link_state == _DOWN:
             self.known = 1
-        self.change = change
+        self.change_tick = change + self.latency
 
     def hear(self, tick: int) -> None:
         """The receiver has come to `tick`: drops edges from the robots' wires that no later query needs.
@@ -155,7 +160,7 @@ class Band:
 
         A later one is about `last_edge` or later, so the edges behind it and the level between are enough.
         """
-        self.change = -_NEVER
+        self.change_tick, self.alone_until = 0, -_NEVER
         for transmitter in self.transmitters:
             transmitter.line.forget(transmitter.last_edge)
             transmitter.line.hear(tick)

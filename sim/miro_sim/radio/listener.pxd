@@ -28,7 +28,7 @@ cdef class Listener:
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     @cython.locals(level=int)
     cdef void hear_nothing(self, long long tick, long long until) except *
-    @cython.locals(slot='long long', level=int, before=int)
+    @cython.locals(slot='long long', bits='unsigned long long', level=int, before=int)
     cdef void hear_noise(self, long long tick, long long until) except *
     cdef int silence(self, long long tick, long long slot) except -1
     @cython.locals(slot='long long')

@@ -133,9 +133,12 @@ class Listener:
     def hear_noise(self, tick: int, until: int) -> None:
         """What no carrier drowns, or somebody else's noise on the frequency, stronger than any carrier."""
         slot = tick // _BIT
+        bits = self.noise.bits(slot)
         before = -1
         while tick < until:
-            level = self.noise.bit(slot)
+            if slot & 31 == 0:
+                bits = self.noise.bits(slot)
+            level = bits >> (slot & 31) & 1
             if level != before:
                 self.line.append(tick, level)
                 before = level

@@ -97,7 +97,7 @@ class Uplink:
             self.bit = 0
             self.shift = 0
         else:
-            self.now = min(self.band.next_change(self.now), until)
+            self.now = min(self.band.change_tick, until)
         self.before = level
 
     def sample(self, until: int, symbols: list[tuple[int, bool, int]]) -> None:
