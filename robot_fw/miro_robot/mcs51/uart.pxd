@@ -65,7 +65,7 @@ cdef class Uart:
     cdef void _receive(self, long long tick) noexcept
     @cython.locals(now='long long', enabled=int, level=int, change='long long')
     cdef void _search(self, long long tick) noexcept
-    @cython.locals(period='long long', level=int, edge='long long', state=int, idle='long long', now='long long')
+    @cython.locals(period='long long', level=int, state=int, idle='long long', now='long long')
     cdef void _bit(self, long long tick) noexcept
     @cython.locals(period='long long', idle=int, first='long long', number=int, most=int, found=int, more=int, level=int)
     cdef bint _unanimous(self, long long tick) noexcept

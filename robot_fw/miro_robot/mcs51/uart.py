@@ -276,8 +276,6 @@ class Uart:
     def _bit(self, tick: int) -> None:
         """16x ticks of a character below `tick`: only counter states 7 to 10 of its bits do anything."""
         period = self.rx_period
-        level = 0
-        edge = 0  # the level holds until then
         while self.rx_next < tick and self.rx_count:
             state = self.rx_count & _COUNTER_BITS
             now = self.rx_next
@@ -289,12 +287,9 @@ class Uart:
                     idle = (tick - 1 - now) // period + 1
                 self.rx_count += idle
                 self.rx_next = now + idle * period
-                if self.rx_next >= tick:  # else what comes next looks again
-                    self.rx_last = self.level(self.rx_next - period)
+                self.rx_last = self.level(self.rx_next - period)
                 continue
-            if now >= edge:
-                level = self.level(now)
-                edge = self.rxd.next_edge(now) if self.latch & 1 else _NEVER
+            level = self.level(now)
             self.rx_last = level
             self.rx_next = now + period
             self.rx_count += 1
