@@ -142,6 +142,8 @@ def replay(options: ReplayOptions) -> int:
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
+    if not options.desk.port and (given := options.given("out", "force")):
+        raise click.UsageError(f"{given[0]} needs --port.")
     file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
     if is_bare_case(file):
         _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))

@@ -135,6 +135,9 @@ class _Table:
         value = self.table[verb]
         if isinstance(value, str) and value in choices:
             return choices[value]
+        event = value.get("event") if isinstance(value, dict) else None  # as `[expect]` has a condition
+        if isinstance(event, str) and event in choices:
+            self.refuse(verb, "expected a name", f'write {verb} = "{event}", and its other keys beside it')
         what = f"{value!r} is not one of the choices"
         self.refuse(verb, what, f"use {' or '.join(', '.join(choices).rsplit(', ', 1))}")
 

@@ -40,6 +40,8 @@ WRONG = {
     '{ wait_for = "frame", within_ms = "40 ms" }': "step 1.within_ms: expected a number in milliseconds, got a str",
     '{ wait_for = "frame", within_ms = -1 }': "step 1.within_ms: -1 is out of range; must be >= 0.0 in millisec",
     '{ wait_for = "frame", for_ms = 9 }': "step 1.for_ms: unknown key; it belongs to never and hold",
+    '{ wait_for = { event = "frame", slot = 0 } }': 'step 1.wait_for: expected a name; write wait_for = "frame", and',
+    "{ wait_for = { event = [1] } }": "step 1.wait_for: {'event': [1]} is not one of the choices",
     '{ wait_for = "telemetry" }': "step 1.wait_for: 'telemetry' is not one of the choices; use answer, heard,",
     '{ expect = "answer", acepted = 3 }': "step 1.acepted: unknown key; did you mean accepted?",
     '{ expect = "answer", slot = 2 }': "step 1.slot: there is no robot in slot 2; there is 0",
