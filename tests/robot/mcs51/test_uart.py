@@ -16,7 +16,7 @@ from miro_robot.mcs51.cpu import Cpu
 from tests import children
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.naive.mcs51_uart import NaiveUart
-from tests.robot.mcs51.asm import SFRS
+from tests.robot.mcs51.asm import SFRS, assemble
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
 
 BIT = 2496  # ticks, with timer 2 reloading 65536 - 78
@@ -309,6 +309,36 @@ def test_a_character_that_is_put_on_rxd_between_two_runs_interrupts(before):
         cpu.rxd.append(12_000 + place * 1_152, (0xA5 << 1 | 1 << 9) >> place & 1)
     cpu.run(3_000)
     assert cpu.peek_iram(0x30) == 0xA5
+
+
+class OrderedBus(RecordingBus):
+    """Remembers in which order it was told of ports and characters."""
+
+    def __init__(self):
+        super().__init__()
+        self.ticks = []
+
+    def port_written(self, port, latch, tick):
+        self.ticks.append(tick)
+
+    def byte_sent(self, value, tick):
+        super().byte_sent(value, tick)
+        self.ticks.append(tick)
+
+
+@pytest.mark.parametrize("priorities", ["00h", "02h", "10h"])
+def test_the_bus_is_told_of_a_character_in_its_turn_though_no_interrupt_answers_it(priorities):
+    cpu = Cpu(OrderedBus())
+    cpu.load(
+        assemble(
+            "LJMP main\nORG 000Bh\nLJMP routine\nORG 0023h\nCLR TI\nRETI\nroutine:\nMOV SBUF,#5Ah\nMOV R7,#50\n"
+            f"DJNZ R7,$\nMOV P1,#0\nRETI\nmain:\nMOV SCON,#80h\nMOV IP,#{priorities}\nMOV IE,#92h\nSETB TF0\nSJMP $"
+        )
+    )
+    cpu.run(300)
+    assert len(cpu.bus.sent) == 1
+    assert len(cpu.bus.ticks) == 2
+    assert cpu.bus.ticks == sorted(cpu.bus.ticks)
 
 
 HASTY = """
