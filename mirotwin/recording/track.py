@@ -223,5 +223,5 @@ def error_of(robot: RobotPeriod, tick: int) -> ErrorSample:
         100.0 * (truth.x_m - at.x_m),
         100.0 * (truth.y_m - at.y_m),
         wrapped(truth.theta_rad - at.theta_rad),
-        not pitch.holds(msgspec.structs.replace(truth, theta_rad=wrapped(truth.theta_rad))),
+        not pitch.holds(Posture(truth.x_m, truth.y_m, wrapped(truth.theta_rad))),
     )
