@@ -28,7 +28,6 @@ cdef class Stream:
     cdef void _four_blocks(self, u64_t first, unsigned int *four) noexcept
     @cython.locals(place=int)
     cdef void _load_draws(self, long long group) noexcept
-    cdef inline u64_t _draw(self, long long index) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1
     cpdef u64_t next_below(self, long long index, long long end, u64_t threshold) except? 1

@@ -142,15 +142,12 @@ class Stream:
         """32 random bits."""
         if index < 0 or index >= _INDICES:
             raise ValueError(f"{self!r}: index {index} is outside 0 .. 2^56 - 1")
-        return self._draw(index)
-
-    def _draw(self, index: int) -> int:
-        """`u32`; the sixteen draws that are worked out at once stay there as a cache."""
         if index >> 4 != self.group:
             self._load_draws(index >> 4)
         return self.draws[(index & 3) << 2 | (index >> 2) & 3]
 
     def _load_draws(self, group: int) -> None:
+        """Sixteen draws of `u32`, which are worked out at once and stay there as a cache."""
         self._four_blocks(group << 2, self.draws)
         self.group = group
         self.least = self.draws[0]
@@ -172,7 +169,7 @@ class Stream:
                 self._load_draws(index >> 4)
             if self.least >= threshold:
                 index = (index >> 4) + 1 << 4
-            elif self._draw(index) >= threshold:
+            elif self.u32(index) >= threshold:
                 index += 1
             else:
                 return index

@@ -8,10 +8,10 @@ cpdef double curvature_term(double v, double w, double rho, double sin_alpha) ex
 cpdef double guarded_inverse(double cos_alpha, double d) except? -7.5
 
 
-cdef class Terms:
+cdef class YangKimControl:
     cdef double gamma1, gamma2, q1, q2, p1, p2, layer_s1, layer_s2, layer_theta, cosine_guard, rho_floor
     cdef bint smooth, layer_derivative
-    cdef readonly double rho_e, phi_e, theta_e, s1, s2, u1, u2
+    cdef readonly double rho_e_m, phi_e_rad, theta_e_rad, s1, s2, u1, u2
 
     @cython.locals(
         x=double, y=double, theta=double, rho=double, phi=double, sin_alpha=double, cos_alpha=double, rho_floor=double,

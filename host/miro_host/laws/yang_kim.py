@@ -8,7 +8,6 @@ the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 
 import math
 from typing import Annotated, ClassVar, Literal
 
-import msgspec
 from msgspec import Meta
 
 from miro_exact import dmath
@@ -86,22 +85,6 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
         return YangKim(self)
 
 
-class YangKimControl(msgspec.Struct, frozen=True):
-    """What the law saw and what it answers.
-
-    Errors c - r in polar coordinates (m, rad, wrapped), surfaces s1 [m/s], s2 [rad/s] of equation (13),
-    inputs u1 [m/s2], u2 [rad/s2] of equation (16).
-    """
-
-    rho_e_m: float
-    phi_e_rad: float
-    theta_e_rad: float
-    s1: float
-    s2: float
-    u1: float
-    u2: float
-
-
 def sign(x: float) -> float:
     """sgn(x): -1, 0 or 1."""
     if x > 0.0:
@@ -129,35 +112,38 @@ class YangKim(Law[Gains]):
     """Equations (13) and (16) with one set of gains; without memory: the same inputs give the same output."""
 
     INNER = ("u1", "u2", "s1", "s2")
-    NOT_STATE = ("parameters", "terms")
+    NOT_STATE = ("parameters", "worked_out")
 
     def __init__(self, parameters: Gains) -> None:
         super().__init__(parameters)
-        self.terms = Terms(parameters)
+        self.worked_out = YangKimControl(parameters)
 
     def step(self, given: LawInput) -> Accelerations:
         """v_r' + u1 and w_r' + u2, which equation (15) integrates."""
-        r, terms = given.reference, self.terms
-        terms.work_out(r, given.posture, given.v_m_s, given.w_rad_s)
-        u1, u2 = terms.u1, terms.u2
-        inner = {"u1": u1, "u2": u2, "s1": terms.s1, "s2": terms.s2}
+        r, c = given.reference, self.worked_out
+        c.work_out(r, given.posture, given.v_m_s, given.w_rad_s)
+        u1, u2 = c.u1, c.u2
+        inner = {"u1": u1, "u2": u2, "s1": c.s1, "s2": c.s2}
         return Accelerations(r.v_dot_m_s2 + u1, r.w_dot_rad_s2 + u2, inner)
 
     def control(
         self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float
-    ) -> YangKimControl:
+    ) -> "YangKimControl":
         """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
 
         ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
         """
-        terms = self.terms
-        terms.work_out(reference, measured, v_m_s, w_rad_s)
-        errors = terms.rho_e, terms.phi_e, terms.theta_e
-        return YangKimControl(*errors, terms.s1, terms.s2, terms.u1, terms.u2)
+        control = YangKimControl(self.parameters)
+        control.work_out(reference, measured, v_m_s, w_rad_s)
+        return control
 
 
-class Terms:
-    """The terms of the law as they were worked out last, with one set of gains."""
+class YangKimControl:
+    """What the law saw and what it answers, with one set of gains.
+
+    Errors c - r in polar coordinates (m, rad, wrapped), surfaces s1 [m/s], s2 [rad/s] of equation (13),
+    inputs u1 [m/s2], u2 [rad/s2] of equation (16).
+    """
 
     NOT_STATE = (
         *(
@@ -173,7 +159,7 @@ class Terms:
             "rho_floor",
         ),
         *("layer_s1", "layer_s2", "layer_theta"),
-        *("rho_e", "phi_e", "theta_e", "s1", "s2", "u1", "u2"),
+        *("rho_e_m", "phi_e_rad", "theta_e_rad", "s1", "s2", "u1", "u2"),
     )
 
     def __init__(self, gains: Gains) -> None:
@@ -186,7 +172,10 @@ class Terms:
         self.layer_derivative = gains.layer_derivative
         self.cosine_guard = gains.cosine_guard
         self.rho_floor = gains.rho_floor_m
-        self.rho_e = self.phi_e = self.theta_e = self.s1 = self.s2 = self.u1 = self.u2 = 0.0
+        self.rho_e_m = self.phi_e_rad = self.theta_e_rad = self.s1 = self.s2 = self.u1 = self.u2 = 0.0
+
+    def __repr__(self) -> str:
+        return f"YangKimControl(s1={self.s1!r}, s2={self.s2!r}, u1={self.u1!r}, u2={self.u2!r})"
 
     def work_out(self, r: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> None:
         """See `YangKim.control`."""
@@ -227,7 +216,7 @@ class Terms:
         )
         if self.layer_derivative and abs(theta_e) < self.layer_theta:
             u2 -= theta_e_rate / self.layer_theta * abs(phi_e)
-        self.rho_e, self.phi_e, self.theta_e = rho_e, phi_e, theta_e
+        self.rho_e_m, self.phi_e_rad, self.theta_e_rad = rho_e, phi_e, theta_e
         self.s1, self.s2, self.u1, self.u2 = s1, s2, u1, u2
 
     def _switch(self, x: float, width: float) -> float:
