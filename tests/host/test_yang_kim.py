@@ -42,6 +42,10 @@ def twin(gains):
     return {**dict(zip(names, values, strict=True)), "layer_derivative": gains.layer_derivative}
 
 
+def values(c):
+    return c.rho_e_m, c.phi_e_rad, c.theta_e_rad, c.s1, c.s2, c.u1, c.u2
+
+
 def away_from_switches(c):
     return min(abs(c.theta_e_rad), abs(c.s1), abs(c.s2), abs(c.phi_e_rad)) > 1e-9 and all(
         abs(abs(angle) - math.pi) > 1e-9 for angle in (c.theta_e_rad, c.phi_e_rad)
@@ -163,6 +167,6 @@ def test_outside_the_layer_its_derivative_changes_no_bit(path, t, posture, v, w)
     )
     sloped = YangKim(SLOPED).control(path.at(t), posture, v, w)
     if abs(sloped.theta_e_rad) >= SLOPED.layer_theta_rad or sloped.phi_e_rad == 0.0:
-        assert sloped == published
+        assert values(sloped) == values(published)
     else:
         assert (sloped.u1, sloped.s1, sloped.s2) == (published.u1, published.s1, published.s2)
