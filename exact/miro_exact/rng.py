@@ -63,6 +63,7 @@ class Stream:
         "group",
         "k0",
         "k1",
+        "least",
         "name",
         "name0",
         "name1",

@@ -65,7 +65,7 @@ def decode(content: bytes) -> list[Vector]:
 class _VectorBus(Bus):
     """External RAM of a few bytes, and a record of what happened."""
 
-    NOT_STATE = ("accesses", "latches")
+    NOT_STATE = ("memory", "accesses", "latches")
 
     def __init__(self) -> None:
         self.memory: dict[int, int] = {}
