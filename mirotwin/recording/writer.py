@@ -158,9 +158,7 @@ class McapWriter:
         self._put(rows)
         self._times += (chunk.first_ns, chunk.last_ns)
         place = struct.pack("<4Q", chunk.first_ns, chunk.last_ns, start, len(head) + size)
-        sizes = struct.pack(
-            "<QIQQ", len(rows), 0, size, size
-        )  # in between is the name of a compression: none
+        sizes = struct.pack("<QIQQ", len(rows), 0, size, size)  # 0: no name of a compression
         self._chunks.append(_record(Opcode.CHUNK_INDEX, place, _by_channel(offsets), sizes))
         chunk.begin()
         self._chunk_checksum = 0

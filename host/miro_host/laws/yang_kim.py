@@ -146,21 +146,9 @@ class YangKimControl:
     """
 
     NOT_STATE = (
-        *(
-            "gamma1",
-            "gamma2",
-            "q1",
-            "q2",
-            "p1",
-            "p2",
-            "smooth",
-            "layer_derivative",
-            "cosine_guard",
-            "rho_floor",
-        ),
-        *("layer_s1", "layer_s2", "layer_theta"),
-        *("rho_e_m", "phi_e_rad", "theta_e_rad", "s1", "s2", "u1", "u2"),
-    )
+        "gamma1", "gamma2", "q1", "q2", "p1", "p2", "smooth", "layer_derivative", "cosine_guard", "rho_floor",
+        "layer_s1", "layer_s2", "layer_theta", "rho_e_m", "phi_e_rad", "theta_e_rad", "s1", "s2", "u1", "u2",
+    )  # fmt: skip
 
     def __init__(self, gains: Gains) -> None:
         self.gamma1, self.gamma2 = gains.gamma1_per_s, gains.gamma2_per_s

@@ -226,9 +226,8 @@ class Quadrature:
         self.count = 0
         self.chip: Lm629 | None = None
         self.told = 0  # the count that the chip has seen
-        self.crossings = (
-            0  # steps since then with edges in them: begin, length, position, way, count at its end
-        )
+        # Steps since then with edges in them: their number, and of each begin, length, position, way, count at its end.
+        self.crossings = 0
         self.cross_tick = [0] * 16
         self.cross_ticks = [0] * 16
         self.cross_start = [0.0] * 16

@@ -78,9 +78,7 @@ class Band:
         self.transmitters: list[Transmitter] = []
         self.known = 1  # the answer before `change_tick`
         self.change_tick = 0
-        self.alone: Transmitter | None = (
-            None  # before `alone_until`, on the air with nothing that disturbs it
-        )
+        self.alone: Transmitter | None = None  # on the air before `alone_until`; nothing disturbs it
         self.alone_until = -_NEVER
 
     def add(self, robot: int, line: Line) -> None:
