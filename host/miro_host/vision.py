@@ -103,7 +103,7 @@ class Vision:
         )
 
     def expose(self, true: tuple[float, float, float], noise: Stream, frame: int) -> Posture | None:
-        """The same of a robot at this position and heading, with the draws that belong to frame number `frame`."""
+        """As `frame`, of a robot at this position and heading, with the draws of frame number `frame`."""
         x_m, y_m, theta_rad = true
         first = 3 * frame
         right, up, turn = noise.gauss(first), noise.gauss(first + 1), noise.gauss(first + 2)

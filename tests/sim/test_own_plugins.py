@@ -64,6 +64,19 @@ def test_a_world_saved_anywhere_goes_on_with_the_memory_of_its_parts(parameters,
     assert snapshot(second) == snapshot(whole)
 
 
+def test_an_observer_that_changes_what_it_is_given_changes_no_bit():
+    def spoil(period):
+        for robot in period.robots:
+            if robot.control is not None:
+                robot.control.inner.clear()
+                robot.control.estimate.clear()
+
+    quiet, spoilt = world(Gains()), world(Gains())
+    spoilt.observers.append(spoil)
+    assert finish(spoilt) == finish(quiet)
+    assert spoilt.save() == quiet.save()
+
+
 def test_what_was_heard_is_saved_and_hashed():
     first, second = world(ByEar()), world(ByEar())
     first.run_to(10 * CONTROL_PERIOD_TICKS)

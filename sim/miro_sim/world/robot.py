@@ -162,7 +162,7 @@ def _iram_address(image: Image, name: str) -> int | None:
 
 def _control(command: WheelCommand) -> Control:
     left, right, v_m_s, w_rad_s, inner, _, _, estimate = astuple(command)
-    return Control(v_m_s, w_rad_s, left, right, inner, estimate)
+    return Control(v_m_s, w_rad_s, left, right, dict(inner), dict(estimate))  # observers may change theirs
 
 
 def _axis(chip: Lm629) -> Axis:
