@@ -243,8 +243,8 @@ def _in_order(values: Mapping[str, float], declared: tuple[str, ...]) -> Mapping
 
 def _check_inner(values: Mapping[str, float], declared: tuple[str, ...]) -> None:
     known = len(values) == len(declared)
-    for name in declared:
-        known = known and name in values
+    for name in values:
+        known = known and name in declared
     if not known:
         raise ValueError(f"its inner values are {sorted(values)}, but INNER declares {sorted(declared)}")
     for name, value in values.items():

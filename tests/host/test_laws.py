@@ -126,6 +126,17 @@ def test_a_law_that_fails_is_named_and_leaves_the_command_as_it_was(how, reason)
     assert math.isfinite(one.integrator.v_m_s)
 
 
+def test_a_name_that_a_law_declares_twice_stands_for_no_other():
+    class Twice(Wrong):
+        INNER = ("a", "a")
+
+        def step(self, given):
+            return Velocities(0.1, 0.0, {"a": 1.0, "b": 2.0})
+
+    with pytest.raises(PluginError, match=r"values are \['a', 'b'\], but INNER declares \['a', 'a'\]"):
+        pilot(Twice(WrongParameters())).update(HERE, 0.0)
+
+
 @pytest.mark.parametrize(
     ("command", "reason"),
     [
