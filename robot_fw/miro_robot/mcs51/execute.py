@@ -273,7 +273,7 @@ class Executor(Core):
                 pc = self.compare(pc, iram[iram[self.bank + (rom[at] & 1)]], rom[at + 1], rom[at + 2])
             elif row == 0xB8:  # CJNE Rn,#imm,rel
                 pc = self.compare(pc, iram[self.bank + (rom[at] & 7)], rom[at + 1], rom[at + 2])
-            elif row == 0xC0:  # PUSH dir: SP counts rom[at + 1], so PUSH SP stores the new one (C4)
+            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one (C4)
                 self.claim()
                 value = self.read(rom[at + 1])
                 iram[self.sp] = value
@@ -297,7 +297,7 @@ class Executor(Core):
                 value = iram[self.bank + (rom[at] & 7)]
                 iram[self.bank + (rom[at] & 7)] = self.a
                 self.a = value
-            elif row == 0xD0:  # POP dir: SP counts rom[at + 1], so POP SP ends with the byte popped (C4)
+            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped (C4)
                 value = self.pop()
                 self.write(rom[at + 1], value)
             elif row == 0xD2:  # SETB bit

@@ -86,9 +86,7 @@ class Peripherals:
         self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag; -1: to be worked out
         self.serial_wait = -1  # tick before which the serial port raises no flag; -1: to be worked out
         self.quiet = -1  # cycle up to which nothing is due
-        self.timer1_free = (
-            0  # timer 1 clocks neither direction of the serial port: writing timers does not touch it
-        )
+        self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
 
     def clear(self, cycle: int) -> None:

@@ -363,9 +363,7 @@ class Uart:
         before = self.rx_next - self.rx_period
         fall = self.rxd.next_edge(before)
         if self.rx_last and not self.rxd.level_at(before):
-            fall = (
-                self.rx_next
-            )  # it fell while another clock was running, or none: the next 16x tick finds it
+            fall = self.rx_next  # it fell under another clock, or none: the next 16x tick finds it
         if fall > self.rxd.settled_tick:
             fall = self.rxd.settled_tick
         if fall <= self.rx_next:
