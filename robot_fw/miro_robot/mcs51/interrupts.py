@@ -54,11 +54,16 @@ class Interrupts:
             self.until[source] = 0
 
     def ask(self, source: int, cycle: int) -> None:
-        """The source's flag is first seen at S5P2 of `cycle`; nothing new if it is up already."""
+        """The source's flag is first seen at S5P2 of `cycle`, or before if it is up already.
+
+        The serial port tells of what it sent before it tells of what it received.
+        """
         if self.until[source] != _NEVER:
             self.since[source] = cycle
             self.until[source] = _NEVER
             self.asked |= 1 << source
+        elif cycle < self.since[source]:
+            self.since[source] = cycle
 
     def withdraw(self, source: int, cycle: int) -> None:
         """The source's flag is no longer seen at S5P2 of `cycle`."""

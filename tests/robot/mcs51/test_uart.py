@@ -311,6 +311,24 @@ def test_a_character_that_is_put_on_rxd_between_two_runs_interrupts(before):
     assert cpu.peek_iram(0x30) == 0xA5
 
 
+@pytest.mark.parametrize("start", range(112, 136, 4))
+def test_a_character_received_just_before_one_is_sent_interrupts_in_its_own_cycle(start):
+    whole, pieces = (
+        cpu_with(
+            "LJMP main\nORG 0023h\nCLR RI\nCLR TI\nINC 30h\nRETI\nmain:\nMOV SCON,#90h\nMOV IE,#90h\n"
+            "MOV SBUF,#5Ah\nwait:\nMOV PCON,#1\nSJMP wait"
+        )
+        for _ in range(2)
+    )
+    for cpu in (whole, pieces):
+        cpu.rxd.append(start, 0)
+        cpu.rxd.append(start + 64 * 9, 1)
+    whole.run(200)
+    while pieces.cycles < 200:
+        pieces.run(pieces.cycles + 1)
+    assert snapshot(whole) == snapshot(pieces)
+
+
 class OrderedBus(RecordingBus):
     """Remembers in which order it was told of ports and characters."""
 
