@@ -80,11 +80,13 @@ def hot_modules():
     return from_file("hot_modules")
 
 
-def places(path):
-    """What tells where the fields of a hot module's classes lie (nothing for what has no uncompiled twin)."""
-    return (
-        from_file("places").text(path.with_suffix(".pxd").read_text("utf-8")) if path.suffix == ".py" else ""
-    )
+def shaped(path):
+    """The source of a hot module as it is compiled (unchanged for what has no uncompiled twin)."""
+    source = path.read_text("utf-8")
+    if path.suffix != ".py":
+        return source
+    places, layout = from_file("places"), path.with_suffix(".pxd").read_text("utf-8")
+    return places.without_zeros(source, layout) + places.text(layout)
 
 
 def package_dirs():
@@ -197,10 +199,10 @@ class BuildHot(build_ext):
                 is_hot = path.suffix != ".pxd" and name in hashes
                 if path.suffix == ".py" and not is_hot and path.name != "__init__.py":
                     continue
-                text = path.read_text(encoding="utf-8")
                 copy = target / relative
+                text = path.read_text(encoding="utf-8")
                 if is_hot:
-                    text += places(path) + STAMP.format(sha=hashes[name])
+                    text = shaped(path) + STAMP.format(sha=hashes[name])
                     hot[name] = copy
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 self._write(copy, text)

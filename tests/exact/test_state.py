@@ -298,3 +298,30 @@ cdef class Other:
 
 def test_every_c_type_of_a_layout_has_a_code():
     assert {*places.C_TYPES} == state.CODES.keys()
+
+
+def test_what_sets_the_c_arrays_of_a_new_object_to_zero_is_not_compiled():
+    """Not a list that is no C array, nor ones, nor what another method sets back."""
+    source = """
+class Line:
+    def __init__(self, levels):
+        self.ticks = [0] * 8  # none yet
+        self.places = [0.0] * SIZE
+        self.bytes = bytearray(4)
+        self.waiting = [0] * 8
+        self.weights = [1] * 8
+        self.levels = levels
+
+    def reset(self):
+        self.ticks = [0] * 8
+"""
+    layout = """
+cdef class Line:
+    cdef int ticks[8]
+    cdef double places[8], weights[8]
+    cdef unsigned char bytes[4]
+    cdef list waiting, levels
+"""
+    lines = places.without_zeros(source, layout).splitlines()
+    assert lines[3:6] == ["        pass"] * 3
+    assert lines[:3] + lines[6:] == source.splitlines()[:3] + source.splitlines()[6:]

@@ -1,12 +1,12 @@
 cimport cython
 
-cdef int _TABLE, _PIXELS
+cdef int _PIXELS
 
 
 @cython.final
 cdef class Regions:
     cdef readonly int width, height, runs, count
-    cdef unsigned char table[65536]
+    cdef bytes table
     cdef int run_kind[4096]
     cdef int run_row[4096]
     cdef int run_start[4096]

@@ -16,8 +16,7 @@ TABLE_SIZE = 65536
 MOST_PIXELS = 4096
 """Pixels of one window: no run is shorter than a pixel, so the arrays hold all runs of any picture."""
 
-_TABLE = 65536  # C constants when compiled
-_PIXELS = 4096
+_PIXELS = 4096  # a C constant when compiled
 
 
 class Region(NamedTuple):
@@ -61,9 +60,7 @@ class Regions:
         """`table`: class of a pixel by Y >> 4, Cb >> 2, Cr >> 2 (4, 6, 6 bits); 0 is none. ValueError: wrong size."""
         if len(table) != TABLE_SIZE:
             raise ValueError(f"the table of colour classes has {len(table)} entries, not {TABLE_SIZE}")
-        self.table = [0] * 65536
-        for index in range(_TABLE):
-            self.table[index] = table[index]
+        self.table = table
         self.width = self.height = self.runs = self.count = 0
         self.run_kind = [0] * 4096
         self.run_row = [0] * 4096
