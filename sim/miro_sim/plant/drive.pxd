@@ -75,7 +75,7 @@ cdef class Quadrature:
     cpdef int index(self) noexcept
 
 @cython.locals(pulsing=cython.bint)
-cdef inline long long _other_tick(Lm629 chip) noexcept
+cdef long long _other_tick(Lm629 chip) noexcept
 
 cdef class DifferentialDrive(Plant):
     cdef readonly object params
