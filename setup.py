@@ -6,6 +6,7 @@ every machine (py3-none-any). Each compiled module checks its stamp when it is i
 (`miro_exact.engine`), so one that no longer matches its source is refused.
 """
 
+import gc
 import importlib.util
 import os
 import platform
@@ -50,11 +51,10 @@ NO_DEBUG = [] if "-g" in os.environ.get("CFLAGS", "") else ["-g0"]
 # 32-bit x86 would compute in x87 registers, which round twice.
 SSE = ["-msse2", "-mfpmath=sse"] if sys.maxsize < 1 << 32 and platform.machine() in X86 else []
 HOTTEST = re.compile(
-    r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.(lens|regions)"
-    r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|chip|encoder|pid|trajectory))"
+    r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.regions"
+    r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|bus_timing|encoder|pid))"
     r"|miro_robot\.mcs51\.(core|cpu|execute|interrupts|line|peripherals|timers|uart)"
     r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|drive)"
-    r"|miro_sim\.radio\.(band|listener|sender)|mirotwin\.recording\.rows"
 )
 """What takes half a percent of a run or more. The others are compiled with -Og, which takes a third of the time."""
 QUICKLY = ["-Og", "-finline-small-functions"]  # among them those that count references
@@ -137,6 +137,7 @@ class BuildHot(build_ext):
     def build_extensions(self):
         from Cython.Build import cythonize
 
+        gc.set_threshold(1_000_000)  # a fifth of the time of translating is looking for garbage
         folder = Path(self.build_temp).absolute() / "stamped"
         stamped = self._stamp(folder)
         self.extensions = [extension for extension in self.extensions if extension.name.startswith(self.only)]
