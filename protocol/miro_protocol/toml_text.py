@@ -57,7 +57,7 @@ def tables(text: str) -> dict[str, Any]:
         end = text.count("\n") + 1
         raise TomlError(f"not TOML: {what}", line=int(line or end), column=int(column or 0)) from None
     except RecursionError:
-        raise TomlError("nested too deeply", "a scenario has tables in at most 5 levels") from None
+        raise TomlError("nested too deeply", "tables have at most 5 levels") from None
     except ValueError:  # more digits than Python converts
         raise TomlError("an integer of thousands of digits", "give a smaller one") from None
 

@@ -237,7 +237,7 @@ MANY_NETWORKS = "[[network]]\n[[network.robot]]\nreference.kind = 'line'\n"
         ("\n[" + "a." * 200_000 + "a]", "line 2: a key of more than 16 parts; remove it"),
         ("a = {" + '"a" . ' * 1_000 + "a = 1}", "line 1: a key of more than 16 parts; remove it"),
         ("# " + "x" * 600_000, "holds more than 512 KiB; is this the right file?"),
-        ("a = {" + "a = {" * 5_000, "nested too deeply; a scenario has tables in at most 5 levels"),
+        ("a = {" + "a = {" * 5_000, "nested too deeply; tables have at most 5 levels"),
         (
             "name = 'a'\nduration_s = 1\n" + MANY_NETWORKS * 200,
             "network: 200 networks, each of which takes as much time as a run; at most 32,",

@@ -168,7 +168,7 @@ def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> 
 
 
 def _too_deep(origin: str) -> ScenarioError:
-    return ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels")
+    return ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels")
 
 
 def _checked(
