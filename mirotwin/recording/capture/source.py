@@ -98,7 +98,7 @@ def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]
         if not crystal_hz:
             crystal_hz = _crystal_hz(reader.header)
             if crystal_hz != TICKS_PER_SECOND:
-                units = f"ticks of its {crystal_hz} Hz crystal are told in those of {TICKS_PER_SECOND} Hz"
+                units = f"ticks of its {crystal_hz} Hz crystal are given in those of {TICKS_PER_SECOND} Hz"
                 tell(f"{given.label}: {units}")
         yield msgspec.structs.replace(sent, tick=sent.tick * TICKS_PER_SECOND // crystal_hz)
 

@@ -282,7 +282,7 @@ def test_ticks_of_another_crystal_are_told_as_those_of_24_megahertz(mirotwin, tm
     code, out, err = mirotwin("decode", case, "--json")
     ticks = [(row["tick"], row["time_s"]) for row in map(json.loads, out.splitlines()) if "tick" in row]
     assert (code, ticks) == (0, [(24_000_000, 1.0), (48_000_002, 48_000_002 / 24e6)])
-    units = f"mirotwin: {case}: ticks of its 11059200 Hz crystal are told in those of 24000000 Hz"
+    units = f"mirotwin: {case}: ticks of its 11059200 Hz crystal are given in those of 24000000 Hz"
     assert units in err.splitlines()
     code, _, err = mirotwin("export", case, "--out", tmp_path / "case.pcapng", "-q")
     assert (code, err.count("11059200 Hz")) == (0, 1)
