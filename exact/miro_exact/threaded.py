@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 INTERPRETER_ARMS = 64  # a loop around a choice of at least so many executes a program
 SWITCH_OF_A_LOOP = re.compile(
@@ -44,6 +45,8 @@ def threaded(c: str, mark: bytes) -> str:
 
 
 _NUMBER = r"-?(?:0x[0-9A-Fa-f]+|\d+|\d*\.?\d+(?:e[+-]?\d+)?)"
+_SET = re.compile(r"\b(__pyx_v_\d\w+) = ")
+_SETTING = re.compile(rf"^  (__pyx_v_\d\w+) = ({_NUMBER}|__pyx_t_\d+);\n", re.M)
 _DECLARED = re.compile(r"^static (int|PY_LONG_LONG|double|[\w ]*__pyx_t_\w+) (__pyx_v_\d\w+);\n", re.M)
 
 
@@ -54,21 +57,25 @@ def constants(c: str) -> str:
     together (`A, B = 1, 2`) go through temporaries. Text that is not as Cython 3 writes it stays as it is: slower, the
     same bits.
     """
-    for c_type, name in _DECLARED.findall(c):
-        settings = list(re.finditer(rf"^  {name} = ({_NUMBER}|__pyx_t_\d+);\n", c, re.M))
-        if len(settings) != 1 or len(re.findall(rf"\b{name} = ", c)) != 1:
-            continue
-        setting = settings[0]
-        number = _number(c[: setting.start()], setting[1])
-        if number:
-            c = c[: setting.start()] + c[setting.end() :]
-            c = c.replace(f"static {c_type} {name};\n", f"static {c_type} const {name} = {number};\n")
-    return c
+    declared = {name for _, name in _DECLARED.findall(c)}
+    times = Counter(_SET.findall(c))
+    numbers = {}
+    for setting in _SETTING.finditer(c):
+        name, value = setting.groups()
+        if name in declared and times[name] == 1:
+            numbers[name] = _number(c, setting.start(), value)
+    c = _SETTING.sub(lambda setting: "" if numbers.get(setting[1]) else setting[0], c)
+    return _DECLARED.sub(lambda one: _constant(one[1], one[2], numbers.get(one[2], "")), c)
 
 
-def _number(before: str, value: str) -> str:
-    """The number that `value` is; that of a temporary was set last, within the statement. "" if it is none."""
-    if not value.startswith("__pyx_t_"):
-        return value
-    last = before.rpartition(f"  {value} = ")[2].partition(";")[0]
-    return last if re.fullmatch(_NUMBER, last) else ""
+def _number(c: str, end: int, value: str) -> str:
+    """The number that `value` is; that of a temporary was set last before `end`. "" if it is none."""
+    if value.startswith("__pyx_t_"):
+        setting = f"  {value} = "
+        place = c.rfind(setting, 0, end)
+        value = c[place + len(setting) : c.find(";", place)] if place >= 0 else ""
+    return value if re.fullmatch(_NUMBER, value) else ""
+
+
+def _constant(c_type: str, name: str, number: str) -> str:
+    return f"static {c_type} const {name} = {number};\n" if number else f"static {c_type} {name};\n"
