@@ -278,7 +278,11 @@ class Cpu(Executor):
         self.next_event = 0
 
     def end_run(self) -> None:
-        """TXD is final up to now; RXD before it is no longer needed."""
+        """TXD is final up to now; RXD before it is no longer needed.
+
+        Pins that moved during the last instruction are seen in their own cycles, before the peripherals are at its end.
+        """
+        self.peripherals.apply_pushes(self.cycles - 1)
         self.peripherals.sync(self.cycles)
         self.peripherals.settle()
         now = 12 * self.cycles

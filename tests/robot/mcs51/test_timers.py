@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.robot.mcs51.asm import SFRS, assemble
@@ -101,6 +102,22 @@ def test_a_counter_counts_falls_one_cycle_after_their_sample():
         cpu.step()
         seen.append((cpu.cycles - 1, cpu.a))
     assert seen[2:] == [(3, 0), (4, 0), (5, 1), (6, 1)]
+
+
+@given(
+    st.lists(st.integers(60, 3000), min_size=1, max_size=12),
+    st.sampled_from(["05h", "0Dh", "55h", "50h", "5Dh"]),
+)
+def test_falls_within_an_instruction_count_however_a_run_is_cut(ticks, mode):
+    """An instruction of four cycles goes on beyond the end of its piece of a run, and pins move meanwhile."""
+    whole, pieces = (cpu_with(f"MOV TMOD,#{mode}\nMOV TCON,#50h\nloop:\nMUL AB\nSJMP loop") for _ in range(2))
+    for cpu in (whole, pieces):
+        for number, tick in enumerate(sorted(ticks)):
+            cpu.set_external(3, 0xFF if number % 2 else 0xC7, tick)  # T0, T1 and INT1
+    whole.run(300)
+    while pieces.cycles < whole.cycles:
+        pieces.run(pieces.cycles + 1)
+    assert snapshot(whole) == snapshot(pieces)
 
 
 def test_a_gate_is_the_pin_and_not_the_interrupt_flag():
