@@ -78,8 +78,11 @@ def test_keys_channels_and_columns_are_the_codes(site):
         "torque_constant_nm_a",
     ):
         assert f"<code>{key}</code>" in keys, key
-    for key, span in (("wheel_radius_m", "0.001, &lt;= 1"), ("baud_offset_ppm", "-50000, &lt;= 50000")):
-        assert f"<td><code>{key}</code></td>\n<td>number (&gt;= {span})</td>" in keys
+    for key, span in (
+        ("wheel_radius_m", "number (&gt;= 0.001, &lt;= 1)"),
+        ("baud_offset_ppm", "whole number (&gt;= -50000, &lt;= 50000)"),
+    ):
+        assert f"<td><code>{key}</code></td>\n<td>{span}</td>" in keys
     assert "exposed_tick" in (site / "formats/recording.html").read_text("utf-8")
     assert "rms_position_cm" in (site / "formats/parquet.html").read_text("utf-8")
 
