@@ -61,6 +61,8 @@ def solution(a, right):
             if row != column:
                 factor = rows[row][column] / pivot[column]
                 rows[row] = [x - factor * y for x, y in zip(rows[row], pivot, strict=True)]
+    if any(row[at] == 0.0 for at, row in enumerate(rows)):  # singular to rounding
+        raise ValueError("the matrix is singular")
     return [[x / row[at] for x in row[size:]] for at, row in enumerate(rows)]
 
 

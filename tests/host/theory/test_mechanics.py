@@ -181,6 +181,11 @@ def test_the_solution_of_linear_equations_solves_them(a, data):
     assert matrices.times(a, found) == pytest.approx(right, abs=1e-9 * (1.0 + scale))
 
 
+def test_equal_columns_are_singular_also_where_rounding_leaves_a_difference():
+    with pytest.raises(ValueError, match="singular"):
+        matrices.solved([[1.75, 1.75], [6.25, 6.25]], [0.0, 0.0])
+
+
 def test_rows_are_exchanged_where_the_first_one_cannot_be_divided_by():
     assert matrices.solved([[0.0, 2.0], [4.0, 0.0]], [6.0, 8.0]) == [2.0, 3.0]
     assert matrices.product([[1.0, 2.0, 3.0]], [[1.0], [10.0], [100.0]]) == [[321.0]]
