@@ -12,9 +12,8 @@ import math
 from miro_exact.dmath import sincos
 from miro_host.eye.camera_parameters import CameraParameters
 
-_STEPS = (
-    6  # of Newton's method, from the drawn radius: exact to 1e-9 px for a camera that sees the whole pitch
-)
+_STEPS = 6
+"""Of Newton's method, from the drawn radius: exact to 1e-9 px for a camera that sees the whole pitch."""
 
 
 class Lens:

@@ -201,7 +201,7 @@ class Harness:
         return len(_OPENING)
 
     def _opens(self, board: Board, program: Program) -> bool:
-        """Whether the program begins as all frames do, and nobody looks into the board meanwhile."""
+        """Whether the program begins as all frames do, on a board with neither a probe nor an inspector."""
         if board.probe is not None or self.cpu.inspector is not None or not program.opens_with(_OPENING):
             return False
         if self._opening_mask != self.cpu.edge_mask:

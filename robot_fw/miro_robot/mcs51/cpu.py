@@ -315,7 +315,7 @@ class Cpu(Executor):
         return 0
 
     def _next_look(self) -> int:
-        """The cycle in which a run that nobody stops looks up again."""
+        """The cycle of the next event, mark or end of the run, whichever comes first: instructions go on until then."""
         event = self.next_event if self.next_event < self.until else self.until
         return event if event < self.next_mark else self.next_mark
 

@@ -102,9 +102,7 @@ class Chassis(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rolling_resistance: float = 0.03  # force / weight
     stiction_ratio: float = 1.0  # friction of a shaft that stands / of one that turns
     gear_backlash_rad: float = 0.0  # how far a wheel turns while its motor shaft is held
-    gear_load_friction: float = (
-        0.0  # friction torque / torque that goes through the gear, both at the motor shaft
-    )
+    gear_load_friction: float = 0.0  # friction / torque through the gear, both torques at the motor shaft
 
 
 class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -131,7 +131,7 @@ class Listener:
             self.hear_noise(tick, until)
 
     def hear_noise(self, tick: int, until: int) -> None:
-        """What no carrier drowns, or somebody else's noise on the frequency, stronger than any carrier."""
+        """Random levels: the receiver's own noise without a carrier, or noise on the frequency that is stronger than any."""
         slot = tick // _BIT
         bits = self.noise.bits(slot)
         before = -1
