@@ -125,7 +125,7 @@ class Chunk:
 
 
 def _put_head(out: bytearray, begin: int, size: int, channel: int, time_ns: int) -> None:
-    """The head of a message. Each number covers what the one before it wrote too much; the sequence is 0."""
+    """The head of a message, its sequence number 0. Numbers are put in 8 bytes; the next one overwrites the surplus."""
     out[begin] = _MESSAGE
     _put(out, begin + 1, size)
     _put(out, begin + 9, channel)

@@ -253,6 +253,6 @@ def _meanwhile(seen: Sequence[Event]) -> str:
 
 
 def player_of(world: World, steps: Sequence[Step], origin: str) -> Player | None:
-    """Who does these steps in the world; None where there are none. Raises ScenarioError for an unknown symbol."""
+    """The player of these steps; None where there are none. Raises ScenarioError for a symbol that is unknown."""
     check_symbols(steps, world.image, origin)
     return Player(world, steps, origin) if steps else None

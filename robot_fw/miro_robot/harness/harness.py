@@ -193,7 +193,7 @@ class Harness:
         return self._settle(tick + program.trailing_ticks())
 
     def _begin(self, program: Program) -> int:
-        """Puts the machine back to before a character of the program; which one."""
+        """Puts the machine back. Returns which character of the program comes first."""
         if self.board is None or not self._opens(self.board, program):
             self.back()
             return 0

@@ -424,7 +424,7 @@ class Cpu(Executor):
             self._written(address, self.peripherals.write(address, value, self.cycles))
 
     def _written(self, address: int, sooner: int) -> None:
-        """A register of the peripherals was; `sooner`: an event may come sooner by it."""
+        """After a write to a register of the peripherals. `sooner`: an event may come sooner by it."""
         if address in (_IE, _IP):
             self.marks = self.marks if self.peripherals.interrupts.in_service else 0
             self._block()

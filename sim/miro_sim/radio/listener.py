@@ -131,7 +131,7 @@ class Listener:
             self.hear_noise(tick, until)
 
     def hear_noise(self, tick: int, until: int) -> None:
-        """Random levels: the receiver's own noise without a carrier, or noise on the frequency that is stronger than any."""
+        """Random levels, from the receiver itself, or from noise on the frequency that is stronger than any carrier."""
         slot = tick // _BIT
         bits = self.noise.bits(slot)
         before = -1
