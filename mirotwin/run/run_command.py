@@ -14,7 +14,6 @@ from mirotwin.recording.runner import report_faults
 from mirotwin.run.run_files import RunFiles, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.run.run_stops import Stops
-from mirotwin.run.run_table import print_table
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
@@ -111,6 +110,8 @@ def run(options: RunOptions) -> int:
         note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
         tell_notes([f"{note}; --out keeps both"])
     if not options.quiet:
+        from mirotwin.run.run_table import print_table  # loads rich
+
         print_table(summary, run_files.tracks, folder.path)
     if player is not None:
         keep_saved(player, folder.path)

@@ -8,7 +8,8 @@ from rich.console import Console, RenderableType
 from rich.text import Text
 
 from miro_exact.bad_input import one_line
-from mirotwin.shell.pairs import PIPE_COLUMNS
+
+PIPE_COLUMNS = 200
 
 
 class _Plain(Console):

@@ -5,12 +5,14 @@ import platform
 from importlib import metadata
 from typing import Annotated
 
+from rich.table import Table
+
 from miro_exact import engine as engines
 from miro_exact import hot_modules
 from mirotwin.shell.command import Options, command_of
+from mirotwin.shell.console import show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FIRMWARE, Engine, choose_engine
-from mirotwin.shell.pairs import Pairs
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
@@ -53,7 +55,9 @@ def info(options: InfoOptions) -> int:
     active = choose_engine(options.engine)
     broken = _broken_modules(active)
     image = load_firmware(options.firmware, named=False)
-    table = Pairs()
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
     table.add_row("mirotwin", version_of("mirotwin"))
     table.add_row("Python", f"{platform.python_version()} ({platform.python_implementation()})")
     table.add_row("platform", platform.platform())
@@ -63,7 +67,7 @@ def info(options: InfoOptions) -> int:
     table.add_row("firmware", str(image.path))
     table.add_row("", f"sha256 {image.sha256}")
     table.add_row("", f"{image.size} bytes of 8192")
-    table.show()
+    show(table)
     for message in broken:
         complain(f"error: {message}")
     return BAD_INPUT if broken else DONE
