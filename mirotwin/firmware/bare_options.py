@@ -16,7 +16,7 @@ from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.image import Image
-from mirotwin.firmware.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
+from mirotwin.firmware.code_place import FLASH_BYTES, SPACE_BYTES, address_of, check_code_at, place_of
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole
@@ -156,7 +156,12 @@ def load_bare_image(path: str, options: BareOptions, named: bool = True) -> Imag
 
 def target_of(path: str, image: Image, options: BareOptions) -> int | None:
     """The address of --until. Raises BadInput."""
-    return None if options.until is None else address_of(options.until, image, path, "--until")
+    if options.until is None:
+        return None
+    address = address_of(options.until, image, path, "--until")
+    if not options.code_in_xram:  # where the program may write it
+        check_code_at(address, image, path, "--until")
+    return address
 
 
 def make_machine(

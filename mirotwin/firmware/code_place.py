@@ -49,6 +49,12 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
     raise BadInput(path, option, f"no symbol {text} in the code", remedy)
 
 
+def check_code_at(address: int, image: Image, path: str, option: str) -> None:
+    """Raises BadInput for an address that the processor cannot execute."""
+    if not any(first <= address < end for first, end in image.used):
+        raise BadInput(path, option, f"the image has no code at {address:#06x}", "see mirotwin fw disasm")
+
+
 def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: str) -> set[tuple[int, str]]:
     """(first address, name) of the functions that --symbol names; static ones of several files may share a name.
 
@@ -57,10 +63,7 @@ def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: 
     found = set()
     for place in places:
         address = address_of(place, image, path, "--symbol")
-        if not any(first <= address < end for first, end in image.used):
-            raise BadInput(
-                path, "--symbol", f"the image has no code at {address:#06x}", "see mirotwin fw disasm"
-            )
+        check_code_at(address, image, path, "--symbol")
         around = names.function(address)
         by_address = place[:2].lower() == "0x"
         found |= {around} if by_address else {other for other in names.functions if other[1] == around[1]}

@@ -83,9 +83,24 @@ def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin):
 
 
 def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(mirotwin, tmp_path):
-    image = hex_file(tmp_path / "a.ihx", LOOP)
+    image = hex_file(tmp_path / "a.ihx", LOOP + LOOP)
     assert mirotwin("fw", "run", image)[0] == 0
-    assert mirotwin("fw", "run", image, "--until", "0x10")[0] == 1
+    assert mirotwin("fw", "run", image, "--until", "0x2")[0] == 1
+
+
+@pytest.mark.parametrize("command", ["run", "profile", "trace", "coverage"])
+def test_an_address_without_code_is_refused_before_the_run(mirotwin, tmp_path, command):
+    image = hex_file(tmp_path / "a.ihx", b"\x00\x80\xfd")  # a loop that never ends
+    code, out, err = mirotwin("fw", command, image, "--until", "0x10")
+    assert (code, out) == (2, "")
+    assert err == (
+        f"mirotwin: error: {image}: --until: the image has no code at 0x0010; see mirotwin fw disasm\n"
+    )
+
+
+def test_an_address_to_which_a_program_may_bring_code_is_run_to(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "a.ihx", b"\x00\x02\x00\x10")
+    assert mirotwin("fw", "run", image, "--code-in-xram", "--until", "0x10") == (0, "", "")
 
 
 def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(mirotwin, tmp_path):
