@@ -14,11 +14,14 @@ from typing import Unpack
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.events import Received
 from miro_protocol.table import ROBOT_COUNTS, TICKS_PER_MS
 from miro_protocol.transmission import Transmission, joined
+from miro_sim.world.conditions import answer_of
 from miro_sim.world.events import Cursor
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import RobotPort
+from mirotwin.shell.program import complain
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule, Topology
@@ -101,6 +104,9 @@ def try_at_port(rules: Sequence[Rule], desk: DeskOptions) -> Iterator[Outcome]:
     """Each as soon as it is known. Raises BadInput where no robot answers, PortError."""
     with RobotPort(desk, trial_of(rules[0]).scenario) as port:
         topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
+        if len(port.slots) > 1:
+            who = " and ".join(map(str, port.slots))
+            complain(f"{desk.port}: robots {who} answer; robot {port.slots[0]} is tried")
 
         def tried(rule: Rule) -> Outcome:
             if rule.id in NOT_OBSERVABLE:
@@ -155,7 +161,9 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     def gather(tick: int) -> None:
         for _, event in cursor.read():
-            if event.what != "sent":
+            if event.frame is not None and _in_turn_of_another(event.frame, topology, port.slots):
+                seen.forget(event.frame.data)
+            elif event.what != "sent":
                 seen.take(msgspec.structs.replace(event, tick=event.tick - way))
         seen.end_tick = tick - way
 
@@ -168,6 +176,13 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
             if (what := one.test(seen)) is not None:
                 return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
     return None, unsure
+
+
+def _in_turn_of_another(frame: Received, topology: Topology, there: Sequence[int]) -> bool:
+    """Whether another robot at the port may say this."""
+    said = answer_of(frame)
+    others = (slot for slot in there if slot not in topology.slots)
+    return said is not None and said.slot in others and said.slot == said.seq % topology.robots
 
 
 def _whole(said: Sequence[Transmission]) -> list[Transmission]:

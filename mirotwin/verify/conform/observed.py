@@ -74,6 +74,11 @@ class Observed:
             assert said is None or isinstance(said, TelemetryFrame)
             self.answers.append(Answer(event.tick, event.frame, said))
 
+    def forget(self, data: bytes) -> None:
+        """Takes back what was heard last of these characters: another robot said them."""
+        start = bytes(event.value for event in self.heard).rfind(data)
+        del self.heard[start : start + len(data)]
+
     def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
         """The robot as it was at the start of a control period, and its board as it is now."""
         self.periods.append((tick, record))

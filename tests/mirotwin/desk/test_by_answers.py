@@ -51,6 +51,32 @@ def test_an_adapter_that_keeps_characters_for_16_ms_lets_no_rule_fail(mirotwin, 
     assert verdicts(mirotwin, f"{ROBOT}&{QUICK}", [rule])[rule]["verdict"] == "passed"
 
 
+@pytest.fixture
+def two_robots(tmp_path):
+    """The port of a network in which robots 0 and 1 answer."""
+    scenario = tmp_path / "two.scenario.toml"
+    scenario.write_text(
+        'name = "two"\nduration_s = 600.0\ncamera.kind = "gaussian"\n'
+        '[[network]]\nhost = "silent"\nradio.bit_error_rate = 0.0\n'
+        'robot = [{slot = 0, reference = {kind = "line", drive_s = 0.0}},'
+        ' {slot = 1, reference = {kind = "line", drive_s = 0.0, start_y_cm = 30.0}}]\n'
+    )
+    return f"miro://{scenario}"
+
+
+def test_of_several_robots_at_a_port_one_is_tried_and_named(mirotwin, two_robots):
+    rules = ("--rule", "P41", "--rule", "P43", "--rule", "P44", "--rule", "P45")
+    code, out, err = mirotwin("conform", "-q", "--port", two_robots, *rules)
+    assert (code, out) == (0, "")
+    assert err == f"mirotwin: {two_robots}: robots 0 and 1 answer; robot 0 is tried\n"
+
+
+@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+def test_another_robot_at_the_port_hides_no_mistake(mirotwin, two_robots):
+    robots = f"{two_robots}?firmware={built('answers frames that ask nobody')}"
+    assert verdicts(mirotwin, robots, ["P43"])["P43"]["verdict"] == "failed"
+
+
 def test_what_answers_do_not_show_is_never_passed(mirotwin):
     found = verdicts(mirotwin, f"{ROBOT}&{QUICK}", NOT_OBSERVABLE)
     assert {one["verdict"] for one in found.values()} == {"not observable"}
@@ -98,10 +124,13 @@ UNSEEN = {
 """Mistakes that answers do not show, and the rule that they break."""
 
 
-def robot_with(name):
+def built(name):
     planted = PLANTED[name]
-    made = build({planted.file: planted.applied(source_files()[planted.file])})
-    return f"{ROBOT}&{QUICK}&firmware={made.image}"
+    return build({planted.file: planted.applied(source_files()[planted.file])}).image
+
+
+def robot_with(name):
+    return f"{ROBOT}&{QUICK}&firmware={built(name)}"
 
 
 @pytest.mark.slow
