@@ -18,6 +18,7 @@ from mirotwin.desk.robot_port import SEEN, NotObservable, RobotPort, check_obser
 from mirotwin.recording.recorder import Recorder
 from mirotwin.replay.replay_port import twin_source
 from mirotwin.shell.outputs import RECORDING, whole_file
+from mirotwin.verify.cases.artifacts import clear
 from mirotwin.verify.steps.keys import (
     CheckStep,
     HoldStep,
@@ -31,7 +32,7 @@ from mirotwin.verify.steps.keys import (
 )
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import steps_of
-from mirotwin.verify.steps.running import Outcome, folder_of, load_test
+from mirotwin.verify.steps.running import SCENARIO, Outcome, folder_of, load_test
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -61,9 +62,11 @@ def run_port_test(
     """Plays a file's steps at the port. `artifacts`: below it the recording is left. Whatever happens is an outcome."""
     folder = None if artifacts is None else folder_of(artifacts, path)
     try:
+        if folder is not None:
+            clear(folder, SCENARIO)
         return _run(path, image, desk, settings, folder)
     except NotObservable as error:
-        return Outcome(path, "not observable", notes=(f"{path}: {error}",))
+        return Outcome(path, "not observable", notes=(f"{error}",))
     except BadInput as error:
         return Outcome(path, "error", (f"{error}",))
 
@@ -77,15 +80,13 @@ def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], fo
     seen = [step for step in steps if not unseen(step)]
     switches = [step.number for step in steps if unseen(step) and not isinstance(step, _PASSED_OVER)]
     playable = [step for step in seen if not switches or step.number < switches[0]]
-    with ExitStack() as stack:
-        recorder = None
+    with ExitStack() as files, RobotPort(desk, text.scenario, path) as port:
+        port.greet()
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            part = stack.enter_context(whole_file(folder / RECORDING, "--artifacts"))
-            stream = stack.enter_context(part.open("wb"))
-            recorder = stack.enter_context(Recorder(stream, twin_source(text.scenario, 0, image)))
-        port = stack.enter_context(RobotPort(desk, text.scenario, path, recorder))
-        port.greet()
+            part = files.enter_context(whole_file(folder / RECORDING, "--artifacts"))
+            stream = files.enter_context(part.open("wb"))
+            port.recorder = files.enter_context(Recorder(stream, twin_source(text.scenario, 0, image)))
         player = Player(cast("World", port), playable, path)  # which asks of it what a PC can see
         player.play()
         tick = port.tick

@@ -133,6 +133,8 @@ def test(options: TestOptions) -> int:
             what,
             "nothing was tested; a test is a scenario or a case in such a file",
         )
+    if desk.port and options.seed:
+        raise BadInput("", "--seed", "is not for a robot at a port", "leave it out")
     case = next((file for file in chosen if file.endswith(CASE_SUFFIX)), None)
     if desk.port and case is not None:
         what = "a case is judged by what is inside the twin, which no port shows"

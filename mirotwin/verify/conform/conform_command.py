@@ -57,6 +57,8 @@ from mirotwin.verify.conform.table import LONG, RULES, chapter_of, find
 
 LINES = 5
 """Firmware faults that are listed."""
+_OF_TRIALS = ("image", "everything", "junit", "artifacts", "seed", "stack_from", "port")
+"""Options that say nothing to a list of the rules."""
 
 
 class ConformOptions(Options, frozen=True, kw_only=True):
@@ -110,6 +112,8 @@ def conform(options: ConformOptions) -> int:
     was judged.
     """
     choose_engine(options.engine)
+    if options.listing and (given := options.given(*_OF_TRIALS)):
+        raise click.UsageError(f"{given[0]} does not go with --list.")
     every = EVERY_RULE if options.long or options.listing else RULES
     rules = list(dict.fromkeys(map(find, options.ids))) or list(every)
     junit, artifacts, quiet = options.junit, options.artifacts, options.quiet

@@ -105,15 +105,46 @@ def test_a_step_that_moves_is_refused_unless_it_is_allowed(at_port):
 
 
 def test_a_controller_needs_more_than_a_port(at_port):
-    code, out, _ = at_port("".replace("", ""), "--set", 'network.host="controller"')
-    assert (code, "a controller, which needs a camera: not observable on a port" in out) == (5, True)
+    code, out, _ = at_port("", "--set", 'network.host="controller"')
+    assert (code, out.splitlines()[1]) == (
+        5,
+        "    a controller, which needs a camera: not observable on a port",
+    )
 
 
 def test_the_recording_of_a_test_is_compared_with_its_twin(at_port, mirotwin, tmp_path):
-    at_port(POLL * 1 + POLL.replace("accepted = 1", "accepted = 2"), "--artifacts", tmp_path / "left")
+    at_port(POLL + POLL.replace("accepted = 1", "accepted = 2"), "--artifacts", tmp_path / "left")
     (folder,) = (tmp_path / "left").iterdir()
     code, out, err = mirotwin("replay", folder)
     assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
+
+
+def test_a_port_that_is_not_there_leaves_no_folder(mirotwin, tmp_path):
+    path = tmp_path / "poll.scenario.toml"
+    path.write_text(HEAD + POLL)
+    code, out, _ = mirotwin("test", path, "--port", "/dev/nope", "--artifacts", tmp_path / "left")
+    assert (code, out.splitlines()[1]) == (
+        2,
+        "    /dev/nope: there is no such port; `python -m serial.tools.list_ports` lists those there are",
+    )
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_case_of_an_earlier_failure_is_not_told_of_a_robot(at_port, mirotwin, tmp_path):
+    wrong = POLL.replace("accepted = 1", "accepted = 3")
+    at_port(wrong, "--artifacts", tmp_path / "left")
+    mirotwin("test", tmp_path / "poll.scenario.toml", "--artifacts", tmp_path / "left")
+    assert (found := list(tmp_path.glob("left/*/case.stream")))
+    code, out, _ = at_port(wrong, "--artifacts", tmp_path / "left")
+    assert (code, "case.stream" in out, found[0].exists()) == (1, False, False)
+
+
+def test_a_seed_is_refused_for_a_robot(at_port):
+    assert at_port(POLL, "--seed", 4) == (
+        2,
+        "",
+        "mirotwin: error: --seed: is not for a robot at a port; leave it out\n",
+    )
 
 
 TESTS = """

@@ -153,6 +153,25 @@ def test_all_rules_are_listed_and_none_is_tried(mirotwin):
 
 
 @pytest.mark.parametrize(
+    "given",
+    [
+        ("a.ihx",),
+        ("--all",),
+        ("--junit", "a.xml"),
+        ("--artifacts", "a"),
+        ("--seed", "1"),
+        ("--port", "loop://"),
+    ],
+)
+def test_the_list_is_of_rules_alone(mirotwin, given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = mirotwin("conform", "--list", *given)
+    assert (code, out) == (2, "")
+    assert "does not go with --list." in err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("--rule", "P1"), "there is no rule 'P1'; did you mean P"),
