@@ -76,7 +76,7 @@ def run(options: RunOptions) -> int:
         world = World(text.scenario, seed, image)
         stops.begin(world)
     source = source_of(text, world, record, stops.resumed)
-    checks = Checks(world, expectations_of(text.scenario, text.origin))
+    checks = Checks(world, expectations_of(text.scenario, text.origin), cut=stops.to_tick is not None)
     player = player_of(world, steps, text.origin)
     views: list[View] = []
     if options.frames is not None or options.record_frames:

@@ -65,7 +65,8 @@ class Failure(msgspec.Struct, frozen=True):
 class Subject(msgspec.Struct, frozen=True):
     """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself.
 
-    `first_slot`: of the robots that are present in its network; `radio`: from the PC to them.
+    `first_slot`: of the robots that are present in its network; `radio`: from the PC to them. `cut`: it may be ended
+    before: what was still to come does not fail then.
     """
 
     robot: Robot
@@ -73,6 +74,7 @@ class Subject(msgspec.Struct, frozen=True):
     end_tick: int
     first_slot: int = 0
     radio: Downlink | None = None
+    cut: bool = False
 
     @property
     def network(self) -> int:

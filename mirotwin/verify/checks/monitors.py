@@ -76,11 +76,12 @@ class ExpectationFailed(AssertionError):
 class Checks:
     """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
 
-    `expected` replaces that, by network and slot. Begin with the run: a check does not know what wheels were told
-    before. RuntimeError is raised if the world is loaded meanwhile, because what a check remembers is not saved.
+    `expected` replaces that, by network and slot. `cut`: the run may be ended before it is over. Begin with the run: a
+    check does not know what wheels were told before. RuntimeError is raised if the world is loaded meanwhile, because
+    what a check remembers is not saved.
     """
 
-    def __init__(self, world: World, expected: Expected | None = None) -> None:
+    def __init__(self, world: World, expected: Expected | None = None, cut: bool = False) -> None:
         self.world = world
         if expected is None:
             expected = expectations_of(world.scenario, world.scenario.name)
@@ -92,6 +93,7 @@ class Checks:
                 robot,
                 expected.get((network.index, robot.slot), ()),
                 end_tick,
+                cut,
             )
             for network in world.networks
             for robot in network.robots
@@ -147,9 +149,16 @@ class _RobotMonitors:
     """
 
     def __init__(
-        self, world: World, network: Network, robot: Robot, checks: Sequence[Check], end_tick: int
+        self,
+        world: World,
+        network: Network,
+        robot: Robot,
+        checks: Sequence[Check],
+        end_tick: int,
+        cut: bool,
     ) -> None:
-        subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot, network.downlink)
+        first_slot = network.robots[0].slot
+        subject = Subject(robot, network.spec.robots, end_tick, first_slot, network.downlink, cut)
         self.network = network
         self.robot = robot
         self.monitors = [self._guarded(check, partial(checked_monitor, check, subject)) for check in checks]

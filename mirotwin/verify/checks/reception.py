@@ -227,6 +227,8 @@ class AcceptedMonitor(Monitor[FramesAccepted]):
         if accepted is None:  # an image without the counter: nothing can be judged
             return
         self._count(accepted)
+        if self.frames < self.check.frames and self.subject.cut and tick < self.subject.end_tick:
+            return
         self.judged += 1
         if self.frames < self.check.frames:
             self.fail(tick, f"at least {self.check.frames} frames accepted", f"{self.frames}")

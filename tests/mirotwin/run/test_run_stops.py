@@ -93,6 +93,25 @@ def test_a_run_ends_where_it_is_told_to(mirotwin, tmp_path, short):
 
 
 @pytest.mark.parametrize(
+    ("to", "frames", "verdict"),
+    [
+        ("10ms", 1, "not judged"),
+        ("150ms", 1, "passed"),
+        ("150ms", 99, "not judged"),
+        ("4804800t", 99, "failed"),
+    ],
+)
+def test_a_run_that_is_cut_short_does_not_fail_by_frames_to_come(
+    mirotwin, tmp_path, short, to, frames, verdict
+):
+    expect = f"frames_accepted_min={frames}"
+    code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--to", to, "--expect", expect, *QUIET)
+    assert (code, f"expectation {verdict}: " in err) == (int(verdict == "failed"), verdict != "passed")
+    found = json.loads((tmp_path / "a" / "summary.json").read_text())["expectations"]
+    assert verdict in [one["verdict"] for one in found if one["name"] == "frames_accepted_min"]
+
+
+@pytest.mark.parametrize(
     ("arguments", "what"),
     [
         (
