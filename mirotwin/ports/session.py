@@ -8,12 +8,10 @@ recording keeps; how they came to arrive then is not needed to run it again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from selectors import BaseSelector
-from typing import Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
-from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
 from mirotwin.report.summary import LiveFigures
@@ -24,7 +22,7 @@ LONGEST_SLICE_TICKS = ticks(0.020)
 
 
 class Session:
-    """Steps `world` for `runner.run`: until it is over, or `end_tick`; with `once` until all clients have gone."""
+    """Runs `world` until it is over, or `end_tick`; with `once` until all clients have gone."""
 
     def __init__(
         self,
@@ -41,39 +39,19 @@ class Session:
         self.selector = selector
         self.endpoints = endpoints
         self.tell = tell
-        self.end_tick = end_tick
         self.once = once
         self.periods = min(world.periods, -(-end_tick // CONTROL_PERIOD_TICKS))
         self._slice_ticks = max(1, min(ticks(SLICE_S * pace.factor), LONGEST_SLICE_TICKS))
         self._reported_ticks = 0
 
-    # ---- what `runner.run` steps -------------------------------------------------------------------------
-
-    @property
-    def tick(self) -> int:
-        return self.world.tick
-
-    @property
-    def index(self) -> int:
-        return self.world.index
-
-    @property
-    def observers(self) -> list[Callable[[Period], object]]:
-        return self.world.observers
-
-    @property
-    def networks(self) -> Sequence[Any]:
-        return self.world.networks
-
     @property
     def finished(self) -> bool:
         return self.world.finished or self.world.index >= self.periods or (self.once and self._all_gone())
 
-    def step(self) -> Period:
-        """One control period."""
-        self.run_to(self.world.period_end)
-        assert self.world.last is not None
-        return self.world.last
+    def run(self) -> None:
+        """Control period by control period."""
+        while not self.finished:
+            self.run_to(self.world.period_end)
 
     def run_to(self, tick: int) -> None:
         """Up to `tick`, as the wall clock goes."""

@@ -1,7 +1,9 @@
 """Runs a world from its first control period to its last, and records it."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
 from miro_robot.faults import FirmwareFault
@@ -10,28 +12,12 @@ from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.recorder import Recorder
 from mirotwin.shell.program import DONE, FIRMWARE_FAULT, complain
 
-
-class Simulation(Protocol):
-    """What is used of `world.World`."""
-
-    @property
-    def tick(self) -> int: ...
-    @property
-    def index(self) -> int: ...
-    @property
-    def periods(self) -> int: ...
-    @property
-    def observers(self) -> list[Callable[[Period], object]]: ...
-    @property
-    def networks(self) -> Sequence[Any]: ...
-    @property
-    def finished(self) -> bool: ...
-    def step(self) -> Period: ...
-    def run_to(self, tick: int) -> None: ...
+if TYPE_CHECKING:
+    from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
 
 def run(
-    world: Simulation,
+    world: World,
     recorder: Recorder | None = None,
     full: bool = False,
     on_period: Callable[[Period], bool | None] = lambda period: None,
@@ -62,7 +48,7 @@ def run(
 
 
 def _moved(
-    world: Simulation,
+    world: World,
     recorder: Recorder | None,
     on_period: Callable[[Period], object],
     move: Callable[[], object],
@@ -81,7 +67,7 @@ def _moved(
         world.observers.remove(keep)
 
 
-def _run_samples(world: Simulation, recorder: Recorder) -> None:
+def _run_samples(world: World, recorder: Recorder) -> None:
     """Up to the last LM629 sample of the period under way, recording each (they are 8192 ticks apart)."""
     end_tick = (world.index + 1) * CONTROL_PERIOD_TICKS
     first = -(-(world.tick + 1) // LM629_SAMPLE_TICKS) * LM629_SAMPLE_TICKS
@@ -108,7 +94,7 @@ def _sample(tick: int, robot: Any) -> SampleMessage:
     )
 
 
-def faults_by_robot(world: Simulation) -> list[tuple[int, int, list[FirmwareFault]]]:
+def faults_by_robot(world: World) -> list[tuple[int, int, list[FirmwareFault]]]:
     """(network, slot, faults) of every robot that has any."""
     return [
         (network, robot.spec.slot, list(robot.board.faults))
@@ -117,7 +103,7 @@ def faults_by_robot(world: Simulation) -> list[tuple[int, int, list[FirmwareFaul
     ]
 
 
-def report_faults(world: Simulation) -> int:
+def report_faults(world: World) -> int:
     """Says on stderr what the firmware did wrong; returns the exit code."""
     found = faults_by_robot(world)
     for network, slot, faults in found:
@@ -126,7 +112,7 @@ def report_faults(world: Simulation) -> int:
     return FIRMWARE_FAULT if found else DONE
 
 
-def _robots(world: Simulation) -> Iterator[tuple[int, Any]]:
+def _robots(world: World) -> Iterator[tuple[int, Any]]:
     for index, network in enumerate(world.networks):
         for robot in network.robots:
             yield index, robot

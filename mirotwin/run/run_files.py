@@ -43,9 +43,10 @@ FLUSH_S = 0.2
 """Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
 
 
-class LiveSession(runner.Simulation, Protocol):
-    """A world that a wall clock and clients drive."""
+class LiveSession(Protocol):
+    """Moves a world by a wall clock and by what clients send."""
 
+    def run(self) -> None: ...
     def live(self) -> LiveFigures: ...
 
 
@@ -120,18 +121,14 @@ class RunFiles:
         for view in self.views:
             view.shows.append(keep_frame)
         with bar, self.hold.released():
-            runner.run(
-                self.session or self.world,
-                recorder,
-                self.source.record == "full",
-                keep,
-                self._own_way(),
-            )
+            runner.run(self.world, recorder, self.source.record == "full", keep, self._own_way())
 
     def _own_way(self) -> Callable[[], None] | None:
         """How the world moves where it is not just stepped."""
         if self.player is not None:
             return self._play
+        if self.session is not None:
+            return self.session.run
         stops = self.stops
         return partial(stops.move, self.world, self.folder) if stops else None
 

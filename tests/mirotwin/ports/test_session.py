@@ -8,7 +8,6 @@ from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.session import Session
-from mirotwin.recording import runner
 from mirotwin.rerun.job import script_of
 from tests.mirotwin.ports.rig import NO_SELECTOR, fake_pace, own_image, question
 
@@ -49,8 +48,8 @@ def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_t
     session.pace.per_look = ticks(0.0007)
     periods = []
     session.world.observers.append(periods.append)
-    runner.run(session)
-    assert session.tick == 15 * CONTROL_PERIOD_TICKS >= ticks(0.5)
+    session.run()
+    assert session.world.tick == 15 * CONTROL_PERIOD_TICKS >= ticks(0.5)
     assert len(client.got) == 2 * 19
     script = script_of(periods)
     assert [one.data for one in script] == [question(0), question(3)]
@@ -63,7 +62,7 @@ def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
     session.pace.per_look = ticks(0.0003)
     periods = []
     session.world.observers.append(periods.append)
-    runner.run(session)
+    session.run()
     (sent,) = script_of(periods)
     assert ticks(0.101) <= sent.tick < ticks(0.101 + 0.002) + 121 + 1  # at most a slice later, and the key-up
 
@@ -71,7 +70,7 @@ def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
 def test_all_ports_of_a_network_hear_its_robots():
     session, clients, _ = session_of((0, question(0)), ports=3)
     session.pace.per_look = ticks(0.001)
-    runner.run(session)
+    session.run()
     assert len(clients[0].got) == 19
     assert clients[0].got == clients[1].got == clients[2].got
 
@@ -93,14 +92,14 @@ def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much
 def test_once_ends_it_when_the_last_client_has_gone():
     session, (client, other), _ = session_of(ports=2, once=True)
     session.pace.per_look = ticks(0.001)
-    session.step()
+    session.run_to(session.world.period_end)
     client.has_gone()
-    session.step()
+    session.run_to(session.world.period_end)
     assert not session.finished
     other.port.send(question(0))
     other.has_gone()
     assert not session.finished  # what it sent is still under way
-    session.step()
+    session.run_to(session.world.period_end)
     assert session.finished
 
 
