@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, get_args
 
 import click
 import msgspec
@@ -15,7 +15,7 @@ from miro_host.eye.colours import ColourClasses
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.tracker import CentroidKind, Sighting, Tracker
-from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.command import Argument, Option, Options, Word, command_of
 from mirotwin.shell.options import JSON, NETWORK, PATH, Engine, choose_engine
 from mirotwin.shell.program import complain, show_line
 
@@ -25,24 +25,18 @@ DEFAULT_NUMBERS = (0, 1, 2)
 HEADING = f"{'frame':>6} {'robot':>6} {'x_cm':>9} {'y_cm':>9} {'heading_deg':>12} {'confidence':>11}  picture"
 
 
-class RobotNumbers(click.types.StringParamType):
+def robot_numbers(text: str) -> tuple[int, ...]:
     """Numbers of robots, separated by commas."""
+    words = [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in [str(number) for number in range(_MOST + 1)]:
+            raise ValueError(f"{word!r} is no robot's number: 0 to {_MOST}, separated by commas.")
+        if words.count(word) > 1:
+            raise ValueError(f"two robots have the number {word}; name each once.")
+    return tuple(map(int, words))
 
-    name = "numbers"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
-            return value
-        words = [word.strip() for word in f"{value}".split(",")]
-        for word in words:
-            if word not in [str(number) for number in range(_MOST + 1)]:
-                self.fail(f"{word!r} is no robot's number: 0 to {_MOST}, separated by commas.", param, ctx)
-            if words.count(word) > 1:
-                self.fail(f"two robots have the number {word}; name each once.", param, ctx)
-        return tuple(map(int, words))
-
-    def written(self, value: tuple[int, ...]) -> str:
-        return ",".join(map(str, value))
+NUMBERS = Word("numbers", robot_numbers, lambda numbers: ",".join(map(str, numbers)))
 
 
 class TrackLine(msgspec.Struct):
@@ -66,7 +60,7 @@ class TrackOptions(Options, frozen=True, kw_only=True):
     colours: Annotated[Path, Option(type=PATH, help="TOML file: the colour classes.")]
     team: Annotated[str, Option(type=click.Choice(TEAMS), help="Colour of the team patch.")] = TEAMS[0]
     numbers: Annotated[
-        tuple[int, ...] | None, Option(type=RobotNumbers(), help="Robots to look for. Default: 0,1,2.")
+        tuple[int, ...] | None, Option(type=NUMBERS, help="Robots to look for. Default: 0,1,2.")
     ] = None
     pattern: Annotated[PatternName, Option(type=click.Choice(list(PATTERNS)), help="Of the patches.")] = (
         "diagonal"

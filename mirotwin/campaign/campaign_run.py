@@ -13,7 +13,7 @@ from mirotwin.campaign import running
 from mirotwin.campaign.file import MOST_RUNS
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.plan import Plan, load_plan
-from mirotwin.campaign.ranges import SEEDS, SeedRange
+from mirotwin.campaign.ranges import SEEDS, seed_range
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
 from mirotwin.campaign.worker import RunOutcome
@@ -43,7 +43,7 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
     out: Annotated[Path | None, OUT.saying("Results. Default: runs/FILE.parquet.")] = None
     seeds: Annotated[
         range | None,
-        SEEDS.saying("First and last seed, instead of those of the file.", type=SeedRange(MOST_RUNS)),
+        SEEDS.saying("First and last seed, instead of those of the file.", type=seed_range(MOST_RUNS)),
     ] = None
     settings: Annotated[
         tuple[str, ...],

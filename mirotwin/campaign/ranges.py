@@ -9,13 +9,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NoReturn, Protocol
-
-import click
 
 from miro_exact.domain import MAX_SEED
 from mirotwin.campaign.design import Draw, Value
-from mirotwin.shell.command import Option
+from mirotwin.shell.command import Option, Word
 
 KEYS = ("from", "to", "scale", "whole")
 CHOOSE = "choose"
@@ -95,24 +94,9 @@ def seeds_of(text: str, most: int = MOST_SEEDS) -> range:
     return range(first_seed, last_seed + 1)
 
 
-class SeedRange(click.ParamType[range]):
+def seed_range(most: int = MOST_SEEDS) -> Word:
     """Seeds from a first one to a last one: 0-49, or one alone; at most `most` of them."""
-
-    name = "seeds"
-
-    def __init__(self, most: int = MOST_SEEDS) -> None:
-        self.most = most
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
-        if isinstance(value, range):
-            return value
-        try:
-            return seeds_of(str(value), self.most)
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
-
-    def written(self, value: range) -> str:
-        return f"{value[0]}-{value[-1]}"
+    return Word("seeds", partial(seeds_of, most=most), lambda seeds: f"{seeds[0]}-{seeds[-1]}")
 
 
-SEEDS = Option("--seeds", type=SeedRange(), help="First and last seed.")
+SEEDS = Option("--seeds", type=seed_range(), help="First and last seed.")

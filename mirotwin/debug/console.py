@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
-import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
@@ -133,9 +132,9 @@ class Console:
 
     def _goto(self, rest: str) -> None:
         try:
-            tick = TimeType().convert(rest, None, None).ticks(self.timeline.run.tick_hz)
-        except click.UsageError as error:
-            raise BadInput("", "goto", error.message) from None
+            tick = TimeType().read(rest).ticks(self.timeline.run.tick_hz)
+        except ValueError as error:
+            raise BadInput("", "goto", f"{error}") from None
         self.say(self.debugger.go_to(tick))
 
     def _until(self, rest: str) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
-from typing import Annotated, Any
-
-import click
+from typing import Annotated
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
@@ -17,7 +15,7 @@ from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.image import Image
 from mirotwin.firmware.code_place import FLASH_BYTES, SPACE_BYTES, address_of, check_code_at, place_of
-from mirotwin.shell.command import Option, Options
+from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
@@ -27,17 +25,13 @@ STDIN = "-"
 _SCON, _NINE_BITS = 0x98, 0x80
 
 
-class CodeSize(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+def code_size(word: str) -> int:
     """A number of bytes up to 64 KB, or of KB with a k."""
-
-    name = "SIZE"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        match = re.fullmatch(r"(\d{1,5})([kK]?)", str(value))
-        size = int(match[1]) << (10 if match[2] else 0) if match else 0
-        if not 1 <= size <= SPACE_BYTES:
-            self.fail(f"{value!r} is no size of a program; give bytes or KB, up to 64k.", param, ctx)
-        return size
+    match = re.fullmatch(r"(\d{1,5})([kK]?)", word)
+    size = int(match[1]) << (10 if match[2] else 0) if match else 0
+    if not 1 <= size <= SPACE_BYTES:
+        raise ValueError(f"{word!r} is no size of a program; give bytes or KB, up to 64k.")
+    return size
 
 
 CRYSTAL = Option(
@@ -120,7 +114,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
     code_size: Annotated[
         int | None,
         Option(
-            type=CodeSize(),
+            type=Word("SIZE", code_size),
             help="Program memory, up to 64k; external RAM stays separate. Default 8k.",
             heading=IMAGE,
         ),

@@ -16,7 +16,7 @@ from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.debug_files import SourceFolders
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Engine, Whole
-from mirotwin.shell.times import WallTime
+from mirotwin.shell.times import wall_time
 from mirotwin.verify.expectations import CHECK, EXPECT
 
 LONGEST_S = 1e7
@@ -26,7 +26,7 @@ BARE = "Any 8051 firmware with a serial port"
 class FuzzOptions(Options, frozen=True, kw_only=True):
     COMMAND = "fuzz"
     image: Annotated[str | None, Argument("[IMAGE.ihx]", NAME)] = None
-    time_s: Annotated[float, Option("--time", type=WallTime(LONGEST_S), help="How long: 30s, 5min, 2h.")] = (
+    time_s: Annotated[float, Option("--time", type=wall_time(LONGEST_S), help="How long: 30s, 5min, 2h.")] = (
         60.0
     )
     jobs: Annotated[int | None, JOBS.saying("Processes of the engine. Default: the processors but one.")] = (
@@ -72,7 +72,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     force: Annotated[bool, FORCE.saying("Replace an earlier campaign in --out.")] = False
     minimise_s: Annotated[
         float,
-        Option("--minimise", type=WallTime(LONGEST_S), help="Longest time for making a crash small."),
+        Option("--minimise", type=wall_time(LONGEST_S), help="Longest time for making a crash small."),
     ] = MINIMISE_S
     sources: SourceFolders = ()
     engine: Engine = None

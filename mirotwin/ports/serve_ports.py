@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from selectors import BaseSelector
-from typing import Annotated, Any
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_sim.world.world import World
@@ -18,7 +16,7 @@ from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.rfc2217 import Rfc2217Endpoint
 from mirotwin.ports.sockets import TcpEndpoint
 from mirotwin.ports.terminal import PtyEndpoint
-from mirotwin.shell.command import Option, Options
+from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.options import FORCE
 
 HIGHEST_PORT = 65_535
@@ -26,59 +24,38 @@ LONGEST_NUMBER = 5
 HERE = "127.0.0.1"
 
 
-class PortNumberType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+def port_number(word: str) -> tuple[int, int]:
     """NUMBER, or NUMBER@NETWORK; 0 stands for a free port."""
-
-    name = "port"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        number, at, network = str(value).partition("@")
-        plain = _is_number(number) and (not at or _is_number(network))
-        if not plain or int(number) > HIGHEST_PORT:
-            what = f"{shortened(repr(value))} is no port, such as 7000, or 7000@1 for network 1."
-            self.fail(what, param, ctx)
-        return int(number), int(network or 0)
-
-    def written(self, value: tuple[int, int]) -> str:
-        return _at(f"{value[0]}", value[1])
+    number, at, network = word.partition("@")
+    plain = _is_number(number) and (not at or _is_number(network))
+    if not plain or int(number) > HIGHEST_PORT:
+        raise ValueError(f"{shortened(repr(word))} is no port, such as 7000, or 7000@1 for network 1.")
+    return int(number), int(network or 0)
 
 
-class LinkType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+def link(word: str) -> tuple[str, int]:
     """A path, or PATH@NETWORK; "" or @NETWORK for none."""
-
-    name = "link"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, int]:
-        path, at, network = str(value).rpartition("@")
-        return (path, int(network)) if at and _is_number(network) else (str(value), 0)
-
-    def written(self, value: tuple[str, int]) -> str:
-        return _at(*value)
+    path, at, network = word.rpartition("@")
+    return (path, int(network)) if at and _is_number(network) else (word, 0)
 
 
-class AddressType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+def address(word: str) -> str:
     """An address to listen on. The empty one would be all of the machine's."""
-
-    name = "address"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        if not str(value).strip():
-            self.fail(
-                f"the address is empty; {HERE} is this machine, 0.0.0.0 is all its addresses.", param, ctx
-            )
-        return str(value)
+    if not word.strip():
+        raise ValueError(f"the address is empty; {HERE} is this machine, 0.0.0.0 is all its addresses.")
+    return word
 
 
-def _at(port: str, network: int) -> str:
-    return f"{port}@{network}" if network else port
+def _at_network(value: tuple[object, int]) -> str:
+    port, network = value
+    return f"{port}@{network}" if network else f"{port}"
 
 
 def _is_number(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
+
+
+PORT = Word("port", port_number, _at_network)
 
 
 class PortOptions(Options, frozen=True, kw_only=True):
@@ -87,7 +64,7 @@ class PortOptions(Options, frozen=True, kw_only=True):
     pty: Annotated[
         tuple[tuple[str, int], ...],
         Option(
-            type=LinkType(),
+            type=Word("link", link, _at_network),
             metavar="[LINK]",
             alone="",
             help="A pseudo-terminal, and a symbolic link to it. The default where no port is asked for.",
@@ -96,7 +73,7 @@ class PortOptions(Options, frozen=True, kw_only=True):
     tcp: Annotated[
         tuple[tuple[int, int], ...],
         Option(
-            type=PortNumberType(),
+            type=PORT,
             metavar="PORT",
             help="TCP with the bytes as they are, `socket://` of pyserial. 0: any free port.",
         ),
@@ -104,12 +81,14 @@ class PortOptions(Options, frozen=True, kw_only=True):
     rfc2217: Annotated[
         tuple[tuple[int, int], ...],
         Option(
-            type=PortNumberType(),
+            type=PORT,
             metavar="PORT",
             help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
         ),
     ] = ()
-    host: Annotated[str, Option(type=AddressType(), help="Address on which TCP ports are opened.")] = HERE
+    host: Annotated[
+        str, Option(type=Word("address", address), help="Address on which TCP ports are opened.")
+    ] = HERE
     force: Annotated[
         bool, FORCE.saying("Replace the files of an earlier session in the folder, and its link.")
     ] = False

@@ -39,6 +39,23 @@ def command_line(*words: str) -> str:
     return shlex.join(["mirotwin", *words])
 
 
+class Word(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A word of the command line. `read` makes a value of it, or raises ValueError; `written` is its inverse."""
+
+    def __init__(self, name: str, read: Callable[[str], Any], written: Callable[[Any], str] = str) -> None:
+        self.name = name
+        self.read = read
+        self.written = written
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):  # a default
+            return value
+        try:
+            return self.read(value)
+        except ValueError as error:
+            self.fail(f"{error}", param, ctx)
+
+
 class Argument(NamedTuple):
     """What an argument is on the command line; its field is called as the function wants it."""
 

@@ -17,7 +17,7 @@ from miro_exact.domain import MAX_SEED, DomainError
 from miro_host.plugins import PluginError
 from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.keys import Scenario
-from mirotwin.shell.command import Argument, Option
+from mirotwin.shell.command import Argument, Option, Word
 from mirotwin.shell.times import TimeType
 
 if TYPE_CHECKING:
@@ -77,22 +77,11 @@ class ScenarioName(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
 
 
-class IramAddress(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+def iram_address(word: str) -> int:
     """An address of internal RAM as 0x07 to 0xff."""
-
-    name = "ADDRESS"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        if isinstance(value, int):
-            return value
-        if not re.fullmatch(r"0[xX][0-9a-fA-F]{1,2}", value):
-            self.fail(
-                f"{shortened(repr(value))} is not an address of internal RAM; give 0x00 to 0xff.", param, ctx
-            )
-        return int(value, 16)
-
-    def written(self, value: int) -> str:
-        return f"{value:#04x}"
+    if not re.fullmatch(r"0[xX][0-9a-fA-F]{1,2}", word):
+        raise ValueError(f"{shortened(repr(word))} is not an address of internal RAM; give 0x00 to 0xff.")
+    return int(word, 16)
 
 
 NAME = PathType()
@@ -138,7 +127,7 @@ Firmware = Annotated[str | None, FIRMWARE]
 StackFrom = Annotated[
     int | None,
     Option(
-        type=IramAddress(),
+        type=Word("ADDRESS", iram_address, "{:#04x}".format),
         help="Where the stack begins (0x..; it ends at 0xff), for an image without a .map.",
         heading=IMAGE,
     ),

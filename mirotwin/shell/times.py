@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from typing import Any
 
-import click
 import msgspec
 
 from miro_exact.bad_input import shortened
 from miro_exact.clock import TICKS_PER_SECOND
+from mirotwin.shell.command import Word
 
 UNITS_S = {
     "h": Fraction(3600),
@@ -42,31 +41,28 @@ class Time(msgspec.Struct, frozen=True):
         return float(self.value / crystal_hz if self.in_ticks else self.value)
 
 
-class TimeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+class TimeType(Word):
     """A time with its unit, as a Time: at most `longest_s`, and more than zero where `positive`.
 
     A time of the wall clock (`on_wall`) has no ticks.
     """
 
-    name = "TIME"
-
     def __init__(self, positive: bool = False, longest_s: float = LONGEST_S, on_wall: bool = False) -> None:
+        super().__init__("TIME", self._read)
         self.positive = positive
         self.longest_s = longest_s
         self.on_wall = on_wall
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Time:
-        if isinstance(value, Time):
-            return value
-        said = shortened(repr(value))
-        found = SHAPE.fullmatch(str(value).strip())
+    def _read(self, word: str) -> Time:
+        said, text = shortened(repr(word)), word.strip()
+        found = SHAPE.fullmatch(text)
         if found is None or not self._is_unit(found[1], found[2]):
-            self.fail(f"{said} is not a time; {self._remedy(found)}.", param, ctx)
-        time = Time(str(value).strip(), Fraction(found[1]) * UNITS_S.get(found[2], 1), found[2] == TICKS)
+            raise ValueError(f"{said} is not a time; {self._remedy(found)}.")
+        time = Time(text, Fraction(found[1]) * UNITS_S.get(found[2], 1), found[2] == TICKS)
         if self.positive and not time.value:
-            self.fail(f"{said} is no time at all; give more than zero.", param, ctx)
+            raise ValueError(f"{said} is no time at all; give more than zero.")
         if time.seconds() > self.longest_s:
-            self.fail(f"{said} is too long; the longest is {self.longest_s:.0f}s.", param, ctx)
+            raise ValueError(f"{said} is too long; the longest is {self.longest_s:.0f}s.")
         return time
 
     def _is_unit(self, number: str, unit: str) -> bool:
@@ -80,14 +76,7 @@ class TimeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return f"it has no unit: write {number}s for seconds{ticks}"
 
 
-class WallTime(TimeType):
+def wall_time(longest_s: float) -> Word:
     """A time of the wall clock, in seconds."""
-
-    def __init__(self, longest_s: float) -> None:
-        super().__init__(positive=True, longest_s=longest_s, on_wall=True)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return value if isinstance(value, float) else super().convert(value, param, ctx).seconds()
-
-    def written(self, value: float) -> str:
-        return f"{value:g}s"
+    time = TimeType(positive=True, longest_s=longest_s, on_wall=True)
+    return Word("TIME", lambda word: time.read(word).seconds(), "{:g}s".format)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirotwin.shell.times import UNITS_S, TimeType, WallTime
+from mirotwin.shell.times import UNITS_S, TimeType, wall_time
 
 
 @pytest.mark.parametrize(
@@ -55,8 +55,8 @@ def test_whatever_was_read_is_exact(number, unit):
 
 
 def test_the_wall_clock_has_no_ticks():
-    assert WallTime(100.0).convert("1min", None, None) == 60.0
+    assert wall_time(100.0).convert("1min", None, None) == 60.0
     for text in ("5t", "5", "101s", "0s"):
         with pytest.raises(click.BadParameter) as refused:
-            WallTime(100.0).convert(text, None, None)
+            wall_time(100.0).convert(text, None, None)
         assert "ticks" not in refused.value.message
