@@ -25,8 +25,7 @@ from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image
-from mirotwin.fuzz.harness_target import HarnessTarget, described
-from mirotwin.fuzz.target import TargetFailure
+from mirotwin.fuzz.target import Target, TargetFailure, described
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, Exchange, NamedCheck, check_named
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
@@ -74,7 +73,7 @@ _BITS = 10
 T = TypeVar("T")
 
 
-class BareTarget(HarnessTarget):
+class BareTarget(Target):
     """`image` on a bare processor, up and in silence.
 
     `protocol` makes frames of bodies; without it they are sent as they are. `check` judges each run, `baud` 0 takes the
@@ -161,7 +160,6 @@ class BareTarget(HarnessTarget):
 
     @property
     def failure(self) -> TargetFailure | None:
-        """Of the last run."""
         fault = self.processor.fault()
         if self.code == NO_FAULT_CODE and fault is not None:
             return TargetFailure(NO_FAULT, fault.tick, fault.pc, str(fault))

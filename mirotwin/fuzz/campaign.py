@@ -206,7 +206,7 @@ class Campaign:
         began_s = time.monotonic()
         try:
             self.judged += 1
-            failure = self.triage.judged(data, self.expected).failure
+            failure = self.triage.oracle.judged(data, self.expected).failure
             if failure is not None:
                 self._keep(self.triage.take_judged(data, failure, self.expected))
         finally:

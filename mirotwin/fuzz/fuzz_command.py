@@ -98,40 +98,23 @@ def _campaign(
     folder.make()
     triage = Triage(reached, oracle, folder, sources_of(image, options.sources), options.minimise_s)
     with folder.filled():
-        sorted_inputs = _sorted_out(target, inputs)
-        campaign = _begun(spec, options, triage, folder, expected, covering, sorted_inputs)
-        time_s = options.time_s if sorted_inputs[1] else 0.0
-        return _run(
-            campaign,
-            image,
-            folder.path,
-            time_s,
-            options,
-            check.text if check is not None and check.from_file else None,
-        )
+        failing, passing, silent = _sorted_out(target, inputs)
+        engine = _engine(spec, passing, folder, options)
+        campaign = Campaign(engine, triage, folder, expected, covering, _teller(options.quiet))
+        campaign.begin_with(failing, (*passing, *silent))
+        check_in_file = check.text if check is not None and check.from_file else None
+        return _run(campaign, options.time_s if passing else 0.0, options.quiet, check_in_file)
 
 
-def _begun(
-    spec: TargetSpec,
-    options: FuzzOptions,
-    triage: Triage,
-    folder: CampaignFolder,
-    expected: dict[str, Any],
-    covering: Covering | None,
-    inputs: tuple[list[bytes], list[bytes], list[bytes]],
-) -> Campaign:
-    """A campaign that has looked at the inputs that fail, pass and execute no branch."""
-    failing, passing, silent = inputs
-    engine = Engine()
-    if passing:
-        engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(options.jobs), options.seed)
-        for note in notes:
-            complain(note)
-    else:
+def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, options: FuzzOptions) -> Engine:
+    """One that goes on from the inputs that pass; one that makes up none where there are none."""
+    if not passing:
         complain("every input fails or executes no branch: there is nothing to go on from")
-    campaign = Campaign(engine, triage, folder, expected, covering, _teller(options.quiet))
-    campaign.begin_with(failing, (*passing, *silent))
-    return campaign
+        return Engine()
+    engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(options.jobs), options.seed)
+    for note in notes:
+        complain(note)
+    return engine
 
 
 def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
@@ -150,28 +133,20 @@ def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[
     return failing, passing, silent
 
 
-def _run(
-    campaign: Campaign,
-    image: Image,
-    out: Path,
-    time_s: float,
-    options: FuzzOptions,
-    check_in_file: str | None,
-) -> int:
+def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | None) -> int:
     """The campaign to its end, whatever ends it; the exit code."""
     stopped: BaseException | None = None
     left = 0
-    with FuzzProgress(image.path.name, time_s, options.quiet) as progress:
+    with FuzzProgress(campaign.triage.target.image.path.name, time_s, quiet) as progress:
         try:
             campaign.run(time_s, progress.show)
             left = campaign.finish(progress.show, AFTER_S)
         except (KeyboardInterrupt, Terminated) as error:
-            stopped = error
+            stopped, limit_s = error, 1.0
             if isinstance(error, KeyboardInterrupt):
-                complain(f"interrupted; looking for {INTERRUPTED_S:.0f} s at most at what is left")
-            left = campaign.finish(
-                progress.show, INTERRUPTED_S if isinstance(error, KeyboardInterrupt) else 1.0
-            )
+                limit_s = INTERRUPTED_S
+                complain(f"interrupted; looking for {limit_s:.0f} s at most at what is left")
+            left = campaign.finish(progress.show, limit_s)
         except PluginError as error:
             stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
             stopped.__cause__ = error
@@ -180,7 +155,7 @@ def _run(
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
     ended = CampaignEnd(left=left, complete=stopped is None, check=check_in_file)
-    code = report(campaign, image, out, options.covering, ended, options.quiet)
+    code = report(campaign, ended, quiet)
     if stopped is not None:
         raise stopped
     return code

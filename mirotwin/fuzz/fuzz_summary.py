@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import msgspec
 
-from miro_robot.image import Image
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
@@ -32,22 +29,19 @@ class CampaignEnd(msgspec.Struct, frozen=True):
     check: str | None = None
 
 
-def report(
-    campaign: Campaign, image: Image, out: Path, covering: str | None, ended: CampaignEnd, quiet: bool
-) -> int:
+def report(campaign: Campaign, ended: CampaignEnd, quiet: bool) -> int:
     """Writes the files of the campaign and shows the results; the exit code."""
-    triage = campaign.triage
+    triage, out = campaign.triage, campaign.folder.path
     tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
     never = never_reached(tracefile)
-    _write_summary(campaign, out, tracefile, never, ended)
+    _write_summary(campaign, tracefile, never, ended)
     status = campaign.status()
     if not quiet:
         edges = "" if status.edges is None else f", {status.edges} edges"
         rate = status.executions / status.run_s if status.run_s else 0.0
-        show_line(
-            f"{image.path.name}: {status.executions} executions in {clock(status.run_s)} ({rate:.0f}/s){edges},"
-            f" {counted(campaign.inputs, 'input')} that found something new"
-        )
+        done = f"{status.executions} executions in {clock(status.run_s)} ({rate:.0f}/s){edges}"
+        new = f"{counted(campaign.inputs, 'input')} that found something new"
+        show_line(f"{triage.target.image.path.name}: {done}, {new}")
         show(table(tracefile))
         if never:
             show_line(f"never reached: {', '.join(never)}")
@@ -57,10 +51,10 @@ def report(
         show_line(f"{', '.join(campaign.expected)}: judged {counted(campaign.judged, 'input')}")
     if triage.unrepeated:
         complain(f"{counted(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
-    _print_crashes(campaign, out, image, ended.check)
+    _print_crashes(campaign, ended.check)
     if not quiet:
         show_line(f"written to {out}")
-    missed = covering is not None and _print_covering(campaign, covering, image)
+    missed = campaign.covering is not None and _print_covering(campaign, campaign.covering.name)
     return EXPECTATION_FAILED if triage.confirmed or missed else DONE
 
 
@@ -71,45 +65,44 @@ def never_reached(tracefile: Tracefile) -> list[str]:
     )
 
 
-def _print_crashes(campaign: Campaign, out: Path, image: Image, check: str | None) -> None:
+def _print_crashes(campaign: Campaign, check: str | None) -> None:
     triage = campaign.triage
     show_line(counted(len(triage.confirmed), "crash", "crashes"))
     for crash in triage.confirmed:
-        _print_crash(crash, triage.more[crash.name], out, image, check)
+        _print_crash(crash, campaign, check)
     if triage.unconfirmed:
-        show_line(
-            f"{len(triage.unconfirmed)} not confirmed: wrong on the target, right in a World; kept in"
-            f" {out / 'unconfirmed'}"
-        )
+        where = campaign.folder.path / "unconfirmed"
+        what = "not confirmed: wrong on the target, right in a World"
+        show_line(f"{len(triage.unconfirmed)} {what}; kept in {where}")
         for crash in triage.unconfirmed:
-            _print_crash(crash, triage.more[crash.name], out, image, check)
+            _print_crash(crash, campaign, check)
 
 
-def _print_crash(crash: Crash, more: int, out: Path, image: Image, check: str | None) -> None:
+def _print_crash(crash: Crash, campaign: Campaign, check: str | None) -> None:
     where = f" in {crash.function}" if crash.function else ""
+    more = campaign.triage.more[crash.name]
     again = f"; {counted(more, 'more input')}" if more else ""
     before, after = crash.sizes
     show_line(f"  {crash.name}{where}: {crash.verdict} ({after} bytes, found with {before}{again})")
     in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
-    stream = out / crash.folder / f"{crash.name}.stream"
-    show_line(f"    {replay_line(stream, foreign_path(image), in_file)}")
-    show_line(f"    {debug_line(stream, foreign_path(image), check=in_file)}")
+    stream = campaign.folder.path / crash.folder / f"{crash.name}.stream"
+    image = foreign_path(campaign.triage.target.image)
+    show_line(f"    {replay_line(stream, image, in_file)}")
+    show_line(f"    {debug_line(stream, image, check=in_file)}")
 
 
-def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:
+def _print_covering(campaign: Campaign, symbol: str) -> bool:
     """Says whether the function was reached; True if not."""
     if campaign.reached_by is None:
         inputs = counted(campaign.inputs, "input")
         complain(f"--covering {symbol}: not reached by {inputs}; give it more --time, or a --corpus")
         return True
     show_line(f"--covering {symbol}: reached by {campaign.reached_by}")
-    show_line(f"    {replay_line(campaign.reached_by, foreign_path(image))}")
+    show_line(f"    {replay_line(campaign.reached_by, foreign_path(campaign.triage.target.image))}")
     return False
 
 
-def _write_summary(
-    campaign: Campaign, out: Path, tracefile: Tracefile, never: list[str], ended: CampaignEnd
-) -> None:
+def _write_summary(campaign: Campaign, tracefile: Tracefile, never: list[str], ended: CampaignEnd) -> None:
     status = campaign.status()
     lines, branches = line_share(tracefile), branch_share(tracefile)
     document = {
@@ -126,14 +119,13 @@ def _write_summary(
         "branches": msgspec.to_builtins(branches),
         "functions_never_reached": never,
         "reached_by": None if campaign.reached_by is None else str(campaign.reached_by),
-        "crashes": [_as_json(crash, campaign) for crash in campaign.triage.found],
+        "crashes": [
+            {
+                **msgspec.to_builtins(crash),
+                "confirmed": crash.confirmed,
+                "more": campaign.triage.more[crash.name],
+            }
+            for crash in campaign.triage.found
+        ],
     }
     campaign.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")
-
-
-def _as_json(crash: Crash, campaign: Campaign) -> dict[str, object]:
-    return {
-        **msgspec.to_builtins(crash),
-        "confirmed": crash.confirmed,
-        "more": campaign.triage.more[crash.name],
-    }

@@ -9,7 +9,7 @@ input ──► Target.script ──► a World: ideal radio, carrier on, the ro
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol.actions import ScriptItem
@@ -23,7 +23,6 @@ from mirotwin.verify.bare.case import BareRerun, rerun_bare
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
 from mirotwin.verify.bare.run import AHEAD_TICKS
 from mirotwin.verify.cases.rerun import Rerun, rerun_robot
-from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.registry import CHECKS
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
@@ -33,37 +32,8 @@ SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 Expected = Mapping[str, Any]
 """Checks by name with their parameters, as the table `[expect]` of a scenario."""
-
-
-class OracleVerdict(Protocol):
-    """What became of an input that was played again."""
-
-    @property
-    def failure(self) -> Failure | None:
-        """The first check that failed, None if none did."""
-        ...
-
-    def case(self) -> str:
-        """The case of that failure."""
-        ...
-
-    def stream(self) -> str:
-        """The input as a stream file that nothing is expected of."""
-        ...
-
-
-class Oracle(Protocol):
-    """Judges inputs of `target`."""
-
-    @property
-    def target(self) -> Target: ...
-    def confirm(self, data: bytes, failure: TargetFailure) -> OracleVerdict:
-        """Judges an input in which the target failed so."""
-        ...
-
-    def judged(self, data: bytes, expected: Expected) -> OracleVerdict:
-        """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
-        ...
+OracleVerdict = Rerun | BareRerun
+"""What an input did that was played again."""
 
 
 class RobotOracle:
@@ -73,12 +43,14 @@ class RobotOracle:
         self.target = target
 
     def confirm(self, data: bytes, failure: TargetFailure) -> Rerun:
+        """Judges an input in which the target failed so."""
         script = self.target.script(data)
         if failure.check == NEVER_SLEEPS:
             script = [*script, *_questions(script, failure.tick, self.target.robots)]
         return self._rerun(script, expected_of(failure.check), failure.tick)
 
     def judged(self, data: bytes, expected: Expected) -> Rerun:
+        """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
         return self._rerun(self.target.script(data), expected, 0)
 
     def _rerun(self, script: Sequence[ScriptItem], expected: Expected, last_tick: int) -> Rerun:
@@ -104,6 +76,9 @@ class BareProcessorOracle:
     def _rerun(self, data: bytes, name: str, until_tick: int) -> BareRerun:
         target = self.target
         return rerun_bare(target.image, target.line, target.script(data), until_tick, name, self.check)
+
+
+Oracle = RobotOracle | BareProcessorOracle
 
 
 def oracle_of(target: Target, check: NamedCheck | None = None) -> Oracle:

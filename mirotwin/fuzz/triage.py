@@ -133,7 +133,7 @@ class Triage:
             return None
 
         def fails(one: bytes) -> bool:
-            found = self.judged(one, expected).failure
+            found = self.oracle.judged(one, expected).failure
             return found is not None and found.check == failure.check
 
         small = minimise(data, fails, Budget(TRIES_IN_A_WORLD, self.minimise_s, self.tell))
@@ -142,12 +142,8 @@ class Triage:
         if key in self._by_key:
             self._count(key)
             return None
-        verdict = self.judged(small, expected)
+        verdict = self.oracle.judged(small, expected)
         return self._keep(key, small, 0, "", verdict, counts, (len(data), len(small)))
-
-    def judged(self, data: bytes, expected: Expected) -> OracleVerdict:
-        """What the checks in `expected`, and those that are always on, say of an input."""
-        return self.oracle.judged(data, expected)
 
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None

@@ -124,7 +124,7 @@ def test_a_find_of_a_check_in_python_is_made_small_in_worlds(tmp_path):
     triage = triage_of(own_image(), tmp_path)
     expected = {"wheels_within_m_s": {"limit_m_s": 0.1, "overshoot_m_s": 0.0}}
     data = bytes([6, 0, 64, 0, 64, *bytes(8), 6, 0, 64, 0, 64, *bytes(8)])
-    failure = triage.judged(data, expected).failure
+    failure = triage.oracle.judged(data, expected).failure
     assert failure is not None
     crash = triage.take_judged(data, failure, expected)
     assert crash is not None
