@@ -97,7 +97,7 @@ class Builds:
     def _look(self, before: tuple[Mark, Mark]) -> bool:
         """Compares the variables of each robot whose processors sleep; whether all do."""
         slept = True
-        for robot, twin in zip(_robots(self.pair.one), _robots(self.pair.other), strict=True):
+        for robot, twin in zip(self.pair.one.robots, self.pair.other.robots, strict=True):
             if not (robot.board.cpu.idle and twin.board.cpu.idle):
                 slept = False
                 continue
@@ -156,10 +156,6 @@ class Writes(Watcher):
 
     def _now(self, cpu: Cpu) -> bytes:
         return bytes(cpu.peek_iram(self.first + offset) for offset in range(self.size))
-
-
-def _robots(world: World) -> list[Robot]:
-    return [robot for network in world.networks for robot in network.robots]
 
 
 def _bytes(robot: Robot, first: int, size: int) -> bytes:

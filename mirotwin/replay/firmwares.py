@@ -86,8 +86,11 @@ def _first_mapped(
 ) -> InstructionDifference | None:
     """The first changed instruction that the first firmware executes, and the one in its place in the second."""
     one, other = worlds
-    robots = [(network.index, robot.slot) for network in one.networks for robot in network.robots]
-    reached = [Reached(address=at, network=net, slot=slot) for net, slot in robots for at in mapping.places]
+    reached = [
+        Reached(address=at, network=robot.network, slot=robot.slot)
+        for robot in one.robots
+        for at in mapping.places
+    ]
     try:
         event = one.run_until(reached, until_tick - one.tick) if reached else None
     except WaitExpired:

@@ -101,7 +101,7 @@ class Processors(WorldPair):
 
     def __init__(self, one: World, other: World) -> None:
         super().__init__(one, other)
-        both = zip(_robots(one), _robots(other), strict=True)
+        both = zip(one.robots, other.robots, strict=True)
         self.live = [
             (LiveState(a.board.cpu, one.image), LiveState(b.board.cpu, other.image)) for a, b in both
         ]
@@ -138,7 +138,7 @@ class Stepper:
         places = changed_instructions(one.image, other.image)
         conditions = [
             Reached(address=place, network=robot.network, slot=robot.slot)
-            for robot in _robots(one)
+            for robot in one.robots
             for place in places
         ]
         if not conditions:
@@ -177,7 +177,7 @@ class Stepper:
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[Stepped, Stepped]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
         images = self.pair.one.image, self.pair.other.image
-        robots = zip(_robots(self.pair.one), _robots(self.pair.other), strict=True)
+        robots = zip(self.pair.one.robots, self.pair.other.robots, strict=True)
         pairs = [(Stepped(robot, images[0]), Stepped(twin, images[1])) for robot, twin in robots]
         try:
             while True:
@@ -234,10 +234,6 @@ def _lasting(
         return None
     parted = (at for at in range(first, len(steps)) if steps[at][0].next_pc != steps[at][1].next_pc)
     return first, next(parted, -1)
-
-
-def _robots(world: World) -> list[Robot]:
-    return [robot for network in world.networks for robot in network.robots]
 
 
 def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[FieldDifference]:

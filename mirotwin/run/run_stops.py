@@ -80,10 +80,9 @@ def _tick(time: Time) -> int:
 
 def _forget_commands(world: World) -> None:
     """What LM629s were told before is a record of then: whoever begins from what was saved does not have it either."""
-    for network in world.networks:
-        for robot in network.robots:
-            robot.board.left.commands.clear()
-            robot.board.right.commands.clear()
+    for robot in world.robots:
+        robot.board.left.commands.clear()
+        robot.board.right.commands.clear()
 
 
 def _outside(option: str, first_tick: int, end_tick: int) -> BadInput:

@@ -31,11 +31,7 @@ class Rig:
         self.options = options
         self.world, self.trace, self.checks = world_for(options)
         self.links = [Link(self.world, network.index) for network in self.world.networks]
-        self.robots = [
-            RobotUnderTest(self.world, network.index, robot.slot)
-            for network in self.world.networks
-            for robot in network.robots
-        ]
+        self.robots = [RobotUnderTest(self.world, robot.network, robot.slot) for robot in self.world.robots]
         self.tick = -1
         """Where the test ended, -1 while it runs."""
 
@@ -67,8 +63,8 @@ class Rig:
         events: list[Event] = []
         for network in self.world.networks:
             events += [event for _, event in network.log.since(network.log.end - LAST_EVENTS)]
-            for robot in network.robots:
-                events += [event for _, event in robot.log.since(robot.log.end - LAST_EVENTS)]
+        for robot in self.world.robots:
+            events += [event for _, event in robot.log.since(robot.log.end - LAST_EVENTS)]
         end_tick = self.tick if self.tick >= 0 else self.world.tick
         events = sorted((event for event in events if event.tick <= end_tick), key=lambda event: event.tick)
         return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
@@ -107,13 +103,12 @@ def world_for(options: RigOptions) -> tuple[World, Trace, Checks]:
 
 def _watched(world: World) -> bool:
     """Whether the coverage of the firmware is taken: it is to count the same however the tests are spread."""
-    return any(robot.board.cpu.inspector for network in world.networks for robot in network.robots)
+    return any(robot.board.cpu.inspector for robot in world.robots)
 
 
 def _boot(world: World) -> None:
-    robots = [robot for network in world.networks for robot in network.robots]
     for _ in range(BOOT_PERIODS):
         world.step()
-        if world.stopped or all(is_up(robot.board.cpu) for robot in robots):
+        if world.stopped or all(is_up(robot.board.cpu) for robot in world.robots):
             return
     raise not_up(world.image, "boot=False begins a test at power-on")

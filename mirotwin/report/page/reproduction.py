@@ -83,8 +83,7 @@ def reproduce(
 
 def _faults(world: World) -> list[RobotFault]:
     return [
-        RobotFault(network.index, robot.slot, fault.tick, f"{fault}")
-        for network in world.networks
-        for robot in network.robots
+        RobotFault(robot.network, robot.slot, fault.tick, f"{fault}")
+        for robot in world.robots
         for fault in robot.board.faults
     ]

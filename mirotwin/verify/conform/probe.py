@@ -59,8 +59,7 @@ class Listener(Monitor[Listening]):
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
     """A listener for each robot of the trial, which is run to its end."""
     world = World(trial.scenario, seed, image, trial.script)
-    places = [(network.index, robot.slot) for network in world.networks for robot in network.robots]
-    checks = Checks(world, {place: [Listening()] for place in places})
+    checks = Checks(world, {(robot.network, robot.slot): [Listening()] for robot in world.robots})
     run_trial(world)
     checks.finish()
     return [monitor for monitor in checks.monitors if isinstance(monitor, Listener)]

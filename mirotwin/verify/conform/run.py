@@ -78,9 +78,8 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
     checks.finish()
     failures = [one for one in checks.failures if not one.fault]
     faults = tuple(
-        (network.index, robot.slot, fault)
-        for network in world.networks
-        for robot in network.robots
+        (robot.network, robot.slot, fault)
+        for robot in world.robots
         for fault in robot.board.faults[:FAULTS_KEPT]
     )
     if not failures and (not world.finished or checks.verdicts()[0].verdict != "passed"):
@@ -113,7 +112,7 @@ def _cases(
 
 
 def _robots(world: World) -> list[RobotId]:
-    return [(network.index, robot.slot) for network in world.networks for robot in network.robots]
+    return [(robot.network, robot.slot) for robot in world.robots]
 
 
 def try_all(

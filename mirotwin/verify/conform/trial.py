@@ -118,8 +118,4 @@ def run_trial(world: World) -> None:
 
 
 def fault_count(world: World) -> int:
-    count = 0
-    for network in world.networks:
-        for robot in network.robots:
-            count += robot.board.fault_count
-    return count
+    return sum(robot.board.fault_count for robot in world.robots)

@@ -201,10 +201,9 @@ class Player:
     def begin_checks(self, checks: Sequence[Check], network: int | None, slot: int | None) -> None:
         """Checks from now on, of the robots in that network and slot; None: of all."""
         places = [
-            (one.index, robot.slot)
-            for one in self.world.networks
-            for robot in one.robots
-            if network in (None, one.index) and slot in (None, robot.slot)
+            (robot.network, robot.slot)
+            for robot in self.world.robots
+            if network in (None, robot.network) and slot in (None, robot.slot)
         ]
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
 

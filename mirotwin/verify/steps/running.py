@@ -146,9 +146,8 @@ def folder_of(artifacts: Path, path: str) -> Path:
 def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Failures, and what was not judged, one line each: faults, the step, the checks in the order of their begin."""
     lines = [
-        f"firmware fault: net{network.index}/robot{robot.slot}: {fault}"
-        for network in player.world.networks
-        for robot in network.robots
+        f"firmware fault: net{robot.network}/robot{robot.slot}: {fault}"
+        for robot in player.world.robots
         for fault in robot.board.faults[:1]
     ]
     if player.failure is not None:

@@ -48,10 +48,9 @@ class Watch:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for network in self.world.networks:
-            for robot in network.robots:
-                robot.marks = ()
-                robot.asked = []
+        for robot in self.world.robots:
+            robot.marks = ()
+            robot.asked = []
         self._close_pins()
 
     def wants(self, event: Event) -> bool:

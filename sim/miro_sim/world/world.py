@@ -113,16 +113,15 @@ class World:
         for one, other in permutations(self.networks, 2):
             if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
                 one.share_frequency(other)
-        everyone = [robot for network in self.networks for robot in network.robots]
         for network in self.networks:
-            network.show(everyone)
+            network.show(self.robots)
         self.tick = 0
         self.index = 0
         self.in_period = False
         self.stopped = False
         self.chain = b""
         self.last: Period | None = None
-        self.bodies = Bodies(everyone)
+        self.bodies = Bodies(self.robots)
         self.waits = Waits(self)
         self.observers: list[Callable[[Period], object]] = []
         self._state: Flat | None = None
@@ -143,11 +142,14 @@ class World:
         return self.stopped or self.index >= self.periods
 
     @property
+    def robots(self) -> list[Robot]:
+        """By network and slot."""
+        return [robot for network in self.networks for robot in network.robots]
+
+    @property
     def faults(self) -> list[FirmwareFault]:
         """Firmware faults of all robots, in robot order."""
-        return [
-            fault for network in self.networks for robot in network.robots for fault in robot.board.faults
-        ]
+        return [fault for robot in self.robots for fault in robot.board.faults]
 
     def step(self) -> Period:
         """Runs to the end of the control period that is under way and returns what it left behind."""
@@ -347,7 +349,7 @@ class World:
 
     def counters(self) -> dict[str, dict[str, int | None]]:
         """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
-        robots = [robot for network in self.networks for robot in network.robots]
+        robots = self.robots
         cpus = [robot.board.cpu for robot in robots]
         return {
             "link": {
