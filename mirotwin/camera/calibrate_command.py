@@ -25,7 +25,7 @@ from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load
 from mirotwin.shell.command import Option, Options, command_of
-from mirotwin.shell.console import show
+from mirotwin.shell.console import facts_table, plain_table, show
 from mirotwin.shell.options import (
     FORCE,
     OUT,
@@ -205,9 +205,7 @@ def _of_scenario(name: str, initial: CameraParameters | None, options: Calibrate
 def _print(found: _Found, files: Sequence[Path]) -> None:
     residuals = found.calibration.residuals
     assert residuals is not None
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(style="bold")
-    table.add_column()
+    table = facts_table()
     table.add_row("points", f"{residuals.points}")
     table.add_row("residuals", f"rms {residuals.rms_px:.3f} px, max {residuals.max_px:.3f} px")
     if found.worst_m is not None:
@@ -221,9 +219,8 @@ def _print(found: _Found, files: Sequence[Path]) -> None:
 
 def _by_residual(points: Sequence[ControlPoint], off_px: Sequence[float]) -> Table:
     """The points that fit worst, the worst first."""
-    table = Table(box=None, pad_edge=False)
-    for name in ("point", "x_cm", "y_cm", "height_cm", "u_px", "v_px", "off_px"):
-        table.add_column(name, justify="right")
+    names = ("point", "x_cm", "y_cm", "height_cm", "u_px", "v_px", "off_px")
+    table = plain_table(*names, justify="right")
     order = sorted(range(len(points)), key=lambda number: -off_px[number])
     for number in order[:SHOWN]:
         x_m, y_m, z_m, u, v = points[number]

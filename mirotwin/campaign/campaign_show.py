@@ -18,6 +18,7 @@ from mirotwin.campaign.design import Value
 from mirotwin.campaign.rows import UNSETTLED, VERDICTS, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval, figures
 from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as show_table
 from mirotwin.shell.options import JSON, PATH, FiniteNumber
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
@@ -125,9 +126,7 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
 
 
 def _groups_table(groups: Sequence[GroupFigures]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for name in (*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric"):
-        table.add_column(name)
+    table = plain_table(*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric")
     for name in ("of", "median", "95 % interval", "5 %", "95 %", "worst"):
         table.add_column(name, justify="right")
     for group in groups:
@@ -211,8 +210,7 @@ def _differences(
 
 
 def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:
-    table = Table(box=None, pad_edge=False)
-    table.add_column("metric")
+    table = plain_table("metric")
     for name in ("pairs", "left out", "seeds", first, second, "difference", "95 % interval", "median"):
         table.add_column(name, justify="right")
     for name in ("higher", "lower"):

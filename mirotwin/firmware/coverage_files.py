@@ -24,6 +24,7 @@ from miro_robot.inspect.coverage import (
     missed,
 )
 from miro_robot.inspect.lcov import Tracefile, decode, encode
+from mirotwin.shell.console import plain_table
 from mirotwin.shell.outputs import whole_file
 
 
@@ -83,9 +84,7 @@ def read_tracefile(path: Path) -> Tracefile:
 
 def table(tracefile: Tracefile) -> Table:
     """A row a file and a total: lines, branches, and the lines that never ran."""
-    result = Table(box=None, pad_edge=False)
-    for column in ("file", "lines", "branches", "never ran"):
-        result.add_column(column, overflow="fold")
+    result = plain_table("file", "lines", "branches", "never ran", overflow="fold")
     for path in sorted(tracefile):
         one = {path: tracefile[path]}
         result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))

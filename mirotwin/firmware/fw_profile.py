@@ -7,7 +7,6 @@ from typing import Annotated
 
 import click
 import msgspec
-from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_robot.inspect.activity import Activity
@@ -27,7 +26,7 @@ from mirotwin.firmware.coverage_files import (
 )
 from mirotwin.firmware.subject import WindowOptions, image_name, look, open_window
 from mirotwin.shell.command import Option, command_of
-from mirotwin.shell.console import show
+from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import SourceFolders, sources_of, with_debug_files
 from mirotwin.shell.options import FORCE, JSON, OUT
 from mirotwin.shell.outputs import check_new, check_not_input
@@ -65,7 +64,9 @@ def _print(result: Profile, name: str) -> None:
         f"{name}: {result.cycles} machine cycles, {result.instructions} instructions, "
         f"asleep {_percent(result.asleep_cycles, result.cycles)}"
     )
-    functions = _table("function", "address", "calls", "instructions", "cycles", "of awake", "of all")
+    counts = ("address", "calls", "instructions", "cycles", "of awake", "of all")
+    functions = plain_table("function", *counts, justify="right")
+    functions.columns[0].justify = "left"
     for function in result.functions:
         functions.add_row(
             function.name,
@@ -77,9 +78,9 @@ def _print(result: Profile, name: str) -> None:
             _percent(function.cycles, result.cycles),
         )
     show(functions)
-    interrupts = _table(
-        "interrupt", "count", "worst latency", "at tick", "worst duration", "at tick", "of all"
-    )
+    worst = ("count", "worst latency", "at tick", "worst duration", "at tick", "of all")
+    interrupts = plain_table("interrupt", *worst, justify="right")
+    interrupts.columns[0].justify = "left"
     for found in result.interrupts:
         if found.count:
             interrupts.add_row(
@@ -105,13 +106,6 @@ def _print(result: Profile, name: str) -> None:
     room = stack.last - stack.first + 1 if stack.first is not None else None
     if room is not None and stack.at_least > room:
         show(f"the stack has {room} bytes: it can run out by {stack.at_least - room}")
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for index, column in enumerate(columns):
-        table.add_column(column, justify="right" if index else "left")
-    return table
 
 
 def _percent(part: int, whole: int) -> str:

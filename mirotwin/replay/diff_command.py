@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
-from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
@@ -28,7 +27,7 @@ from mirotwin.replay.exact_difference import (
 from mirotwin.replay.firmwares import annotated_of
 from mirotwin.rerun.job import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
-from mirotwin.shell.console import show
+from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.options import ALL, NAME, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import file_in
@@ -163,9 +162,7 @@ def _digests(compare: CompareOptions, recordings: tuple[Recording, Recording], n
 def _print_sources(sources: Sequence[SourceDifference]) -> None:
     if not sources:
         return
-    table = Table(box=None, pad_edge=False)
-    for name in ("made from", *WORDS):
-        table.add_column(name, overflow="fold")
+    table = plain_table("made from", *WORDS, overflow="fold")
     for one in sources:
         table.add_row(one.key, one.one, one.other)
     show(table)

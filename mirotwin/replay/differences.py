@@ -7,7 +7,6 @@ from typing import Any
 
 import click
 import msgspec
-from rich.table import Table
 
 from miro_exact.clock import seconds
 from miro_protocol.events import Damaged
@@ -21,7 +20,7 @@ from mirotwin.replay.builds import VariableDifference
 from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.instructions import InstructionDifference
 from mirotwin.rerun.job import Job
-from mirotwin.shell.console import show
+from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.program import complain
 
 LISTED = 5
@@ -31,9 +30,7 @@ LISTED = 5
 def print_differences(found: Sequence[Difference], everything: bool, words: tuple[str, str] = WORDS) -> None:
     """The first difference of each channel, or all of them."""
     rows = [(one, 1) for one in found] if everything else first_per_channel(found)
-    table = Table(box=None, pad_edge=False)
-    for name in ("period", "tick", "t [s]"):
-        table.add_column(name, justify="right")
+    table = plain_table("period", "tick", "t [s]", justify="right")
     table.add_column("channel", no_wrap=True)
     for word in words:
         table.add_column(word, overflow="fold")
@@ -118,9 +115,7 @@ def print_frames(job: Job, replayed: Sequence[Period], everything: bool, to_tick
     if to_tick is not None:
         lines = [line for line in lines if line.tick < to_tick]
     shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
-    table = Table(box=None, pad_edge=False)
-    table.add_column("tick", justify="right")
-    table.add_column("t [s]", justify="right")
+    table = plain_table("tick", "t [s]", justify="right")
     table.add_column("")
     table.add_column("from")
     table.add_column("frame", overflow="fold")
@@ -136,9 +131,8 @@ def print_frames(job: Job, replayed: Sequence[Period], everything: bool, to_tick
 
 def print_response(replayed: Sequence[Period]) -> None:
     """What the robots made of a stream: there is no recording to compare with."""
-    table = Table(box=None, pad_edge=False)
-    for name in ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]"):
-        table.add_column(name, justify="right")
+    names = ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]")
+    table = plain_table(*names, justify="right")
     for index, robot in enumerate(replayed[-1].robots):
         seen = [period.robots[index] for period in replayed]
         commands = sum(len(one.left.commands) + len(one.right.commands) for one in seen)

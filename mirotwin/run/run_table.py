@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.table import Table
-
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import calibration_text, wheels_text
 from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
 from mirotwin.report.theory import theory_text
-from mirotwin.shell.console import show
+from mirotwin.shell.console import facts_table, show
 from mirotwin.verify.expectations import expectations_text
 
 
 def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
     tracking, link, firmware = summary.tracking, summary.link, summary.firmware
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(style="bold")
-    table.add_column()
+    table = facts_table()
     table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
     if summary.set:
         table.add_row("set", " ".join(summary.set))

@@ -4,7 +4,6 @@ import json
 from typing import Annotated, Any
 
 import click
-from rich.table import Table
 
 from miro_exact.bad_input import shortened
 from miro_host.plugins import PluginError
@@ -12,6 +11,7 @@ from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
 from mirotwin.shell.command import Argument, Options, command_of
+from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
 from mirotwin.shell.options import SET, ScenarioName
 from mirotwin.shell.program import LazyGroup
@@ -40,8 +40,7 @@ def scenarios(context: click.Context) -> None:
     """Lists the built-in scenarios."""
     if context.invoked_subcommand is not None:
         return
-    table = Table(box=None, pad_edge=False)
-    table.add_column("scenario", style="bold")
+    table = plain_table("scenario", bold=True)
     table.add_column("duration", justify="right")
     table.add_column("robots", justify="right")
     table.add_column("what it shows")
@@ -87,10 +86,7 @@ scenarios.add_command(show)
 @scenarios.command()
 def profiles() -> None:
     """Lists the radio profiles and the keys that each sets, for `profile = ".."` in [network.radio]."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("profile", style="bold")
-    table.add_column("what it does")
-    table.add_column("keys")
+    table = plain_table("profile", "what it does", "keys", bold=True)
     for name, profile in radio_profiles.profiles().items():
         table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
     print_result(table)
@@ -102,10 +98,7 @@ def variants() -> None:
 
     With --set a variant wins over the file, and over what is set before it; in a file, keys that are given win.
     """
-    table = Table(box=None, pad_edge=False)
-    table.add_column("variant", style="bold")
-    table.add_column("what it is")
-    table.add_column("keys")
+    table = plain_table("variant", "what it is", "keys", bold=True)
     for name, variant in scenario_variants.variants().items():
         keys = _keys({key: value for key, value in variant.items() if key != "about"})
         table.add_row(name, variant["about"], keys)
@@ -115,10 +108,7 @@ def variants() -> None:
 @scenarios.command()
 def checks() -> None:
     """Lists the checks, for --expect and [expect], and their parameters; a bare value is that of the one with a *."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("check", style="bold")
-    table.add_column("what it checks")
-    table.add_column("parameters")
+    table = plain_table("check", "what it checks", "parameters", bold=True)
     for name in CHECKS.names():
         try:
             struct = struct_of(name)

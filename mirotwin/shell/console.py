@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 from rich.console import Console, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from miro_exact.bad_input import one_line
@@ -17,6 +18,21 @@ class _Plain(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(one_line(text), **options)
+
+
+def plain_table(*names: str, bold: bool = False, **style: Any) -> Table:
+    """A table without lines, with these columns, each in this style; the first one `bold`."""
+    table = Table(box=None, pad_edge=False)
+    for index, name in enumerate(names):
+        table.add_column(name, style="bold" if bold and not index else None, **style)
+    return table
+
+
+def facts_table(**style: Any) -> Table:
+    """A table of names and what is to be said of each."""
+    table = plain_table("", "", bold=True, **style)
+    table.show_header = False
+    return table
 
 
 def show(result: RenderableType) -> None:

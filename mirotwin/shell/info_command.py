@@ -5,12 +5,10 @@ import platform
 from importlib import metadata
 from typing import Annotated
 
-from rich.table import Table
-
 from miro_exact import engine as engines
 from miro_exact import hot_modules
 from mirotwin.shell.command import Options, command_of
-from mirotwin.shell.console import show
+from mirotwin.shell.console import facts_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FIRMWARE, Engine, choose_engine
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
@@ -55,9 +53,7 @@ def info(options: InfoOptions) -> int:
     active = choose_engine(options.engine)
     broken = _broken_modules(active)
     image = load_firmware(options.firmware, named=False)
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
+    table = facts_table(overflow="fold")
     table.add_row("mirotwin", version_of("mirotwin"))
     table.add_row("Python", f"{platform.python_version()} ({platform.python_implementation()})")
     table.add_row("platform", platform.platform())

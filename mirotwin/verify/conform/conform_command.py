@@ -8,13 +8,12 @@ from typing import Annotated
 
 import click
 import msgspec
-from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.console import show
+from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import (
@@ -205,9 +204,7 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
             line = {"rule": rule.id, "name": rule.name, "text": rule.text, "source": rule.source}
             click.echo(msgspec.json.encode(line | {"presupposes": rule.presupposes}))
         return
-    table = Table(box=None, pad_edge=False)
-    for head in ("rule", "name", "what a robot has to do"):
-        table.add_column(head, overflow="fold")
+    table = plain_table("rule", "name", "what a robot has to do", overflow="fold")
     for rule in rules:
         table.add_row(rule.id, rule.name, rule.text)
     show(table)
@@ -252,9 +249,7 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
     if begin:
         show(begin)
     names = {rule.id: rule.name for rule in rules}
-    table = Table(box=None, pad_edge=False)
-    for head in ("rule", "name", "verdict", "first failure"):
-        table.add_column(head, overflow="fold")
+    table = plain_table("rule", "name", "verdict", "first failure", overflow="fold")
     for outcome in causes_first(outcomes):
         if (quiet and not outcome.failures) or (outcome.cause and not everything):
             continue
