@@ -14,6 +14,12 @@ cdef struct Place:
     Py_ssize_t end_size
 
 
+cdef class Layout:
+    cdef Place *places  # their addresses count from the begin of a part
+    cdef Py_ssize_t number
+    cdef tuple names
+
+
 cdef class Memory:
     cdef Place *places
     cdef Py_ssize_t number
@@ -22,14 +28,14 @@ cdef class Memory:
     cdef Py_ssize_t *looked_at  # before packing: the places that are queues or may hold NaN
     cdef Py_ssize_t looked_at_count
     cdef Py_ssize_t fixed  # bytes of all that are no queues
-    cdef readonly tuple names
-    cdef object parts
+    cdef list groups  # they hold the parts
     cdef bytes data
     cdef Py_ssize_t begin
 
     cpdef bytes pack(self)
     cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1
     cpdef put(self)
+    cdef str name(self, Py_ssize_t number)
     cdef int join(self) except -1
     cdef Py_ssize_t size(self) except -1
     cdef void write(self, char *to) noexcept

@@ -54,24 +54,23 @@ cdef void set_length(char *at, Py_ssize_t size, long long value) noexcept:
         memcpy(at, &value, 8)
 
 
-cdef class Memory:
-    """Fields in their order; each is (part, name for messages, address, item size, items, code, low, high, end).
+cdef class Layout:
+    """Neighbouring fields of a class, from those of one part: (name, address, item size, items, code, low, high, end).
 
     `low` and `high` are None where every value of the type will do; `end` is None, or (address, size).
     """
 
-    def __cinit__(self, list fields):
+    def __cinit__(self, part, list fields):
         cdef Place *place
+        cdef size_t begin = <size_t><void *>part
         self.number = len(fields)
         self.places = <Place *>PyMem_Calloc(max(1, self.number), sizeof(Place))
-        self.looked_at = <Py_ssize_t *>PyMem_Calloc(max(1, self.number), sizeof(Py_ssize_t))
-        if self.places == NULL or self.looked_at == NULL:
+        if self.places == NULL:
             raise MemoryError
-        self.parts = [field[0] for field in fields]
-        self.names = tuple(field[1] for field in fields)
-        for index, (_, _, address, size, count, code, low, high, end) in enumerate(fields):
+        self.names = tuple(field[0] for field in fields)
+        for index, (_, address, size, count, code, low, high, end) in enumerate(fields):
             place = &self.places[index]
-            place.at = <char *><size_t>address
+            place.at = <char *>(<size_t>address - begin)
             place.size = size
             place.count = count
             place.code = ord(code)
@@ -82,15 +81,52 @@ cdef class Memory:
             elif low is not None:
                 place.low = low
                 place.high = high
-            if end is None:
-                self.fixed += place.size * place.count
-            else:
-                place.end = <char *><size_t>end[0]
+            if end is not None:
+                place.end = <char *>(<size_t>end[0] - begin)
                 place.end_size = end[1]
-            if end is not None or code == "d":
-                self.looked_at[self.looked_at_count] = index
-                self.looked_at_count += 1
+
+    def __dealloc__(self):
+        PyMem_Free(self.places)
+
+
+cdef class Memory:
+    """Fields in their order, of groups: each is (part, what stands before the names of its fields, layout)."""
+
+    def __cinit__(self, list groups):
+        cdef Layout layout
+        cdef Place *place
+        cdef Py_ssize_t index, number = 0
+        cdef size_t begin
+        self.groups = groups
+        for _, _, layout in groups:
+            self.number += layout.number
+        self.places = <Place *>PyMem_Calloc(max(1, self.number), sizeof(Place))
+        self.looked_at = <Py_ssize_t *>PyMem_Calloc(max(1, self.number), sizeof(Py_ssize_t))
+        if self.places == NULL or self.looked_at == NULL:
+            raise MemoryError
+        for part, _, layout in groups:
+            begin = <size_t><void *>part
+            for index in range(layout.number):
+                place = &self.places[number]
+                place[0] = layout.places[index]
+                place.at += begin
+                if place.end != NULL:
+                    place.end += begin
+                else:
+                    self.fixed += place.size * place.count
+                if place.end != NULL or place.code == c"d":
+                    self.looked_at[self.looked_at_count] = number
+                    self.looked_at_count += 1
+                number += 1
         self.join()
+
+    cdef str name(self, Py_ssize_t number):
+        """Of a field, for messages."""
+        cdef Layout layout
+        for _, prefix, layout in self.groups:
+            if number < layout.number:
+                return prefix + layout.names[number]
+            number -= layout.number
 
     cdef int join(self) except -1:
         """Fields that lie next to each other in their part as they do in the bytes are one span."""
@@ -130,11 +166,11 @@ cdef class Memory:
                 for item in range(place.count):
                     memcpy(&real, place.at + 8 * item, 8)
                     if real != real:
-                        raise DomainError(f"{self.names[index]} is NaN")
+                        raise DomainError(f"{self.name(index)} is NaN")
                 continue
             count = length(place.end, place.end_size)
             if count < 0 or count > place.count:
-                raise ValueError(f"{self.names[index]}: {count} items, room for {place.count}")
+                raise ValueError(f"{self.name(index)}: {count} items, room for {place.count}")
             total += 4 + place.size * count
         return total
 
@@ -174,19 +210,19 @@ cdef class Memory:
             count = place.count
             if place.end != NULL:
                 if left < 4:
-                    raise ValueError(f"the state ends in {self.names[index]}")
+                    raise ValueError(f"the state ends in {self.name(index)}")
                 copy(<char *>&written, source + at, 4, 1)
                 if written > count:
-                    raise ValueError(f"{self.names[index]} has {written} items, not at most {count}")
+                    raise ValueError(f"{self.name(index)} has {written} items, not at most {count}")
                 count = written
                 if place.end == end and count != shared:
-                    raise ValueError(f"{self.names[index]} has {count} items, not {shared}")
+                    raise ValueError(f"{self.name(index)} has {count} items, not {shared}")
                 end = place.end
                 shared = count
                 at += 4
                 left -= 4
             if left < count * place.size:
-                raise ValueError(f"the state ends in {self.names[index]}")
+                raise ValueError(f"the state ends in {self.name(index)}")
             if place.bounded:
                 self.check_items(place, index, source + at, count)
             at += count * place.size
@@ -203,7 +239,7 @@ cdef class Memory:
             if place.code == c"d":
                 copy(<char *>&real, data + 8 * item, 8, 1)
                 if not place.least <= real <= place.most:
-                    raise ValueError(f"{self.names[index]} is {real}, not from {place.least} to {place.most}")
+                    raise ValueError(f"{self.name(index)} is {real}, not from {place.least} to {place.most}")
                 continue
             if place.code == c"q":
                 copy(<char *>&value, data + 8 * item, 8, 1)
@@ -213,7 +249,7 @@ cdef class Memory:
             else:
                 value = <unsigned char>data[item]
             if not place.low <= value <= place.high:
-                raise ValueError(f"{self.names[index]} is {value}, not from {place.low} to {place.high}")
+                raise ValueError(f"{self.name(index)} is {value}, not from {place.low} to {place.high}")
         return 0
 
     cpdef put(self):
@@ -250,9 +286,7 @@ cdef class Attributes:
     """
 
     def __cinit__(self, list fields, slow):
-        self.fields = [
-            (part, name, shape, codes.encode(), count, split) for part, name, shape, codes, count, split in fields
-        ]
+        self.fields = fields
         self.slow = slow
 
     def __dealloc__(self):

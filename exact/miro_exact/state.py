@@ -24,7 +24,7 @@ where fields that are each in their range contradict each other.
 `load` takes any bytes: it first checks all lengths and ranges and writes nothing, then writes and calls `after_load`.
 Where a check fails, the state stays as it was, and a ValueError names the field. The very same bytes object, loaded
 again, is not checked again: bytes do not change. Parts are looked up once, when a `Flat` is made: a part must not be
-replaced afterwards.
+replaced afterwards. What a class has is looked up once in a process.
 
 In the compiled engine the build adds to each compiled module where the fields of its classes lie (`_places_NAME`), and
 neighbouring fields are copied by `memory.pyx`. Both engines give the same bytes.
@@ -35,9 +35,9 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import groupby
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from struct import Struct, calcsize
 from typing import Any, NamedTuple, Protocol
 
@@ -99,10 +99,15 @@ class StateField(NamedTuple):
     path: str
 
 
-class Block(Protocol):
+class Packed(Protocol):
     """Neighbouring fields that are packed together."""
 
     def pack(self) -> bytes: ...
+
+
+class Block(Packed, Protocol):
+    """The same, which can be put back too."""
+
     def check(self, data: bytes, at: int) -> int: ...
     def put(self) -> None: ...
 
@@ -126,13 +131,43 @@ def kind_of(declared: Any) -> Kind:
     return kind
 
 
+class Group(NamedTuple):
+    """Neighbours in the table of a class, which are packed together in each of its parts.
+
+    `counts`: whether they enter a digest. `layout`: where they lie in a part, if they are compiled.
+    """
+
+    fields: list[tuple[str, Kind]]
+    counts: bool
+    layout: Any = None
+
+
+class Below(NamedTuple):
+    """A field that is a part with a table of its own, or `many` of them."""
+
+    name: str
+    many: bool
+    counts: bool
+
+
+class Piece(NamedTuple):
+    """A group in one part. `prefix` stands before the names of its fields; `counts` as of a group."""
+
+    part: Any
+    prefix: str
+    group: Group
+    counts: bool
+
+    def fields(self) -> list[StateField]:
+        return [StateField(self.part, name, kind, self.prefix + name) for name, kind in self.group.fields]
+
+
 class One:
     """A field that is not compiled."""
 
     def __init__(self, field: StateField, before: Block | None) -> None:
         self.field = field
         self.part, self.name, self.kind, _ = field
-        self.fields = [field]
         self.value: Any = None
         self.sibling: One | None = None
         if isinstance(before, One) and isinstance(before.field.kind, Queue) and isinstance(field.kind, Queue):
@@ -199,23 +234,24 @@ class Flat:
     """The state of `root` and of all parts below it."""
 
     def __init__(self, root: Any) -> None:
-        self.fields: list[StateField] = []
         self._before: list[Callable[[], object]] = []
         self._after: list[Callable[[], object]] = []
-        self._blocks: list[Block] = []
-        self._hashed: list[Block] = []  # those of them that enter a digest
-        self._group: list[Any] = []  # of fields that will be one block
-        self._counts = True  # whether they enter a digest
+        self._pieces: list[Piece] = []
         self._tables = ""
         self._accepted: bytes | None = None  # the bytes that the blocks hold, once they were found good
-        self._compiled = engine.active() == "compiled"
-        self._walk(root, "")
-        self._close()
-        if not self.fields:
+        self._walk(root, "", True)
+        if not self._pieces:
             raise TypeError(f"{type(root).__name__} declares no state")
+        known = _blocks(self._pieces)
+        self._blocks = [one.block for one in known]
         self._steps = [*(block.put for block in self._blocks), *self._after]
-        self._packed = _together(self._blocks) if self._compiled else self._blocks
-        self._hashed = _together(self._hashed) if self._compiled else self._hashed
+        self._packed = _together(known)
+        self._hashed = _together([one for one in known if one.counts])
+
+    @cached_property
+    def fields(self) -> list[StateField]:
+        """All fields, in their order."""
+        return [field for piece in self._pieces for field in piece.fields()]
 
     def save(self) -> bytes:
         """The state as it is. Raises DomainError with the field's name for NaN."""
@@ -291,120 +327,161 @@ class Flat:
         for step in self._steps:
             step()
 
-    # ---- making it: which fields there are, and which of them go together
-
-    def _walk(self, part: Any, path: str, hashed: bool = True) -> None:
+    def _walk(self, part: Any, prefix: str, counts: bool) -> None:
         if hasattr(part, "before_save"):
             self._before.append(part.before_save)
-        for cls in reversed(type(part).__mro__):
-            places = self._places(cls, part)
-            apart = cls.__dict__.get("NOT_HASHED", ())
-            for name, declared in cls.__dict__.get("STATE", {}).items():
-                counts = hashed and name not in apart
-                inner = f"{path}.{name}" if path else name
-                if isinstance(declared, type):
-                    if getattr(part, name) is not None:
-                        self._walk(getattr(part, name), inner, counts)
-                elif isinstance(declared, list):
-                    for key, child in _numbered(getattr(part, name)):
-                        self._walk(child, f"{inner}[{key}]", counts)
-                else:
-                    self._add(StateField(part, name, kind_of(declared), inner), places, counts)
+        for entry in _entries(part):
+            if isinstance(entry, Group):
+                self._pieces.append(Piece(part, prefix, entry, counts and entry.counts))
+            elif entry.many:
+                for key, child in _numbered(getattr(part, entry.name)):
+                    self._walk(child, f"{prefix}{entry.name}[{key}].", counts and entry.counts)
+            elif (child := getattr(part, entry.name)) is not None:
+                self._walk(child, f"{prefix}{entry.name}.", counts and entry.counts)
         if hasattr(part, "after_load"):
             self._after.append(part.after_load)
 
-    def _places(self, cls: type, part: Any) -> dict[str, tuple[int, str, int]]:
-        """Name -> (address, C type, size in bytes) of the compiled fields that a class adds."""
-        if not self._compiled:
-            return {}
-        places = getattr(sys.modules.get(cls.__module__), f"_places_{cls.__name__}", None)
-        return {} if places is None else places(part)
 
-    def _add(self, field: StateField, places: dict[str, tuple[int, str, int]], counts: bool) -> None:
-        if counts != self._counts:
-            self._close()
-            self._counts = counts
-        self.fields.append(field)
-        if field.name in places and isinstance(field.kind, Number | Queue):
-            if not self._group or isinstance(self._group[0], StateField):
-                self._close()
-            self._group.append(_memory_field(field, field.kind, places))
-        elif isinstance(field.kind, Number) and not field.kind.count:
-            last = self._group[len(self._group) - 1] if self._group else None
-            if not isinstance(last, StateField) or last.part is not field.part:
-                self._close()
-            self._group.append(field)
+# ---- what a class has
+
+_ENTRIES: dict[type, list[Group | Below]] = {}
+"""Class -> its groups and parts, in the order of its tables: worked out at its first part."""
+
+
+def _entries(part: Any) -> list[Group | Below]:
+    cls = type(part)
+    if cls not in _ENTRIES:
+        _ENTRIES[cls] = [entry for base in reversed(cls.__mro__) for entry in _own_entries(base, part)]
+    return _ENTRIES[cls]
+
+
+def _own_entries(cls: type, part: Any) -> Iterator[Group | Below]:
+    """Of the table of one class."""
+    places, declared = _places(cls, part), cls.__dict__.get("STATE", {})
+    apart = cls.__dict__.get("NOT_HASHED", ())
+    sorts = [(_sort(name, kind, places), name not in apart, name) for name, kind in declared.items()]
+    for (sort, counts), group in groupby(sorts, itemgetter(0, 1)):
+        names = [name for _, _, name in group]
+        if sort == "below":
+            yield from [Below(name, isinstance(declared[name], list), counts) for name in names]
+            continue
+        fields = [(name, kind_of(declared[name])) for name in names]
+        if sort == "compiled":
+            yield Group(fields, counts, _layout(part, fields, places))
+        elif sort == "numbers":
+            yield Group(fields, counts)
         else:
-            self._close()
-            self._append(One(field, self._blocks[len(self._blocks) - 1] if self._blocks else None))
-
-    def _close(self) -> None:
-        group, self._group = self._group, []
-        if not group:
-            return
-        if not isinstance(group[0], StateField):
-            from miro_exact.memory import Memory
-
-            self._append(Memory(group))
-        elif len(group) > 1:
-            self._append(Some(group))
-        else:
-            self._append(One(group[0], None))
-
-    def _append(self, block: Block) -> None:
-        self._blocks.append(block)
-        if self._counts:
-            self._hashed.append(block)
+            yield from [Group([field], counts) for field in fields]
 
 
-def _together(blocks: list[Block]) -> list[Block]:
-    """The same blocks for packing alone: neighbours become one, but for those that only `fields` can pack."""
-    from miro_exact.memory import Attributes
+def _sort(name: str, declared: Any, places: dict[str, Any]) -> str:
+    """What a field is packed with."""
+    if isinstance(declared, type | list):
+        return "below"
+    kind = kind_of(declared)
+    if name in places and isinstance(kind, (Number, Queue)):
+        return "compiled"
+    return "numbers" if isinstance(kind, Number) and not kind.count else "alone"
 
-    found: list[Block] = []
-    for simple, group in groupby(blocks, _is_simple):
-        together: list[Any] = list(group)
-        if simple:
-            parts = [part for block in together for part in _attributes(block)]
-            packed = Attributes(parts, partial(_pack_each, together))
-            together = [packed]
-        found += together
+
+def _places(cls: type, part: Any) -> dict[str, tuple[int, str, int]]:
+    """Name -> (address, C type, size in bytes) of the compiled fields of a part that a class adds."""
+    if engine.active() != "compiled":
+        return {}
+    places = getattr(sys.modules.get(cls.__module__), f"_places_{cls.__name__}", None)
+    return {} if places is None else places(part)
+
+
+def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[int, str, int]]) -> Any:
+    """What `memory.pyx` has to know of a group. Raises TypeError if table and C layout do not agree."""
+    from miro_exact.memory import Layout
+
+    found: list[tuple[object, ...]] = []
+    for name, kind in fields:
+        assert isinstance(kind, (Number, Queue))
+        address, c_type, size = places[name]
+        count = kind.room if isinstance(kind, Queue) else max(kind.count, 1)
+        fits = CODES.get(c_type) == kind.code and size == count * calcsize(f"<{kind.code}")
+        if not fits or (kind.bounds and kind.code not in "iqBd"):
+            what = f"{c_type} of {size} bytes is declared as {count} {kind.code}"
+            raise TypeError(f"{type(part).__name__}.{name}: {what}")
+        low, high = kind.bounds or (None, None)
+        end = (places[kind.end][0], places[kind.end][2]) if isinstance(kind, Queue) else None
+        found.append((name, address, size // count, count, kind.code, low, high, end))
+    return Layout(part, found)
+
+
+# ---- blocks
+
+
+class Known(NamedTuple):
+    """A block, whether it enters a digest, and its fields for `memory.Attributes`, None where that packs none."""
+
+    block: Block
+    counts: bool
+    attributes: list[tuple[Any, ...]] | None
+
+
+def _blocks(pieces: list[Piece]) -> list[Known]:
+    """Of a state, in order."""
+    found: list[Known] = []
+    for (is_compiled, counts), group in groupby(
+        pieces, lambda one: (one.group.layout is not None, one.counts)
+    ):
+        if is_compiled:
+            from miro_exact.memory import MEMORY, Memory
+
+            memory = Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group])
+            found.append(Known(memory, counts, [(memory, "", MEMORY, b"", 0, None)]))
+            continue
+        for fields in map(Piece.fields, group):
+            before = found[len(found) - 1].block if found else None
+            block = Some(fields) if len(fields) > 1 else One(fields[0], before)
+            found.append(Known(block, counts, _attributes(fields)))
     return found
 
 
-def _is_simple(block: Block) -> bool:
-    """Whether `Attributes` can pack it."""
-    if not isinstance(block, One | Some):
-        return True
-    return all(
-        not isinstance(field.kind, Queue) and set(field.kind.form) <= _PACKED_CODES for field in block.fields
-    )
+def _together(known: list[Known]) -> list[Packed]:
+    """The same blocks for packing alone: neighbours become one, but for those that only `fields` can pack."""
+    found: list[Packed] = []
+    for is_slow, group in groupby(known, lambda one: one.attributes is None):
+        together = list(group)
+        blocks = [one.block for one in together]
+        if is_slow:
+            found += blocks
+        else:
+            from miro_exact.memory import Attributes
+
+            attributes = [field for one in together for field in one.attributes or ()]
+            found.append(Attributes(attributes, partial(_pack_each, blocks)))
+    return found
 
 
-def _attributes(block: Any) -> list[tuple[Any, ...]]:
-    """What `memory.pyx` has to know of the fields of a block."""
-    from miro_exact import memory
+def _attributes(fields: list[StateField]) -> list[tuple[Any, ...]] | None:
+    """What `memory.Attributes` has to know of fields that are Python objects; None where it cannot pack them."""
+    if engine.active() != "compiled" or not all(_is_simple(field.kind) for field in fields):
+        return None
+    return [_attribute(field) for field in fields]
 
-    if isinstance(block, memory.Memory):
-        return [(block, "", memory.MEMORY, "", 0, None)]
-    return [_attribute(field) for field in block.fields]
+
+def _is_simple(kind: Kind) -> bool:
+    return not isinstance(kind, Queue) and set(kind.form) <= _PACKED_CODES
 
 
 def _attribute(field: StateField) -> tuple[Any, ...]:
-    """What `memory.pyx` has to know of a field that is a Python object."""
     from miro_exact import memory
 
     part, name, kind, _ = field
     if isinstance(kind, Number):
-        return (part, name, memory.NUMBER, kind.code, kind.count, None)
+        return (part, name, memory.NUMBER, kind.code.encode(), kind.count, None)
     if isinstance(kind, Items):
-        return (part, name, memory.ITEMS, kind.code, kind.room, None)
+        return (part, name, memory.ITEMS, kind.code.encode(), kind.room, None)
     if isinstance(kind, Octets):
-        return (part, name, memory.OCTETS, "s", 0, None)
+        return (part, name, memory.OCTETS, b"s", 0, None)
     row: Row = kind.row if isinstance(kind, Rows) else kind  # type: ignore[assignment]
     if isinstance(kind, Rows):
-        return (part, name, memory.ROWS, row.form, kind.room, row.split)
-    return (part, name, memory.ROW, row.form, 0, row.split)
+        return (part, name, memory.ROWS, row.form.encode(), kind.room, row.split)
+    return (part, name, memory.ROW, row.form.encode(), 0, row.split)
 
 
 def _pack_each(blocks: Sequence[Block]) -> bytes:
@@ -413,21 +490,6 @@ def _pack_each(blocks: Sequence[Block]) -> bytes:
 
 def _numbered(parts: Any) -> Iterator[tuple[Any, Any]]:
     yield from parts.items() if isinstance(parts, dict) else enumerate(parts)
-
-
-def _memory_field(
-    field: StateField, kind: Number | Queue, places: dict[str, tuple[int, str, int]]
-) -> tuple[Any, ...]:
-    """What `memory.pyx` has to know. Raises TypeError if table and C layout do not agree."""
-    address, c_type, size = places[field.name]
-    count = kind.room if isinstance(kind, Queue) else max(kind.count, 1)
-    if CODES.get(c_type) != kind.code or size % count or (kind.bounds and kind.code not in "iqBd"):
-        raise TypeError(f"{field.path}: {c_type} of {size} bytes is declared as {count} {kind.code}")
-    if size // count != calcsize(f"<{kind.code}"):
-        raise TypeError(f"{field.path}: {size} bytes are declared as {count} {kind.code}")
-    low, high = kind.bounds or (None, None)
-    end = (places[kind.end][0], places[kind.end][2]) if isinstance(kind, Queue) else None
-    return (field.part, field.path, address, size // count, count, kind.code, low, high, end)
 
 
 def snapshot(part: Any) -> bytes:
