@@ -1,4 +1,4 @@
-"""The error of input that cannot be used: one line `FILE: PLACE: what; remedy`."""
+"""The error of input that cannot be used, one line `FILE: PLACE: what; remedy`, and words for such lines."""
 
 from collections.abc import Iterable
 from os import PathLike
@@ -54,3 +54,8 @@ def one_line(text: str) -> str:
 def shortened(text: str) -> str:
     """The text without its middle where it is too long to be read: a value or a key of a megabyte."""
     return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"
+
+
+def amount(number: int | str, one: str, more: str = "") -> str:
+    """`1 frame`, `2 frames`; `more`: the plural that is not `one` with an s."""
+    return f"{number} {one if number == 1 else more or f'{one}s'}"

@@ -8,6 +8,7 @@ from typing import Annotated, get_args
 import click
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.inputs import check_regular
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import eye_file
@@ -109,7 +110,7 @@ def track(options: TrackOptions) -> None:
         frames = frame + 1
     if not as_json:
         counts = ", ".join(f"robot {robot} in {count}" for robot, count in found.items())
-        click.echo(f"{frames} pictures: {counts}")
+        click.echo(f"{amount(frames, 'picture')}: {counts}")
 
 
 def _tracker(options: TrackOptions, robots: tuple[int, ...]) -> Tracker:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from mirotwin.campaign import running
 from mirotwin.campaign.file import MOST_RUNS
 from mirotwin.campaign.journal import journal_path
@@ -78,12 +79,14 @@ def run(options: CampaignOptions) -> int:
     running.refuse_many(plan, options.yes)
     if not options.force and running.complete(results, running.head_of(plan)):
         if not options.quiet:
-            show_line(f"{results} has all {plan.runs} runs already")
+            show_line(f"{results} has all {amount(plan.runs, 'run')} already")
         return _judge(plan, results)
     tally, wall_s = _run(plan, results, Processes(options.jobs), options.force, options.quiet)
     if not options.quiet:
         rate = f"{tally.new / wall_s:.1f} runs/s" if tally.new else "all there before"
-        show_line(f"{tally.runs} runs ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}")
+        show_line(
+            f"{amount(tally.runs, 'run')} ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}"
+        )
     return _judge(plan, results)
 
 

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from rich.table import Table
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from mirotwin.campaign.columns import CHECK
 from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifference, difference
 from mirotwin.campaign.design import Value
@@ -119,10 +119,12 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
     if as_json:
         _print_json({"results": str(rows.path), "runs": rows.count, "groups": found})
         return
-    show_line(f"{rows.path}: {rows.count} runs of {rows.about.campaign}")
+    show_line(f"{rows.path}: {amount(rows.count, 'run')} of {rows.about.campaign}")
     show_table(_groups_table(found))
     if len(groups) > len(found):
-        show_line(f"{len(groups) - len(found)} more groups: --by names fewer factors, --json shows all")
+        show_line(
+            f"{amount(len(groups) - len(found), 'more group')}: --by names fewer factors, --json shows all"
+        )
 
 
 def _groups_table(groups: Sequence[GroupFigures]) -> Table:
@@ -162,7 +164,9 @@ def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool)
     if as_json:
         _print_json({"factor": name, "first": first, "second": second, "differences": found})
         return DONE
-    show_line(f"{rows.path}: {name}, {second} against {first}, {len(pairs)} pairs with the same seed")
+    show_line(
+        f"{rows.path}: {name}, {second} against {first}, {amount(len(pairs), 'pair')} with the same seed"
+    )
     show_table(_differences_table(found, f"{first}", f"{second}"))
     return DONE
 
@@ -174,7 +178,7 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
     pairs = paired(baseline, rows)
     seeds = len(set(rows.samples()[[second for _, second in pairs]].tolist()))
     if seeds < FEWEST_FOR_GATE:
-        what = f"has only {seeds} seeds in common with {rows.path}"
+        what = f"has only {amount(seeds, 'seed')} in common with {rows.path}"
         raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
     found = _differences(baseline, rows, pairs, metrics)
     worse = [one for one in found if one.worse(tolerance)]
@@ -192,7 +196,9 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
             }
         )
     else:
-        show_line(f"{rows.path} against {path}: {len(pairs)} pairs of runs, {same} with the same digest")
+        show_line(
+            f"{rows.path} against {path}: {amount(len(pairs), 'pair')} of runs, {same} with the same digest"
+        )
         show_table(_differences_table(found, "before", "now"))
     for ours_only, where, there in ((rows, rows.path, path), (baseline, path, rows.path)):
         if unpaired := ours_only.count - len(pairs):
@@ -236,7 +242,7 @@ def _sentence(one: MetricDifference) -> str:
     """What has got worse, by how much, and with which interval."""
     means = f"from {_number(one.first)} to {_number(one.second)}"
     interval = f" (95 % interval {_interval(one.interval)})" if one.interval is not None else ""
-    of = f"{one.pairs} pairs of {one.seeds} seeds"
+    of = f"{amount(one.pairs, 'pair')} of {amount(one.seeds, 'seed')}"
     return f"{one.metric} by {one.difference:+.4g}{interval} in the mean of {of}, {means}"
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 from miro_exact import clock
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES, read_input
 from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
@@ -216,22 +216,25 @@ def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     waiting = machine.input.waiting_for
     if waiting:
         seen = (
-            f"was not seen again after {machine.input.seen} times" if machine.input.seen else "was not seen"
+            f"was not seen again after {amount(machine.input.seen, 'time')}"
+            if machine.input.seen
+            else "was not seen"
         )
-        complain(f"--stdin-when: {waiting!r} {seen}; {machine.input.left} bytes of --stdin were not sent")
+        left = amount(machine.input.left, "byte of --stdin was", "bytes of --stdin were")
+        complain(f"--stdin-when: {waiting!r} {seen}; {left} not sent")
     if options.stdin and machine.cpu.sfr(_SCON) & _NINE_BITS:
         complain("--stdin: the serial port takes characters of 9 bits; the ninth was 1 in all that were sent")
     changed = machine.changed_code()
     if changed:
         complain(
-            f"--code-in-xram: the program has overwritten {len(changed)} bytes of its image, "
+            f"--code-in-xram: the program has overwritten {amount(len(changed), 'byte')} of its image, "
             f"the first at {changed[0]:#06x}"
         )
     return FIRMWARE_FAULT if machine.faults else code
 
 
 def _stopped_at(machine: BareMachine) -> str:
-    return f"{place_of(machine.cpu.pc, machine.image)} after {machine.cpu.cycles} machine cycles"
+    return f"{place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
 
 
 def _ticks(time: Time | None, options: BareOptions) -> int | None:

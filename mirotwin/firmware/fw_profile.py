@@ -8,7 +8,7 @@ from typing import Annotated
 import click
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_robot.inspect.activity import Activity
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.coverage import counts_of
@@ -61,7 +61,7 @@ def profile(options: ProfileOptions) -> int:
 def _print(result: Profile, name: str) -> None:
     awake = result.cycles - result.asleep_cycles
     show(
-        f"{name}: {result.cycles} machine cycles, {result.instructions} instructions, "
+        f"{name}: {amount(result.cycles, 'machine cycle')}, {amount(result.instructions, 'instruction')}, "
         f"asleep {_percent(result.asleep_cycles, result.cycles)}"
     )
     counts = ("address", "calls", "instructions", "cycles", "of awake", "of all")
@@ -86,9 +86,9 @@ def _print(result: Profile, name: str) -> None:
             interrupts.add_row(
                 found.source,
                 str(found.count),
-                f"{found.worst_latency} cycles",
+                amount(found.worst_latency, "cycle"),
                 str(found.worst_latency_tick),
-                f"{found.worst_duration} cycles",
+                amount(found.worst_duration, "cycle"),
                 str(found.worst_duration_tick),
                 _percent(found.total_cycles, result.cycles),
             )
@@ -96,16 +96,19 @@ def _print(result: Profile, name: str) -> None:
         show(interrupts)
     stack = result.stack
     begins = "" if stack.first is None else f"from {stack.first:02X}h, "
-    used = "" if stack.first is None else f"{stack.highest - stack.first + 1} bytes used, "
+    used = "" if stack.first is None else f"{amount(stack.highest - stack.first + 1, 'byte')} used, "
     show(
-        f"stack: {begins}highest {stack.highest:02X}h at tick {stack.highest_tick}: {used}{stack.free} bytes free"
+        f"stack: {begins}highest {stack.highest:02X}h at tick {stack.highest_tick}: "
+        + f"{used}{amount(stack.free, 'byte')} free"
         + ("" if stack.last == 0xFF else f" below the data at {stack.last + 1:02X}h")
     )
     unknown = f"; not followed: {', '.join(stack.unknown)}" if stack.unknown else ""
-    show(f"stack by the code: at least {stack.at_least} bytes, in {' > '.join(stack.deepest)}{unknown}")
+    show(
+        f"stack by the code: at least {amount(stack.at_least, 'byte')}, in {' > '.join(stack.deepest)}{unknown}"
+    )
     room = stack.last - stack.first + 1 if stack.first is not None else None
     if room is not None and stack.at_least > room:
-        show(f"the stack has {room} bytes: it can run out by {stack.at_least - room}")
+        show(f"the stack has {amount(room, 'byte')}: it can run out by {stack.at_least - room}")
 
 
 def _percent(part: int, whole: int) -> str:

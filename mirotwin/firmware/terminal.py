@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_robot.bare.machine import BareMachine, Ended
 from mirotwin.firmware.bare_options import STDIN, BareOptions
 from mirotwin.firmware.code_place import place_of
@@ -66,7 +66,7 @@ def run_terminal(machine: BareMachine, target: int | None, options: BareOptions)
                 machine.input.add(keys)
     if left:
         complain(
-            f"left at {place_of(machine.cpu.pc, machine.image)} after {machine.cpu.cycles} machine cycles"
+            f"left at {place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
         )
     return ended
 

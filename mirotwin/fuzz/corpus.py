@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
@@ -63,7 +63,7 @@ def read_corpus(folder: Path, kind: str, robots: int) -> Corpus:
         else:
             foreign.append(path.name)
     if not found:
-        held = f"none of the {len(files)} files is an input" if files else "holds no file"
+        held = f"no input among {amount(len(files), 'file')}" if files else "holds no file"
         more = f" ({notes[0].removeprefix(f'{OPTION}: passed over: ')})" if notes else ""
         remedy = "put .stream or .mcap files, or inputs of an earlier campaign there, or leave --corpus out"
         raise BadInput(folder, OPTION, f"{held}{more}", remedy)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Self
 
+from miro_exact.bad_input import amount
 from mirotwin.fuzz.campaign import Status
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
@@ -54,16 +55,11 @@ def said(status: Status) -> str:
     """Rates and counts of a campaign, in short."""
     parts = [f"{status.executions_per_s:.0f}/s"]
     if status.edges is not None:  # else the engine has not said yet
-        parts.append(f"{status.edges} edges")
-    parts.append(counted(status.crashes, "crash", "crashes"))
+        parts.append(amount(status.edges, "edge"))
+    parts.append(amount(status.crashes or "no", "crash", "crashes"))
     if status.unconfirmed:
         parts.append(f"{status.unconfirmed} unconfirmed")
     return ", ".join(parts)
-
-
-def counted(number: int, word: str, plural: str = "") -> str:
-    """`no inputs`, `1 input`, `2 crashes`."""
-    return f"{number or 'no'} {word if number == 1 else plural or f'{word}s'}"
 
 
 def clock(time_s: float) -> str:

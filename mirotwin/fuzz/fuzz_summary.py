@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
 from mirotwin.fuzz.campaign import Campaign
-from mirotwin.fuzz.fuzz_progress import clock, counted
+from mirotwin.fuzz.fuzz_progress import clock
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
@@ -37,20 +38,20 @@ def report(campaign: Campaign, ended: CampaignEnd, quiet: bool) -> int:
     _write_summary(campaign, tracefile, never, ended)
     status = campaign.status()
     if not quiet:
-        edges = "" if status.edges is None else f", {status.edges} edges"
+        edges = "" if status.edges is None else f", {amount(status.edges, 'edge')}"
         rate = status.executions / status.run_s if status.run_s else 0.0
-        done = f"{status.executions} executions in {clock(status.run_s)} ({rate:.0f}/s){edges}"
-        new = f"{counted(campaign.inputs, 'input')} that found something new"
+        done = f"{amount(status.executions, 'execution')} in {clock(status.run_s)} ({rate:.0f}/s){edges}"
+        new = f"{amount(campaign.inputs or 'no', 'input')} that found something new"
         show_line(f"{triage.target.image.path.name}: {done}, {new}")
         show(table(tracefile))
         if never:
             show_line(f"never reached: {', '.join(never)}")
     if ended.left:
-        complain(f"{counted(ended.left, 'input')} of the engine were not looked at; a longer --time does")
+        complain(f"{amount(ended.left, 'input')} of the engine were not looked at; a longer --time does")
     if campaign.expected and not quiet:
-        show_line(f"{', '.join(campaign.expected)}: judged {counted(campaign.judged, 'input')}")
+        show_line(f"{', '.join(campaign.expected)}: judged {amount(campaign.judged or 'no', 'input')}")
     if triage.unrepeated:
-        complain(f"{counted(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
+        complain(f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
     _print_crashes(campaign, ended.check)
     if not quiet:
         show_line(f"written to {out}")
@@ -67,7 +68,7 @@ def never_reached(tracefile: Tracefile) -> list[str]:
 
 def _print_crashes(campaign: Campaign, check: str | None) -> None:
     triage = campaign.triage
-    show_line(counted(len(triage.confirmed), "crash", "crashes"))
+    show_line(amount(len(triage.confirmed) or "no", "crash", "crashes"))
     for crash in triage.confirmed:
         _print_crash(crash, campaign, check)
     if triage.unconfirmed:
@@ -81,9 +82,9 @@ def _print_crashes(campaign: Campaign, check: str | None) -> None:
 def _print_crash(crash: Crash, campaign: Campaign, check: str | None) -> None:
     where = f" in {crash.function}" if crash.function else ""
     more = campaign.triage.more[crash.name]
-    again = f"; {counted(more, 'more input')}" if more else ""
+    again = f"; {amount(more, 'more input')}" if more else ""
     before, after = crash.sizes
-    show_line(f"  {crash.name}{where}: {crash.verdict} ({after} bytes, found with {before}{again})")
+    show_line(f"  {crash.name}{where}: {crash.verdict} ({amount(after, 'byte')}, found with {before}{again})")
     in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
     stream = campaign.folder.path / crash.folder / f"{crash.name}.stream"
     image = foreign_path(campaign.triage.target.image)
@@ -94,7 +95,7 @@ def _print_crash(crash: Crash, campaign: Campaign, check: str | None) -> None:
 def _print_covering(campaign: Campaign, symbol: str) -> bool:
     """Says whether the function was reached; True if not."""
     if campaign.reached_by is None:
-        inputs = counted(campaign.inputs, "input")
+        inputs = amount(campaign.inputs or "no", "input")
         complain(f"--covering {symbol}: not reached by {inputs}; give it more --time, or a --corpus")
         return True
     show_line(f"--covering {symbol}: reached by {campaign.reached_by}")

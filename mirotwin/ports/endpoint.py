@@ -12,6 +12,7 @@ from selectors import BaseSelector
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.report.summary import Plug
 
@@ -101,9 +102,8 @@ class Endpoint:
             full = self.out.dropped
             self.out.add(data)
             if self.out.dropped and not full:
-                self.tell(
-                    f"{self.name}: {self.client} does not read; {len(self.out)} bytes wait, more are dropped"
-                )
+                waiting = amount(len(self.out), "byte waits", "bytes wait")
+                self.tell(f"{self.name}: {self.client} does not read; {waiting}, more are dropped")
 
     def plug(self) -> Plug:
         """The counts, for the summary."""
@@ -128,7 +128,7 @@ class Endpoint:
         """Forgets what waits for the client."""
         counted_in, counted_out = self._client_bytes
         lost = len(self.out)
-        text = f"{self.bytes_in - counted_in} bytes came from it, {self.bytes_out - counted_out} went to it"
+        text = f"{amount(self.bytes_in - counted_in, 'byte')} came from it, {self.bytes_out - counted_out} went to it"
         if self.out.dropped or lost:
             text += f", {self.out.dropped + lost} that it did not read are dropped"
         self.tell(f"{self.name}: {self.client} {why}; {text}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
 from miro_sim.scenario.file import parse as parse_scenario
@@ -188,13 +188,12 @@ def _verdict(
     shorter, longer = sorted(periods, key=len)
     if len(shorter) != len(longer) and compare.rule.to_tick is None:
         code = DIVERGENCE
-        complain(f"A has {len(periods[0])} control periods, B has {len(periods[1])}")
+        complain(f"A has {amount(len(periods[0]), 'control period')}, B has {len(periods[1])}")
     for note in notes:
         complain(note)
     if code == DONE and not compare.as_json:
         how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         whence = "; they were not made from the same" if sources else ""
-        show(
-            f"the recordings hold the same in all {compare.rule.compared(shorter)} control periods{how}{whence}"
-        )
+        count = amount(compare.rule.compared(shorter), "control period")
+        show(f"the recordings hold the same in all {count}{how}{whence}")
     return code

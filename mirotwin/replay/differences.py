@@ -8,6 +8,7 @@ from typing import Any
 import click
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import seconds
 from miro_protocol.events import Damaged
 from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
@@ -172,7 +173,7 @@ def _text(row: DecodedRow) -> str:
     event, message = row.event, row.message
     if isinstance(event, Damaged):
         reason = event.reason.name.lower().replace("_", " ")
-        text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
+        text = f"{amount(len(event.data), 'byte')}, {reason}: {event.data[:16].hex(' ')}"
         return text + " .." if len(event.data) > 16 else text
     if message is None:
         return f"frame with unknown content: {row.unknown}"

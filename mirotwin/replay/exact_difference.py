@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
@@ -69,7 +69,7 @@ def _first_byte(one: Image, other: Image) -> Iterator[SourceDifference]:
         f"{image.code[places[0]]:02X}h at {places[0]:#06x} in {SymbolNames(image).place(places[0])}"
         for image in (one, other)
     )
-    yield SourceDifference(f"firmware code, the first of {len(places)} bytes", *where)
+    yield SourceDifference(f"firmware code, the first of {amount(len(places), 'byte')}", *where)
 
 
 def _flat(path: str, value: Any) -> Iterator[tuple[str, Any]]:

@@ -9,7 +9,7 @@ from typing import Annotated
 import click
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Period
 from mirotwin.desk.guard import HEADING, DeskOptions
@@ -272,5 +272,5 @@ def _verdict(
     if not compare.as_json:
         how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         count = compare.rule.compared(replayed)
-        show(f"the robots' response equals the recorded one in all {count} control periods{how}")
+        show(f"the robots' response equals the recorded one in all {amount(count, 'control period')}{how}")
     return DONE

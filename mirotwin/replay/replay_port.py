@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import tomli_w
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import Transmission
@@ -71,7 +71,7 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     if of_99 > LATE_MS and not port.prompt:
         hint = "; this process may not ask for real-time priority, which would help"
     told = f"99 % less than {of_99:.2f} ms late, all less than {late[-1]:.2f} ms"
-    complain(f"{len(sent)} transmissions sent, {told}{hint}")
+    complain(f"{amount(len(sent), 'transmission')} sent, {told}{hint}")
     return folder.path / RECORDING
 
 
@@ -90,7 +90,8 @@ def _sendable(job: Job, desk: DeskOptions) -> list[Transmission]:
             raise BadInput(file, f"tick {one.tick}", what, "leave the line out")
         guard.check(one.data, f"tick {one.tick}")
     if count := len(job.script) - len(sent):
-        complain(f"{file}: {count} actions on robots and radios are not observable on a port, and left out")
+        actions = amount(count, "action on robots and radios is", "actions on robots and radios are")
+        complain(f"{file}: {actions} not observable on a port, and left out")
     return sent
 
 
@@ -134,5 +135,7 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
         complain(f"the robot differs from its twin {first}")
     elif not as_json:
         count, unsure_ms = sum(map(len, comparison.robots.values())), comparison.unsure_ms
-        show(f"the robot answers as its twin does, {count} times; times are known to {unsure_ms:.1f} ms")
+        show(
+            f"the robot answers as its twin does, {amount(count, 'time')}; times are known to {unsure_ms:.1f} ms"
+        )
     return code

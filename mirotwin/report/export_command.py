@@ -10,7 +10,7 @@ from typing import Annotated
 
 import click
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.recording.capture import render
 from mirotwin.recording.capture.detect import NAMES, TIMED, detect
@@ -47,7 +47,7 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
         complain(note)
     if not quiet and out != STDIN:
         frames = f" and {result.images} camera frames" if result.images else ""
-        show(f"{out}: {result.periods} control periods{frames} for Foxglove")
+        show(f"{out}: {amount(result.periods, 'control period')}{frames} for Foxglove")
     return DONE
 
 
@@ -154,7 +154,7 @@ def export(options: ExportOptions) -> int:
         except render.ConversionError as error:
             raise BadInput(given.label, error.place, error.what, error.remedy) from None
     if not quiet and out != STDIN:
-        show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")
+        show(f"{out}: {amount(exported.down, 'transmission')} from the host and {exported.up} from robots")
     if exported.bad_stops and to == "pcapng":
         complain(
             f"{exported.bad_stops} bad stop bits were left out: a capture holds none, a stream file does"

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import tomli_w
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
 from miro_robot.image import Image
@@ -113,7 +113,7 @@ def _of_recording(wanted: PageSubject, job: Job) -> Material:
     notes = []
     if extras.broken_off:
         notes.append(
-            f"This run was broken off: the page shows the {len(recorded)} control periods that were recorded."
+            f"This run was broken off: the page shows {amount(len(recorded), 'control period')} that it recorded."
         )
     if other:
         recorded = [period for period in again.periods if period.index in wanted.shown]

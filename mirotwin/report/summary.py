@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import ErrorSample, Tracks
 from mirotwin.report.learnt import LearntCalibration, LearntWheels
@@ -246,14 +247,14 @@ def off_pitch_text(summary: Summary) -> str:
 
 def vision_text(vision: VisionCounts) -> str:
     """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
-    happened = {
-        "frames dropped": vision.dropped,
-        "frames repeated": vision.repeated,
-        "measurements WRONG": vision.wrong,
-        "robots SWAPPED": vision.swapped,
-    }
-    parts = [f"{vision.frames} frames", f"{vision.lost} robots not found"]
-    return ", ".join(parts + [f"{count} {what}" for what, count in happened.items() if count])
+    happened = (
+        (vision.dropped, "frame dropped", "frames dropped"),
+        (vision.repeated, "frame repeated", "frames repeated"),
+        (vision.wrong, "measurement WRONG", "measurements WRONG"),
+        (vision.swapped, "robot SWAPPED", "robots SWAPPED"),
+    )
+    parts = [amount(vision.frames, "frame"), amount(vision.lost, "robot not found", "robots not found")]
+    return ", ".join(parts + [amount(*one) for one in happened if one[0]])
 
 
 def to_json(summary: Summary) -> bytes:

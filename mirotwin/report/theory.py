@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.laws.yang_kim import Gains as PaperGains
 from miro_sim.scenario.keys import Scenario
@@ -196,7 +197,7 @@ def theory_text(theory: Theory) -> str:
         parts.append(f"assumption 2 broken for {theory.assumption_2.broken_s:.2f} s")
     if third.frames or third.crossings:
         crossed = f", crossed {third.crossings} x" if third.crossings else ""
-        parts.append(f"assumption 3 within 0.1 rad in {third.frames} frames{crossed}")
+        parts.append(f"assumption 3 within 0.1 rad in {amount(third.frames, 'frame')}{crossed}")
     if f is not None:
         for axis, above_gain, above_authority in (
             ("1", f.f1_above_p1, f.f1_above_authority),

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 import msgspec
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
@@ -167,8 +167,8 @@ class RunFiles:
         with suppress(OSError):  # a full disk, which is reported as what broke the run off
             self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False, reason=reason)))
         complain(
-            f"the run broke off after {self.tracks.count} control periods;"
-            f" they are in {self.folder.path / part_name(RECORDING)}"
+            f"the run broke off after {amount(self.tracks.count, 'control period; it is', 'control periods; they are')}"
+            f" in {self.folder.path / part_name(RECORDING)}"
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from miro_exact.bad_input import amount
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import calibration_text, wheels_text
 from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
@@ -48,14 +49,15 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
         table.add_row("wheels", wheels_text(wheels))
     table.add_row(
         "link",
-        f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "
-        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; {link.bit_errors} bit errors",
+        f"{amount(link.frames_sent, 'frame')} sent, {_known(link.frames_accepted)} accepted, "
+        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; "
+        f"{amount(link.bit_errors, 'bit error')}",
     )
     idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
     table.add_row(
         "firmware",
         f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
-        f"{firmware.faults} faults",
+        f"{amount(firmware.faults, 'fault')}",
     )
     table.add_row("expected", expectations_text(summary.expectations))
     table.add_row("digest", summary.digest)

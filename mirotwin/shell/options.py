@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from miro_exact import engine as engines
-from miro_exact.bad_input import BadInput, shortened
+from miro_exact.bad_input import BadInput, amount, shortened
 from miro_exact.domain import MAX_SEED, DomainError
 from miro_host.plugins import PluginError
 from miro_sim.scenario.file import builtin_names
@@ -151,7 +151,7 @@ def choose_engine(engine: str | None) -> str:
 def refuse_steps(scenario: Scenario, origin: str) -> None:
     """For commands that run a scenario without its steps: raises BadInput if it has any."""
     if scenario.step:
-        what = f"has {len(scenario.step)} steps, which only `mirotwin run` and `mirotwin test` do"
+        what = f"has {amount(len(scenario.step), 'step')}, which only `mirotwin run` and `mirotwin test` do"
         raise BadInput(origin, "step", what, "run it, and give the run.mcap that it writes")
 
 

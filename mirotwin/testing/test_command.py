@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
@@ -126,7 +126,9 @@ def test(options: TestOptions) -> int:
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
-        what = f"{len(files)} files, none with {word!r} in its path" if files else f"no {KINDS} there"
+        what = (
+            f"{amount(len(files), 'file')}, none with {word!r} in its path" if files else f"no {KINDS} there"
+        )
         raise BadInput(
             " ".join(options.paths),
             "",
@@ -192,7 +194,7 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     passed = outcome.verdict == "passed"
     if quiet and passed:
         return
-    steps = f"{outcome.done} of {outcome.steps} steps, " if outcome.steps else ""
+    steps = f"{outcome.done} of {amount(outcome.steps, 'step')}, " if outcome.steps else ""
     digest = f", digest {outcome.digest[:12]}" if outcome.digest else ""  # of a robot at a port there is none
     how = f" ({steps}{in_ms(outcome.tick)}{digest})" if steps or digest else ""
     show_line(f"{TOLD[outcome.verdict].line}  {outcome.path}{how}")
@@ -215,8 +217,9 @@ def _summary(outcomes: Sequence[Outcome]) -> int:
     counted = Counter(one.verdict for one in outcomes)
     found = [verdict for verdict in TOLD if counted[verdict]]
     said = ", ".join(f"{counted[verdict]} {TOLD[verdict].counted}" for verdict in found)
-    unseen = sum(one.unseen for one in outcomes)
-    show_line(said + (f"; {unseen} steps and expectations are not observable on a port" if unseen else ""))
+    if unseen := sum(one.unseen for one in outcomes):
+        said += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
+    show_line(said)
     return TOLD[found[0]].code
 
 

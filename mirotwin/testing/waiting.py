@@ -8,7 +8,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_protocol.decoder import Decoder, Received, TelemetryDecoder, WindowDecoder
 from miro_protocol.frames import ContentError, TeamFrame, describe
 from miro_sim.world.events import Event
@@ -42,7 +42,7 @@ class WaitFailed(AssertionError):
         self.expect = expect
         times = f"from {at(begun_tick)} to {at(tick)}"
         happened = "\n".join(f"  {one}" for one in in_words(seen)[-LAST_LINES:]) or "  nothing"
-        count = f", {len(seen)} events" if len(seen) > LAST_LINES else ""
+        count = f", {amount(len(seen), 'event')}" if len(seen) > LAST_LINES else ""
         super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
 
     @classmethod

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
+from miro_exact.bad_input import amount
 from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
 from mirotwin.shell.command import Option
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
@@ -90,7 +91,7 @@ def expectations_text(expectations: Sequence[Expectation]) -> str:
     """
     counted = [one for one in expectations if one.verdict != "not judged" or one.name not in ALWAYS_ON]
     others = [f"{one.name} {one.verdict}" for one in counted if one.verdict != "passed"]
-    return ", ".join([f"{len(counted) - len(others)} of {len(counted)} checks passed", *others])
+    return ", ".join([f"{len(counted) - len(others)} of {amount(len(counted), 'check')} passed", *others])
 
 
 def report_steps(player: Player, checks: Checks) -> int:

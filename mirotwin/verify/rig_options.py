@@ -17,7 +17,7 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.domain import MAX_SEED
 from miro_robot.image import Image
 from miro_sim.scenario.file import load, parse
@@ -102,7 +102,7 @@ def rig_options(mark: MarkerOptions, folder: Path, firmware: str | Path | None, 
         raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")
     scenario = _scenario(mark, folder)
     if scenario.step:
-        what = f"scenario {scenario.name} has {len(scenario.step)} steps, which a test in Python does not do"
+        what = f"scenario {scenario.name} has {amount(len(scenario.step), 'step')}, which a test in Python does not do"
         raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
     if mark.firmware is not None:
         firmware = _near(mark.firmware, folder)

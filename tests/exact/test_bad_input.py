@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 
 
 @pytest.mark.parametrize(
@@ -49,3 +49,13 @@ def test_it_gets_from_one_process_to_another_with_its_line():
     again = pickle.loads(pickle.dumps(Narrow("odd")))
     assert str(again) == "a.toml:3: odd; mend it"
     assert isinstance(again, BadInput)
+
+
+def test_an_amount_of_one_is_singular():
+    said = [amount(number, "frame") for number in (0, 1, 2)]
+    assert said == ["0 frames", "1 frame", "2 frames"]
+    assert [amount(number, "crash", "crashes") for number in ("no", 1, 2)] == [
+        "no crashes",
+        "1 crash",
+        "2 crashes",
+    ]

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.ranges import SEEDS
@@ -84,7 +85,7 @@ def reproduce(options: ReproduceOptions) -> int:
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
         page_path.write_text(text, encoding="utf-8")
     if not quiet:
-        show_line(f"{len(found)} runs in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
+        show_line(f"{amount(len(found), 'run')} in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
     return _failures(found)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.inputs import InputError
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, UP, Transmission
@@ -70,7 +71,7 @@ def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int
     if any_data and not counts[best]:
         what = f"no frame of 3 or 5 robots at the beginning; {best} robots assumed"
     elif others:
-        found = " and ".join(f"{counts[count]} frames of {count} robots" for count in ROBOT_COUNTS)
+        found = " and ".join(f"{amount(counts[count], 'frame')} of {count} robots" for count in ROBOT_COUNTS)
         what = f"{found} at the beginning; {best} robots assumed"
     else:
         return best, ""

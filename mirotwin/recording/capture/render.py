@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import seconds
 from miro_protocol import pcapng, stream
 from miro_protocol.events import Damaged, Received
@@ -67,7 +67,7 @@ def table_line(row: DecodedRow, timed: bool) -> str:
     head = f"{position}   {row.direction}   {row.network:>3}"
     if isinstance(event, Damaged):
         shown = event.data[:SHOWN_BYTES].hex(" ") + (" .." if len(event.data) > SHOWN_BYTES else "")
-        return f"{head}  {'damage':<12}    -  {reason(event):<12}  {len(event.data)} bytes: {shown}"
+        return f"{head}  {'damage':<12}    -  {reason(event):<12}  {amount(len(event.data), 'byte')}: {shown}"
     state = "-" if row.fresh is None else "accepted" if row.fresh else "stale"
     return f"{head}  {kind(event, row.message):<12}  {event.seq:>3}  {state:<12}  {contents(row)}"
 
@@ -87,7 +87,7 @@ def described(row: DecodedRow) -> str:
     """A few words: what a frame is, or what is wrong with these bytes. The comment in a stream file."""
     event = row.event
     if isinstance(event, Damaged):
-        return f"{len(event.data)} bytes, {reason(event)}"
+        return f"{amount(len(event.data), 'byte')}, {reason(event)}"
     return describe(row.message) if row.message is not None else f"unknown content: {row.unknown}"
 
 

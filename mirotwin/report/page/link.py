@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CHARACTER_BITS, HOST_CHARACTER_TICKS, ROBOT_BIT_TICKS, ticks
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, describe
@@ -247,4 +248,4 @@ def _action(event: Event) -> LinkMark:
 
 
 def _characters(count: int) -> str:
-    return f"{count} character" if count == 1 else f"{count} characters"
+    return amount(count, "character")

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
@@ -117,7 +118,11 @@ def _verdict(material: Material) -> tuple[str, str]:
     again, steps = material.again, material.steps
     verdicts = [*again.verdicts, *(steps.expectations if steps else ())]
     failed = [one for one in verdicts if one.verdict == "failed"]
-    of = f"{len(failed)} of {len(verdicts)} checks failed" if failed else f"{len(verdicts)} checks"
+    of = (
+        f"{len(failed)} of {amount(len(verdicts), 'check')} failed"
+        if failed
+        else amount(len(verdicts), "check")
+    )
     if again.faults:
         return "fault", of
     if material.about.verdict:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.robot_receiver import Freshness
@@ -211,7 +212,9 @@ class AliveMonitor(Monitor[ActsAtAll]):
         wanted = f"a robot that acts on one of {self.needed} frames that reached it"
         if untold:
             accepted = (
-                "" if record.accepted is None else f"; the firmware has accepted {record.accepted} frames"
+                ""
+                if record.accepted is None
+                else f"; the firmware has accepted {amount(record.accepted, 'frame')}"
             )
             self.fail(tick, wanted, f"no command to turn the {' and the '.join(untold)} wheel{accepted}")
         if undriven:

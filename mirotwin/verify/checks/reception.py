@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, TeamFrame
@@ -231,7 +232,7 @@ class AcceptedMonitor(Monitor[FramesAccepted]):
             return
         self.judged += 1
         if self.frames < self.check.frames:
-            self.fail(tick, f"at least {self.check.frames} frames accepted", f"{self.frames}")
+            self.fail(tick, f"at least {amount(self.check.frames, 'frame')} accepted", f"{self.frames}")
 
     def restarted(self, tick: int) -> None:
         self.counter = 0

@@ -13,7 +13,7 @@ from typing import Unpack
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_protocol.events import Received
 from miro_protocol.table import ROBOT_COUNTS, TICKS_PER_MS
 from miro_protocol.transmission import Transmission, joined
@@ -150,7 +150,9 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
         found = f"{said[-1].accepted}" if said else "no answer"
         return None if found == f"{fresh}" else (seen.end_tick, found)
 
-    script.expect(last.end_tick, f"{fresh} frames accepted by {last.what}", counted, by_answers=True)
+    script.expect(
+        last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", counted, by_answers=True
+    )
     sent = _whole(script.said)
     port.greet((script.n,), sent)
     cursor, begun = Cursor(port.log), len(port.late_ticks)

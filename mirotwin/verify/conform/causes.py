@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from miro_exact.bad_input import amount
 from mirotwin.verify.conform.run import Outcome
 from mirotwin.verify.conform.table import ALL, find
 
@@ -44,7 +45,7 @@ def folded(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _rules(ids: Sequence[str]) -> str:
-    return "1 rule was" if len(ids) == 1 else f"{len(ids)} rules were"
+    return amount(len(ids), "rule was", "rules were")
 
 
 def _where(cause: Outcome) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 import click
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_robot.image import Image
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -270,7 +270,7 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
 
 def _counts(outcomes: Sequence[Outcome]) -> str:
     verdicts = [outcome.verdict for outcome in outcomes]
-    tried = "1 rule" if len(outcomes) == 1 else f"{len(outcomes)} rules"
+    tried = amount(len(outcomes), "rule")
     text = f"{tried}: {verdicts.count('passed')} passed, {verdicts.count('failed')} failed"
     others = [f", {verdicts.count(one)} {one}" for one in ("not judged", "not observable") if one in verdicts]
     return text + "".join(others)
@@ -298,5 +298,5 @@ def _report_faults(outcomes: Sequence[Outcome]) -> int:
                 told += 1
                 complain(f"trial of {outcome.rule}: net{network}/robot{slot}: {fault}")
     if count > told:
-        complain(f"{count - told} more firmware faults in these trials")
+        complain(f"{amount(count - told, 'more firmware fault')} in these trials")
     return FIRMWARE_FAULT if count else DONE

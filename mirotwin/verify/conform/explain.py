@@ -7,6 +7,7 @@ from itertools import groupby
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame, describe
@@ -56,7 +57,7 @@ def explain(rule: Rule, image: Image, seed: int = 0) -> Story:
 
 
 def _summary(verdicts: list[Row], bad: int) -> str:
-    return f"{len(verdicts)} expectations, {bad} failed" if bad else f"{len(verdicts)} expectations passed"
+    return amount(len(verdicts), "expectation") + (f", {bad} failed" if bad else " passed")
 
 
 def _line(row: Row) -> str:
@@ -147,7 +148,7 @@ def _runs(events: list[Event]) -> Iterator[list[Event]]:
 
 def _characters(run: list[Event]) -> str:
     shown = " ".join(f"{one.value:02x}" + ("" if one.good_stop else "!") for one in run)
-    return f"{len(run)} characters, {between(run[0].tick, run[-1].tick)}: {shown}"
+    return f"{amount(len(run), 'character')}, {between(run[0].tick, run[-1].tick)}: {shown}"
 
 
 def _answer(run: list[Event], listener: Listener) -> str:

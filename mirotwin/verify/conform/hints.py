@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from miro_exact.bad_input import amount
 from miro_protocol.decoder import TelemetryDecoder
 from miro_protocol.events import Damaged
 from miro_protocol.table import SEQ_MODULUS, SYNC, TELEMETRY, TICKS_PER_MS, VELOCITY_SATURATION, FrameType
@@ -112,7 +113,7 @@ def characters(heard: Sequence[Event]) -> str:
     """Characters that the PC heard: how many, which, from when to when."""
     shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in heard[:24])
     more = " .." if len(heard) > 24 else ""
-    count = "1 character" if len(heard) == 1 else f"{len(heard)} characters"
+    count = amount(len(heard), "character")
     return f"{count}, {shown}{more} ({between(heard[0].tick, heard[-1].tick)})"
 
 
@@ -137,7 +138,7 @@ def no_answer(heard: Sequence[Event], seq: int) -> str:
         return "no sync 2D D4"
     found = data[at : at + TELEMETRY.size]
     if len(found) < TELEMETRY.size:
-        return f"{len(found)} characters from the sync on and not {TELEMETRY.size}"
+        return f"{amount(len(found), 'character')} from the sync on and not {TELEMETRY.size}"
     begins = FrameType.TELEMETRY * SEQ_MODULUS + seq
     mistake = mistake_in(TELEMETRY, found, begins)
     if mistake:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from miro_exact.bad_input import amount
 from miro_protocol.frames import seal
 from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import TICKS_PER_MS
@@ -126,7 +127,8 @@ def _serial_port(events: Sequence[Event], frame: Frame) -> str:
     if not received:
         return "its serial port takes no character: not set up, or off"
     if len(received) < len(sent):
-        return f"its serial port takes {len(received)} of {len(sent)} characters: RI stays set, or another bit rate"
+        taken = f"{len(received)} of {amount(len(sent), 'character')}"
+        return f"its serial port takes {taken}: RI stays set, or another bit rate"
     if bytes(one.value for one in received) != sent:
         return f"its serial port takes other characters than were sent, as at another bit rate: {characters(received)}"
     return ""

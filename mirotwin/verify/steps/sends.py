@@ -8,6 +8,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from miro_exact.bad_input import amount
 from miro_host.wheels import TICKS_PER_S, TICKS_PER_SAMPLE, UNITS_PER_COUNT, Wheels, nearest
 from miro_protocol.frames import ServiceFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
@@ -89,9 +90,8 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
 
     def problem(self, robots: int) -> str:
         if self.team_m_s is not None and len(self.team_m_s) != robots:
-            return (
-                f"team_m_s: {len(self.team_m_s)} pairs for {robots} slots; give one pair [left, right] a slot"
-            )
+            pairs = amount(len(self.team_m_s), "pair")
+            return f"team_m_s: {pairs} for {robots} slots; give one pair [left, right] a slot"
         one = (self.slot, self.left_m_s, self.right_m_s)
         if self.team_m_s is not None and one != (None, None, None):
             return "team_m_s: tells all slots; leave out slot, left_m_s and right_m_s"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
+from miro_exact.bad_input import amount
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
@@ -87,7 +88,7 @@ class InstructionTrace(Watcher):
         start, end = self.sleep
         self.sleep = (0, 0)
         if start < end and (self.only is None or self.names.function(self.last)[0] in self.only):
-            self.write(f"{12 * start:>12}  {'':36}-- asleep for {end - start} cycles")
+            self.write(f"{12 * start:>12}  {'':36}-- asleep for {amount(end - start, 'cycle')}")
 
     def _static(self, cpu: Cpu, pc: int) -> str | None:
         if self.only is not None and self.names.function(pc)[0] not in self.only:

@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
+from miro_exact.bad_input import amount
 from miro_protocol.actions import Action, RadioState, Reset
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, Message, TelemetryFrame
@@ -79,7 +80,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
         if self.what == "radio":
             return f" {LINK_STATES[self.value]}"
         if self.what == "sent":
-            return f" {len(self.data)} characters"
+            return f" {amount(len(self.data), 'character')}"
         return ""
 
 

@@ -94,7 +94,7 @@ def test_expectations_are_counted_as_not_observable(at_port):
     code, out, _ = at_port(POLL + "[expect]\nframes_accepted_min = 1\n")
     assert code == 0
     assert "expectation frames_accepted_min: not observable on a port" in out
-    assert "1 steps and expectations are not observable" in out
+    assert "1 step or expectation is not observable" in out
 
 
 def test_a_step_that_moves_is_refused_unless_it_is_allowed(at_port):

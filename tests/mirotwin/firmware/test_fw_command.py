@@ -106,7 +106,7 @@ def test_an_address_to_which_a_program_may_bring_code_is_run_to(mirotwin, tmp_pa
 def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
     code, _, err = mirotwin("fw", "run", image, "--max-cycles", 1)
-    assert (code, err) == (42, "mirotwin: stopped at the limit, at 0x0001 after 1 machine cycles\n")
+    assert (code, err) == (42, "mirotwin: stopped at the limit, at 0x0001 after 1 machine cycle\n")
     for limit in (4, 1000, 100_000):
         code, _, err = mirotwin("fw", "run", image, "--max-cycles", limit)
         assert code == 0

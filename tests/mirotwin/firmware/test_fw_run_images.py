@@ -67,7 +67,7 @@ def test_lines_after_a_text_that_does_not_come_again_are_told_with_how_often_it_
     (tmp_path / "lines").write_bytes(b"one\ntwo\n")
     words = ("--stdin", tmp_path / "lines", "--stdin-when", ">", "--stdin-by-line", "--max-cycles", 400_000)
     _, _, err = mirotwin("fw", "run", image, *words)
-    assert "--stdin-when: b'>' was not seen again after 1 times; 4 bytes of --stdin were not sent" in err
+    assert "--stdin-when: b'>' was not seen again after 1 time; 4 bytes of --stdin were not sent" in err
 
 
 def test_a_port_of_9_bits_is_told(mirotwin, tmp_path):

@@ -63,10 +63,10 @@ def test_a_damaged_stream_is_named_with_its_line(tmp_path):
         (lambda folder: folder.mkdir(), "holds no file"),
         (
             lambda folder: (folder.mkdir(), (folder / "a.png").write_bytes(b"x")),
-            "none of the 1 files is an input",
+            "no input among 1 file",
         ),
-        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(b"")), "none of the 1 files is an input"),
-        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(bytes(9000))), "none of the 1 files"),
+        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(b"")), "no input among 1 file"),
+        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(bytes(9000))), "no input among 1 file"),
     ],
 )
 def test_a_folder_without_inputs_is_refused(tmp_path, make, said):

@@ -119,7 +119,7 @@ def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess():
     assert "no frame of 3 or 5 robots at the beginning; 3 robots assumed (--robots" in decode(b"\0" * 50)[2]
     both = TEAM + encode(TeamFrame(0, 2, ((1, 2),) * 5), 5) * 2
     assert (
-        "1 frames of 3 robots and 2 frames of 5 robots at the beginning; 5 robots assumed" in decode(both)[2]
+        "1 frame of 3 robots and 2 frames of 5 robots at the beginning; 5 robots assumed" in decode(both)[2]
     )
     assert decode(both, "--robots", "3", "--direction", "down")[2] == ""
 

@@ -6,6 +6,7 @@ import math
 import msgspec
 import pytest
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import load
@@ -104,7 +105,7 @@ def test_two_firmwares_are_compared_by_hash_byte_and_instruction(mirotwin, short
     command = ("diff", tmp_path / "a" / "run.mcap", tmp_path / "b" / "run.mcap", "--compare", "commands")
     code, out, err = mirotwin(*command)
     assert code == 4
-    assert f"firmware code, the first of 1 bytes  6Eh at 0x{STOP_AT:04x} in _failsafe_tick+23" in out
+    assert f"firmware code, the first of 1 byte  6Eh at 0x{STOP_AT:04x} in _failsafe_tick+23" in out
     assert "the first changed instruction that is executed: net0/robot0: A tick " in err
     assert "failsafe.c:" in err
     assert "B tick " in err
@@ -217,9 +218,13 @@ def test_the_periods_of_the_window_are_counted(mirotwin, finished):
         (("--to", "801t"), 1),
     ):
         code, out, _ = mirotwin("diff", run, run, *window)
-        assert (code, f"in all {count} control periods" in out) == ((0, True) if count else (2, False))
+        assert (code, f"in all {amount(count, 'control period')}" in out) == (
+            (0, True) if count else (2, False)
+        )
         code, out, _ = mirotwin("replay", run, *window, "-q")
-        assert (code, f"in all {count} control periods" in out) == ((0, True) if count else (2, False))
+        assert (code, f"in all {amount(count, 'control period')}" in out) == (
+            (0, True) if count else (2, False)
+        )
 
 
 def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path):

@@ -161,7 +161,7 @@ def test_it(world):
 """
     out = session(tmp_path, "test_mine.py", tests=tests).stdout
     assert "1 error" in out
-    assert "has 1 steps, which a test in Python does not do" in out
+    assert "has 1 step, which a test in Python does not do" in out
 
 
 @pytest.mark.slow
