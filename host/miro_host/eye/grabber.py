@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Protocol
 
 from miro_exact.state import Rows
@@ -49,22 +48,20 @@ class Grabber:
     def __init__(self, robots: int, delay_frames: int = 1) -> None:
         self.robots = robots
         self.delay_frames = delay_frames
-        self.under_way: deque[Sighting | None] = deque([None] * robots * (delay_frames + 1))
+        self.under_way: list[Sighting | None] = [None] * (robots * (delay_frames + 1))
 
     def __repr__(self) -> str:
-        return f"Grabber(robots={self.robots}, delay_frames={self.delay_frames}, {list(self.under_way)!r})"
+        return f"Grabber(robots={self.robots}, delay_frames={self.delay_frames}, {self.under_way!r})"
 
     def take(self, frame: Sightings | None) -> Sightings:
         """Takes what was seen in a new frame and gives what arrives now; None: the frame before comes once more.
 
         The first `delay_frames` answers are frames in which no robot was found.
         """
-        if frame is None:
-            frame = tuple(self.under_way)[-self.robots :]
-        self.under_way.extend(frame)
-        for _ in range(self.robots):
-            self.under_way.popleft()
-        return tuple(self.under_way)[: self.robots]
+        under_way = self.under_way
+        under_way += under_way[len(under_way) - self.robots :] if frame is None else frame
+        del under_way[: self.robots]
+        return tuple(under_way[: self.robots])
 
     def after_load(self) -> None:
         """Raises ValueError unless as many frames are under way as the delay says."""

@@ -5,9 +5,10 @@ They are no state: a tracker that takes notes finds what one without them finds.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from miro_host.eye.track import Sighting
+if TYPE_CHECKING:
+    from miro_host.eye.tracker import Pair
 
 
 class Window(NamedTuple):
@@ -18,17 +19,6 @@ class Window(NamedTuple):
     width: int
     height: int
     slot: int
-
-
-class Pair(NamedTuple):
-    """A robot as found: its sighting, distance from what was expected, the centroids of both patches in the picture."""
-
-    sighting: Sighting
-    off_m: float
-    u: float
-    v: float
-    identity_u: float
-    identity_v: float
 
 
 class Notes:

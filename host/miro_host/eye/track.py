@@ -11,6 +11,8 @@ from miro_host.posture import Posture
 
 MOST_SPEED_M_S = 2.0
 """No robot goes faster; its patches do not either when it also turns."""
+REACH_M = 0.010
+"""Added to what a robot can go since it was seen: errors of measurement."""
 LONGEST_GAP_S = 0.2
 """Two sightings further apart tell no velocity."""
 LONGEST_AHEAD_S = 0.1
@@ -65,21 +67,22 @@ class Track:
         if self.seen == 2 and self.before_tick >= self.tick:
             raise ValueError(f"the sighting before tick {self.tick} has tick {self.before_tick}")
 
-    def last(self) -> Posture:
-        """Where it was seen last; the origin if it never was."""
-        return Posture(self.x_m, self.y_m, self.theta_rad)
+    def last(self) -> tuple[float, float, float]:
+        """x, y and heading when it was seen last; zeros if it never was."""
+        return self.x_m, self.y_m, self.theta_rad
 
     def remember(self, sighting: Sighting) -> None:
         """Takes the next sighting; one of the same tick replaces the last, an older one starts again."""
-        if self.seen and sighting.tick > self.tick:
+        tick = sighting.tick
+        if self.seen and tick > self.tick:
             self.before_tick = self.tick
             self.before_x_m = self.x_m
             self.before_y_m = self.y_m
             self.before_theta_rad = self.theta_rad
             self.seen = 2
-        elif self.seen == 0 or sighting.tick < self.tick:
+        elif self.seen == 0 or tick < self.tick:
             self.seen = 1
-        self.tick = sighting.tick
+        self.tick = tick
         self.x_m = sighting.x_m
         self.y_m = sighting.y_m
         self.theta_rad = sighting.theta_rad
@@ -88,8 +91,12 @@ class Track:
         """Seconds since the last sighting."""
         return (tick - self.tick) / TICKS_PER_SECOND
 
-    def predicted(self, tick: int) -> Posture:
-        """The posture at a tick if it goes and turns on as between its last two sightings."""
+    def reach_m(self, tick: int) -> float:
+        """How far from its last sighting it may be seen at a tick."""
+        return MOST_SPEED_M_S * self.unseen_s(tick) + REACH_M
+
+    def predicted(self, tick: int) -> tuple[float, float, float]:
+        """x, y and heading at a tick if it goes and turns on as between its last two sightings."""
         gap_s = (self.tick - self.before_tick) / TICKS_PER_SECOND
         if self.seen < 2 or gap_s > LONGEST_GAP_S:
             return self.last()
@@ -102,6 +109,8 @@ class Track:
         else:
             ahead_x = ahead
         turn = wrap_pi(self.theta_rad - self.before_theta_rad)
-        return Posture(
-            self.x_m + ahead_x * dx, self.y_m + ahead_x * dy, wrap_pi(self.theta_rad + ahead * turn)
+        return (
+            self.x_m + ahead_x * dx,
+            self.y_m + ahead_x * dy,
+            wrap_pi(self.theta_rad + ahead * turn),
         )

@@ -20,17 +20,16 @@ from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.colours import CLASS_OF, ColourClasses
 from miro_host.eye.grabber import Pixels
-from miro_host.eye.notes import Notes, Pair, Window
+from miro_host.eye.notes import Notes, Window
 from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.regions import Regions
 from miro_host.eye.self_calibration import SelfCalibration
 from miro_host.eye.top import Top
-from miro_host.eye.track import MOST_SPEED_M_S, Sighting, Track
+from miro_host.eye.track import Sighting, Track
 from miro_host.eye.weighing import Weighing
-from miro_host.posture import Posture
 
-__all__ = ["CentroidKind", "Sighting", "Tracker"]
+__all__ = ["CentroidKind", "Pair", "Sighting", "Tracker"]
 
 CentroidKind = Literal["binary", "weighted"]
 
@@ -38,12 +37,29 @@ LARGE_PX = 64
 """Side of the second window."""
 SEARCH_PX = 56
 """Side of a window around a team patch: its identity patch lies inside, wherever it is."""
-REACH_M = 0.010
-"""Added to what a robot can go since it was seen: errors of measurement."""
 CLEARLY_M = 0.010
 """The second pair must be so much further from the expected posture."""
 CONTESTED_M = 0.025
 """A pair whose patches could be others' must be so near: a wrong one of two touching robots is 53 mm off."""
+
+
+class Pair:
+    """A robot as found: its sighting, distance from what was expected, the centroids of both patches in the picture."""
+
+    NOT_STATE = ("sighting", "off_m", "u", "v", "identity_u", "identity_v")
+
+    def __init__(
+        self, sighting: Sighting, off_m: float, u: float, v: float, identity_u: float, identity_v: float
+    ) -> None:
+        self.sighting = sighting
+        self.off_m = off_m
+        self.u = u
+        self.v = v
+        self.identity_u = identity_u
+        self.identity_v = identity_v
+
+    def __repr__(self) -> str:
+        return f"Pair({self.sighting!r}, u={self.u:.2f}, v={self.v:.2f})"
 
 
 class Tracker:
@@ -122,7 +138,8 @@ class Tracker:
         if self.notes is not None:
             self.notes.pairs = list(pairs)
         sightings: list[Sighting | None] = []
-        for track, pair in zip(self.tracks, pairs, strict=True):
+        for slot in range(len(pairs)):
+            pair, track = pairs[slot], self.tracks[slot]
             if pair is None:
                 self.lost_frames += 1
                 sightings.append(None)
@@ -140,28 +157,24 @@ class Tracker:
         track = self.tracks[slot]
         if track.seen == 0:
             return None
-        predicted = track.predicted(tick)
+        x_m, y_m, theta_rad = track.predicted(tick)
         try:
-            u, v = self.lens.pixel(predicted.x_m, predicted.y_m, self.z_m)
+            u, v = self.lens.pixel(x_m, y_m, self.z_m)
         except ValueError:
             return None
-        pair = self._in_window(frame, tick, slot, u, v, self.window_px, predicted)
+        self.patches.expect_nothing()
+        self._expect(x_m, y_m, theta_rad)
+        self._expect(track.x_m, track.y_m, track.theta_rad)
+        pair = self._chosen(self._look(frame, u, v, self.window_px, slot), tick, slot)
         if pair is None and self.window_px < LARGE_PX:
-            pair = self._in_window(frame, tick, slot, u, v, LARGE_PX, predicted)
+            pair = self._chosen(self._look(frame, u, v, LARGE_PX, slot), tick, slot)
         return pair
-
-    def _in_window(
-        self, frame: Pixels, tick: int, slot: int, u: float, v: float, size: int, predicted: Posture
-    ) -> Pair | None:
-        pixels = self._look(frame, u, v, size, slot)
-        self._expect(slot, predicted)
-        return self._chosen(pixels, tick, slot)
 
     def _look(self, frame: Pixels, u: float, v: float, size: int, slot: int) -> bytearray:
         """Finds the patches in a window around a pixel, moved so that it lies in the picture."""
-        width, height = min(size, frame.width), min(size, frame.height)
-        left = min(max(math.floor(u) - width // 2, 0), frame.width - width)
-        top = min(max(math.floor(v) - height // 2, 0), frame.height - height)
+        whole_width, whole_height = frame.width, frame.height
+        width, height = min(size, whole_width), min(size, whole_height)
+        left, top = _first(u, width, whole_width), _first(v, height, whole_height)
         if self.notes is not None:
             self.notes.windows.append(Window(left, top, width, height, slot))
         pixels = frame.window(left, top, width, height)
@@ -175,7 +188,10 @@ class Tracker:
         for u, v in candidates(frame, self.regions, self.team_kind, self.top.side_px):
             pixels = self._look(frame, u, v, SEARCH_PX, -1)
             for slot in missing:
-                self._expect(slot, None)
+                track = self.tracks[slot]
+                self.patches.expect_nothing()
+                if track.seen:
+                    self._expect(track.x_m, track.y_m, track.theta_rad)
                 pair = self._chosen(pixels, tick, slot)
                 if pair is not None and not any(_same_patch(pair, other) for other in found[slot]):
                     found[slot].append(pair)
@@ -185,14 +201,10 @@ class Tracker:
 
     # ---- which pair it is
 
-    def _expect(self, slot: int, predicted: Posture | None) -> None:
-        """Tells `patches` where the robot may be: moving on as predicted, or still where it was."""
-        track = self.tracks[slot]
-        self.patches.expect_nothing()
-        if predicted is not None:
-            self.patches.expect(*self.top.places(predicted.x_m, predicted.y_m, predicted.theta_rad))
-        if track.seen:
-            self.patches.expect(*self.top.places(track.x_m, track.y_m, track.theta_rad))
+    def _expect(self, x_m: float, y_m: float, theta_rad: float) -> None:
+        """Tells `patches` of a posture in which the robot may be."""
+        team_x, team_y, identity_x, identity_y = self.top.places(x_m, y_m, theta_rad)
+        self.patches.expect(team_x, team_y, identity_x, identity_y)
 
     def _chosen(self, pixels: bytearray, tick: int, slot: int) -> Pair | None:
         """The robot in the window that `patches` looked at last, None if there is none for sure."""
@@ -202,7 +214,7 @@ class Tracker:
         if patches.out_next_m - patches.out_off_m < CLEARLY_M:
             return None
         if track.seen:
-            if patches.out_off_m > MOST_SPEED_M_S * track.unseen_s(tick) + REACH_M:
+            if patches.out_off_m > track.reach_m(tick):
                 return None
             if patches.out_contested and patches.out_off_m > CONTESTED_M:
                 return None
@@ -212,13 +224,11 @@ class Tracker:
 
     def _part(self, pairs: list[Pair | None]) -> None:
         """Where two robots use one team patch, the one further from what was expected is lost."""
-        for slot, pair in enumerate(pairs):
+        for slot in range(1, len(pairs)):
             for other in range(slot):
-                rival = pairs[other]
+                pair, rival = pairs[slot], pairs[other]
                 if pair is not None and rival is not None and _same_patch(pair, rival):
-                    worse = other if pair.off_m < rival.off_m else slot
-                    pairs[worse] = None
-                    pair = pairs[slot]
+                    pairs[other if pair.off_m < rival.off_m else slot] = None
 
     # ---- what it says
 
@@ -226,13 +236,13 @@ class Tracker:
         """The pair that `patches` chose as a sighting."""
         patches = self.patches
         try:
-            centroids = self._centroids(pixels, slot)
-            x_m, y_m, theta_rad = self.top.posture(*centroids)
+            u, v, identity_u, identity_v = self._centroids(pixels, slot)
+            x_m, y_m, theta_rad = self.top.posture(u, v, identity_u, identity_v)
         except ValueError:
             return None
         confidence = self.top.confidence(patches.out_gap_m, patches.out_team_area, patches.out_identity_area)
         sighting = Sighting(x_m, y_m, theta_rad, tick, confidence)
-        return Pair(sighting, patches.out_off_m, *centroids)
+        return Pair(sighting, patches.out_off_m, u, v, identity_u, identity_v)
 
     def _centroids(self, pixels: bytearray, slot: int) -> tuple[float, float, float, float]:
         """u, v of the team patch and of the identity patch in the picture."""
@@ -241,11 +251,21 @@ class Tracker:
         if self.weighted:
             weighing = self.weighings[slot]
             weighing.centroids(pixels, regions, team, identity, patches.least_area)
-            (team_u, team_v), (identity_u, identity_v) = weighing.centroid(0), weighing.centroid(1)
+            team_u, team_v = weighing.centroid(0)
+            identity_u, identity_v = weighing.centroid(1)
         else:
-            (team_u, team_v), (identity_u, identity_v) = regions.centroid(team), regions.centroid(identity)
+            team_u, team_v = regions.centroid(team)
+            identity_u, identity_v = regions.centroid(identity)
         left, top = patches.left, patches.top
         return left + team_u, top + team_v, left + identity_u, top + identity_v
+
+
+def _first(middle: float, size: int, whole: int) -> int:
+    """The first of `size` pixels around a place, moved so that all of them are among the `whole` picture's."""
+    first = math.floor(middle) - size // 2
+    if first > whole - size:
+        return whole - size
+    return int(first) if first > 0 else 0
 
 
 def _same_patch(one: Pair, other: Pair) -> bool:

@@ -116,7 +116,7 @@ class Network:
         for place, robot in enumerate(self.robots):
             self.seen.append(robot.record(tick, measured[place], commands[place]))
 
-    def show(self, bodies: Sequence[Robot]) -> None:
+    def show(self, bodies: list[Robot]) -> None:
         """Lets this network's camera see the robots of all networks."""
         if isinstance(self.sight, PixelSight):
             self.sight.everyone = bodies

@@ -1,14 +1,57 @@
 # C layout of miro_sim.world.sight.
 cimport cython
+from libc cimport math
 from miro_exact.rng cimport Stream
+from miro_host.eye.grabber cimport Grabber
+from miro_host.eye.tracker cimport Tracker
 from miro_host.vision cimport Vision
-from miro_sim.plant.drive cimport DifferentialDrive
+from miro_sim.pitch.camera cimport Camera
+from miro_sim.world.robot cimport Robot
+
+cdef double WRONG
 
 
 cdef class GaussianSight:
-    cdef readonly object bodies
-    cdef readonly list visions, streams
+    cdef readonly list bodies, visions, streams
     cdef public long long frame
 
-    @cython.locals(place=Py_ssize_t, vision=Vision, noise=Stream, drive=DifferentialDrive, found=list)
+    @cython.locals(place=Py_ssize_t, vision=Vision, noise=Stream, body=Robot, found=list)
     cpdef list expose(self, long long tick)
+
+
+cdef class SeeingSight:
+    cdef readonly object camera
+    cdef readonly list bodies
+    cdef readonly Grabber grabber
+    cdef readonly Stream chances
+    cdef readonly double worst_m
+    cdef readonly long long frame, lost, dropped, repeated, wrong, swapped
+
+    cpdef list look(self, long long tick)
+    @cython.locals(robots='long long', first='long long', chance=Stream, seen=tuple)
+    cpdef tuple expose(self, long long tick)
+    @cython.locals(chance=Stream)
+    cdef tuple _kept(self, list seen, long long first)
+    @cython.locals(own=Py_ssize_t, other=Py_ssize_t, x_m=double, y_m=double, way_m=double)
+    cdef _count(self, long long tick, tuple seen)
+    @cython.locals(body=Robot, true_x_m=double, true_y_m=double, dx=double, dy=double)
+    cdef double _distance_m(self, Py_ssize_t own, long long tick, double x_m, double y_m) except? -1.0
+
+
+cdef class GeometricSight(SeeingSight):
+    cdef readonly object field
+
+    cpdef list look(self, long long tick)
+
+
+cdef class PixelSight(SeeingSight):
+    cdef readonly object picture
+    cdef public object watch
+    cdef public list everyone
+    cdef readonly Camera eye
+    cdef readonly Tracker tracker
+
+    cpdef tuple expose(self, long long tick)
+    cpdef list look(self, long long tick)
+    @cython.locals(eye=Camera, body=Robot, x_m=double, y_m=double, theta_rad=double, v_m_s=double, w_rad_s=double)
+    cpdef Camera picture_at(self, long long frame, long long tick)

@@ -28,8 +28,8 @@ from miro_host.vision import Vision, VisionErrors
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.static_field import StaticField
-from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import camera_keys as keys
+from miro_sim.world.robot import Robot
 
 _DEGREE = 0.017453292519943295
 _FRAMES = ("q", 0, 1 << 24)
@@ -37,14 +37,6 @@ WRONG = 3.0
 """A measurement further off than so many times the worst case of the calibration is wrong."""
 SLACK_M = 0.0035
 """Worst case of the tracker itself, and what a robot goes while it is exposed."""
-
-
-class VisibleBody(Protocol):
-    """What a camera sees of a robot."""
-
-    network: int
-    slot: int
-    drive: DifferentialDrive
 
 
 class Sight(Protocol):
@@ -67,11 +59,11 @@ class GaussianSight:
     STATE = {"visions": [Vision], "frame": _FRAMES}
     NOT_STATE = ("bodies", "streams")
 
-    def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
+    def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[Robot], seed: int) -> None:
         errors = VisionErrors(
             camera.position_error_cm / 100.0, camera.heading_error_deg * _DEGREE, camera.pixel_cm / 100.0
         )
-        self.bodies = bodies
+        self.bodies = list(bodies)
         self.visions = [Vision(errors, camera.delay_frames) for _ in bodies]
         self.streams = [Stream(seed, f"net{body.network}/robot{body.slot}/camera") for body in bodies]
         self.frame = 0
@@ -83,8 +75,8 @@ class GaussianSight:
         """See `Sight`."""
         found = []
         for place in range(len(self.visions)):
-            vision, noise, drive = self.visions[place], self.streams[place], self.bodies[place].drive
-            found.append(vision.expose(drive.pose_at(tick), noise, self.frame))
+            vision, noise, body = self.visions[place], self.streams[place], self.bodies[place]
+            found.append(vision.expose(body.drive.pose_at(tick), noise, self.frame))
         self.frame += 1
         return found
 
@@ -111,11 +103,9 @@ class SeeingSight:
     }
     NOT_STATE: tuple[str, ...] = ("camera", "bodies", "chances", "worst_m")
 
-    def __init__(
-        self, camera: keys.SeeingCamera, bodies: Sequence[VisibleBody], seed: int, worst_m: float
-    ) -> None:
+    def __init__(self, camera: keys.SeeingCamera, bodies: Sequence[Robot], seed: int, worst_m: float) -> None:
         self.camera = camera
-        self.bodies = bodies
+        self.bodies = list(bodies)
         self.grabber = Grabber(len(bodies), camera.delay_frames)
         self.chances = Stream(seed, f"net{bodies[0].network}/grabber")
         self.worst_m = worst_m + SLACK_M
@@ -130,37 +120,56 @@ class SeeingSight:
         names = ("lost", "dropped", "repeated", "wrong", "swapped")
         return {"frames": self.frame, **{name: getattr(self, name) for name in names}}
 
-    def deliver(self, tick: int, look: Callable[[], Sightings]) -> Sightings:
-        """What arrives of the frame exposed at `tick`; `look` gives what is seen in it, unless the frame is dropped."""
+    def look(self, tick: int) -> list[Sighting | None]:
+        """What is seen in the frame exposed at `tick`."""
+        raise NotImplementedError
+
+    def expose(self, tick: int) -> Sequence[Posture | None]:
+        """See `Sight`."""
         robots = len(self.bodies)
         first = self.frame * (robots + 2)
-        self.frame += 1
-        camera, chance = self.camera, self.chances.uniform
-        if camera.dropped_frames > 0.0 and chance(first) < camera.dropped_frames:
+        camera, chance = self.camera, self.chances
+        if camera.dropped_frames > 0.0 and chance.uniform(first) < camera.dropped_frames:
             self.dropped += 1
-            return self.grabber.take((None,) * robots)
-        if camera.repeated_frames > 0.0 and chance(first + 1) < camera.repeated_frames:
+            seen: Sightings | None = (None,) * robots
+        elif camera.repeated_frames > 0.0 and chance.uniform(first + 1) < camera.repeated_frames:
             self.repeated += 1
-            return self.grabber.take(None)
-        kept = look()
-        if camera.lost_robots > 0.0:
-            lost = [chance(first + 2 + index) < camera.lost_robots for index in range(robots)]
-            kept = tuple(None if gone else seen for gone, seen in zip(lost, kept, strict=True))
-        self._count(tick, kept)
-        return self.grabber.take(kept)
+            seen = None
+        else:
+            seen = self._kept(self.look(tick), first + 2)
+            self._count(tick, seen)
+        self.frame += 1
+        return self.grabber.take(seen)
+
+    def _kept(self, seen: list[Sighting | None], first: int) -> Sightings:
+        """Without the robots that are lost by chance; `first`: index of the first one's draw."""
+        share, chance = self.camera.lost_robots, self.chances
+        if share > 0.0:
+            seen = [None if chance.uniform(first + at) < share else one for at, one in enumerate(seen)]
+        return tuple(seen)
 
     def _count(self, tick: int, seen: Sightings) -> None:
         """Compares with the truth, which nobody on the PC can."""
-        for sighting, own in zip(seen, self.bodies, strict=True):
+        for own in range(len(seen)):
+            sighting = seen[own]
             if sighting is None:
                 self.lost += 1
                 continue
-            way = _distance_m(own.drive, tick, sighting)
-            if way > WRONG * self.worst_m:
+            x_m, y_m = sighting.x_m, sighting.y_m
+            way_m = self._distance_m(own, tick, x_m, y_m)
+            if way_m > WRONG * self.worst_m:
                 self.wrong += 1
-            others = [body for body in self.bodies if body is not own]
-            if any(_distance_m(body.drive, tick, sighting) < way for body in others):
-                self.swapped += 1
+            for other in range(len(seen)):
+                if other != own and self._distance_m(other, tick, x_m, y_m) < way_m:
+                    self.swapped += 1
+                    break
+
+    def _distance_m(self, own: int, tick: int, x_m: float, y_m: float) -> float:
+        """From where a robot is to a place."""
+        body = self.bodies[own]
+        true_x_m, true_y_m, _ = body.drive.pose_at(tick)
+        dx, dy = true_x_m - x_m, true_y_m - y_m
+        return math.sqrt(dx * dx + dy * dy)
 
 
 class GeometricSight(SeeingSight):
@@ -168,16 +177,16 @@ class GeometricSight(SeeingSight):
 
     NOT_STATE = ("field",)
 
-    def __init__(self, camera: keys.GeometricCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
+    def __init__(self, camera: keys.GeometricCamera, bodies: Sequence[Robot], seed: int) -> None:
         calibration, worst_m = calibration_for(camera, bodies[0].network, seed)
         super().__init__(camera, bodies, seed, worst_m)
         self.field = StaticField(camera.lens, calibration, camera.pattern)
 
-    def expose(self, tick: int) -> Sequence[Posture | None]:
-        """See `Sight`."""
-        return self.deliver(tick, lambda: tuple(self._see(body, tick) for body in self.bodies))
+    def look(self, tick: int) -> list[Sighting | None]:
+        """See `SeeingSight`."""
+        return [self._see(body, tick) for body in self.bodies]
 
-    def _see(self, body: VisibleBody, tick: int) -> Sighting | None:
+    def _see(self, body: Robot, tick: int) -> Sighting | None:
         try:
             read = self.field.read(Posture(*body.drive.pose_at(tick)))
         except ValueError:  # it has left the view
@@ -195,12 +204,12 @@ class PixelSight(SeeingSight):
     STATE = {"tracker": Tracker}
     NOT_STATE = ("eye", "everyone", "picture", "watch")
 
-    def __init__(self, camera: keys.PixelCamera, bodies: Sequence[VisibleBody], seed: int) -> None:
+    def __init__(self, camera: keys.PixelCamera, bodies: Sequence[Robot], seed: int) -> None:
         network = bodies[0].network
         calibration, worst_m = calibration_for(camera, network, seed)
         super().__init__(camera, bodies, seed, worst_m)
         self.picture = camera.picture
-        self.everyone: Sequence[VisibleBody] = bodies
+        self.everyone = list(bodies)
         self.watch: Callable[[int, int], None] | None = None
         self.eye = Camera(
             camera.lens, camera.picture, PATTERNS[camera.pattern], Stream(seed, f"net{network}/pixels")
@@ -220,21 +229,25 @@ class PixelSight(SeeingSight):
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """See `Sight`."""
-        frame = self.frame
-        arrived = self.deliver(tick, lambda: tuple(self.tracker.track(self.picture_at(frame, tick), tick)))
+        arrived = SeeingSight.expose(self, tick)
         if self.watch is not None:
-            self.watch(frame, tick)
+            self.watch(self.frame - 1, tick)
         return arrived
+
+    def look(self, tick: int) -> list[Sighting | None]:
+        """See `SeeingSight`."""
+        return self.tracker.track(self.picture_at(self.frame, tick), tick)
 
     def picture_at(self, frame: int, tick: int) -> Camera:
         """The picture of the world as it stands at `tick`, with the noise of this frame number."""
-        self.eye.clear_robots()
+        eye = self.eye
+        eye.clear_robots()
         for body in self.everyone:
             x_m, y_m, theta_rad = body.drive.pose_at(tick)
             v_m_s, w_rad_s = body.drive.velocity_at(tick)
-            self.eye.robot(body.network, body.slot, x_m, y_m, theta_rad, v_m_s, w_rad_s)
-        self.eye.begin(frame, tick)
-        return self.eye
+            eye.robot(body.network, body.slot, x_m, y_m, theta_rad, v_m_s, w_rad_s)
+        eye.begin(frame, tick)
+        return eye
 
 
 @lru_cache(maxsize=16)
@@ -270,13 +283,7 @@ def _calibration(camera: keys.SeeingCamera, network: int, seed: int) -> Calibrat
     return kinds.wrong(found.camera, ignored)
 
 
-def _distance_m(drive: DifferentialDrive, tick: int, seen: Posture) -> float:
-    x_m, y_m, _ = drive.pose_at(tick)
-    dx, dy = x_m - seen.x_m, y_m - seen.y_m
-    return math.sqrt(dx * dx + dy * dy)
-
-
-def sight_of(camera: keys.Camera, bodies: Sequence[VisibleBody], seed: int) -> Sight:
+def sight_of(camera: keys.Camera, bodies: Sequence[Robot], seed: int) -> Sight:
     """The camera of one host."""
     if isinstance(camera, keys.PixelCamera):
         return PixelSight(camera, bodies, seed)

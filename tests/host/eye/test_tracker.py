@@ -232,11 +232,10 @@ def test_a_colour_without_a_class_is_refused_by_name():
 def test_predictions_go_on_at_constant_velocity_for_a_tenth_of_a_second():
     track = Track()
     track.remember(Sighting(0.0, 0.0, 0.0, 0, 1.0))
-    assert track.predicted(FRAME) == Posture(0.0, 0.0, 0.0)
+    assert track.predicted(FRAME) == (0.0, 0.0, 0.0)
     track.remember(Sighting(0.03, 0.0, 0.1, FRAME, 1.0))
-    ahead = track.predicted(2 * FRAME)
-    assert (ahead.x_m, ahead.theta_rad) == pytest.approx((0.06, 0.2))
-    assert 0.11 < track.predicted(50 * FRAME).x_m < 0.13
+    assert track.predicted(2 * FRAME) == pytest.approx((0.06, 0.0, 0.2))
+    assert 0.11 < track.predicted(50 * FRAME)[0] < 0.13
     assert track.predicted(60 * FRAME) == track.predicted(50 * FRAME)
 
 
@@ -244,7 +243,7 @@ def test_two_sightings_far_apart_in_time_tell_no_velocity():
     track = Track()
     track.remember(Sighting(0.0, 0.0, 0.0, 0, 1.0))
     track.remember(Sighting(0.03, 0.0, 0.1, 7 * FRAME, 1.0))
-    assert track.predicted(8 * FRAME) == Posture(0.03, 0.0, 0.1)
+    assert track.predicted(8 * FRAME) == (0.03, 0.0, 0.1)
 
 
 def test_a_sighting_older_than_the_last_one_begins_anew():

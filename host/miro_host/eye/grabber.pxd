@@ -1,0 +1,10 @@
+cimport cython
+
+
+@cython.final
+cdef class Grabber:
+    cdef readonly Py_ssize_t robots, delay_frames
+    cdef readonly list under_way
+
+    @cython.locals(under_way=list)
+    cpdef tuple take(self, tuple frame)

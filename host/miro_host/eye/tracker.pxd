@@ -1,0 +1,59 @@
+cimport cython
+from libc cimport math
+from miro_host.eye.lens cimport Lens
+from miro_host.eye.patches cimport Patches
+from miro_host.eye.regions cimport Regions
+from miro_host.eye.top cimport Top
+from miro_host.eye.track cimport Track
+from miro_host.eye.weighing cimport Weighing
+
+cdef int LARGE_PX
+cdef double CLEARLY_M, CONTESTED_M
+
+
+@cython.final
+cdef class Pair:
+    cdef readonly object sighting
+    cdef readonly double off_m, u, v, identity_u, identity_v
+
+
+@cython.final
+cdef class Tracker:
+    cdef readonly object pattern, learning
+    cdef readonly str team
+    cdef readonly tuple robots
+    cdef readonly bytes table
+    cdef readonly list kinds, weighings, tracks
+    cdef readonly bint weighted
+    cdef readonly int window_px, team_kind
+    cdef readonly long long lost_frames, searches
+    cdef readonly Top top
+    cdef readonly Lens lens
+    cdef readonly double z_m
+    cdef readonly Patches patches
+    cdef readonly Regions regions
+    cdef public object notes
+
+    @cython.locals(pairs=list, sightings=list, slot=int, pair=Pair, track=Track)
+    cpdef list track(self, frame, long long tick)
+    @cython.locals(track=Track, x_m=double, y_m=double, theta_rad=double, u=double, v=double, pair=Pair)
+    cdef Pair _followed(self, frame, long long tick, int slot)
+    @cython.locals(whole_width=int, whole_height=int, width=int, height=int, left=int, top=int, pixels=bytearray)
+    cpdef bytearray _look(self, frame, double u, double v, int size, int slot)
+    @cython.locals(team_x=double, team_y=double, identity_x=double, identity_y=double)
+    cpdef _expect(self, double x_m, double y_m, double theta_rad)
+    @cython.locals(patches=Patches, track=Track)
+    cpdef Pair _chosen(self, bytearray pixels, long long tick, int slot)
+    @cython.locals(slot=int, other=int, pair=Pair, rival=Pair)
+    cdef _part(self, list pairs)
+    @cython.locals(patches=Patches, u=double, v=double, identity_u=double, identity_v=double, x_m=double, y_m=double,
+                   theta_rad=double)
+    cdef Pair _pair(self, bytearray pixels, long long tick, int slot)
+    @cython.locals(patches=Patches, regions=Regions, weighing=Weighing, team=int, identity=int, team_u=double,
+                   team_v=double, identity_u=double, identity_v=double, left=int, top=int)
+    cdef (double, double, double, double) _centroids(self, bytearray pixels, int slot)
+
+
+cdef bint _same_patch(Pair one, Pair other) noexcept
+@cython.locals(first=double)
+cdef int _first(double middle, int size, int whole) noexcept
