@@ -84,8 +84,9 @@ def test_of_two_settings_of_a_key_the_later_one_holds():
     assert (radio.eb_n0_db, radio.bit_error_rate) == (None, 0.0)
 
 
-def test_a_file_that_is_wrong_without_its_settings_is_read_with_them():
-    text = builtin_text("fig6").replace("duration_s = 6.0", "duration_s = -1")
+@pytest.mark.parametrize("wrong", ["-1", "nan", "inf", "0x" + "f" * 5000, '"6"'])
+def test_a_file_that_is_wrong_without_its_settings_is_read_with_them(wrong):
+    text = builtin_text("fig6").replace("duration_s = 6.0", f"duration_s = {wrong}")
     assert parse(text, "my.toml", ["duration_s=6"]) == FIG6
 
 

@@ -149,9 +149,7 @@ def _base_tables(source: str) -> dict[str, Any]:
 
 def _tables(text: str, origin: str) -> dict[str, Any]:
     try:
-        raw = tables(text)
-        check_numbers(raw)
-        return raw
+        return tables(text)
     except TomlError as error:
         raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
 
@@ -159,10 +157,7 @@ def _tables(text: str, origin: str) -> dict[str, Any]:
 def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
     """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
     try:
-        check_numbers(raw)
         return _checked(raw, origin, settings)
-    except TomlError as error:
-        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
     except RecursionError:
         raise _too_deep(origin) from None
 
@@ -202,9 +197,12 @@ def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
     complete = _with_profiles(_with_variant(raw, origin) if "variant" in raw else raw, origin)
     try:
+        check_numbers(complete)
         scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
     except msgspec.ValidationError as error:
         raise value_error(origin, complete, full_message(error)) from cause_of(error)
+    except TomlError as error:
+        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
     check_places(scenario, origin)
     also(scenario, origin)
     return scenario
