@@ -28,7 +28,7 @@ from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import RobotTarget, target_for
 from mirotwin.verify.cases.rerun import rerun
-from mirotwin.verify.checks.registry import CHECKS
+from mirotwin.verify.checks.expect import CHECKS
 from mirotwin.verify.rig_options import silent_scenario
 from tests.mutants.build import build
 from tests.mutants.draw import source_files

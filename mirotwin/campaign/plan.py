@@ -25,7 +25,7 @@ from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageFile, Work
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.steps.keys import CheckStep
-from mirotwin.verify.steps.plan import check_symbols
+from mirotwin.verify.steps.player import check_symbols
 
 OWN_IMAGE = "own"
 

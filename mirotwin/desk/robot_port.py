@@ -25,7 +25,7 @@ import msgspec
 import serial
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Event as Decoded
 from miro_protocol.events import Received
@@ -117,8 +117,9 @@ class RobotPort:
         self.recorder = recorder
         spec = scenario.networks[0]
         self.log = HostLog(0, lambda tick: tick, spec.robots)
-        self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=())]
-        self.end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
+        self.robots = ()  # a PC sees none from inside
+        self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=self.robots)]
+        self.end_tick = scenario.end_tick
         self.observers: list[Callable[[Period], object]] = []
         self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []

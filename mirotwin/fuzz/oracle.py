@@ -23,7 +23,7 @@ from mirotwin.verify.bare.case import BareRerun, rerun_bare
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
 from mirotwin.verify.bare.run import AHEAD_TICKS
 from mirotwin.verify.cases.rerun import Rerun, rerun_robot
-from mirotwin.verify.checks.registry import CHECKS
+from mirotwin.verify.checks.expect import CHECKS
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
 """How long a world goes on after the input and the crash: an answer may take 30 ms, a frame 10 ms."""

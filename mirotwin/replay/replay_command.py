@@ -245,7 +245,7 @@ def _periods(job: Job, rule: CompareRule) -> int | None:
 def _rerun(job: Job, periods: int | None, quiet: bool) -> Rerun:
     """The first `periods` of it, as far as the scenario goes."""
     first = job.recorded[0].index if job.recorded else 0
-    last = job.periods if periods is None else min(first + periods, job.periods)
+    last = job.scenario.periods if periods is None else min(first + periods, job.scenario.periods)
     with ProgressBar("replaying", last - first, quiet) as bar:
         until_tick = last * CONTROL_PERIOD_TICKS
         return rerun_job(job, until_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS - first))

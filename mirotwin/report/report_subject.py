@@ -93,7 +93,7 @@ def _file_of(subject: str) -> str:
 def _reproduced(wanted: PageSubject, job: Job, until_tick: int | None) -> Reproduction:
     with plain_parameters(job.file, "replayed"):
         world = job.world_of()
-    total = until_tick or job.periods * CONTROL_PERIOD_TICKS
+    total = until_tick or job.scenario.end_tick
     with ProgressBar("running it again", total, wanted.quiet) as bar, replaying(job.file, world):
         return reproduce(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
 from miro_protocol.actions import Power, Reset, ScriptItem
@@ -126,7 +126,7 @@ def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | N
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
     check_script(script, path, len(scenario.networks))
     check_actions(script, path, scenario)
-    end_tick = -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS
+    end_tick = scenario.end_tick
     for one in script:
         # What was recorded may still be on the air when its run ends.
         last_tick = one.end_tick if isinstance(one, Transmission) and header.end_tick is None else one.tick
@@ -261,11 +261,6 @@ class Job(msgspec.Struct, frozen=True):
     resumed: bytes = b""
     origin: str = ""
     firmware: bytes = b""
-
-    @property
-    def periods(self) -> int:
-        """Control periods of its scenario."""
-        return max(1, -(-ticks(self.scenario.duration_s) // CONTROL_PERIOD_TICKS))
 
     def expectations_of_case(self) -> Expected:
         """What its scenario expects. Raises BadInput where that is not the check that the case is about."""

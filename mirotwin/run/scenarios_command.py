@@ -15,8 +15,7 @@ from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
 from mirotwin.shell.options import SET, ScenarioName
 from mirotwin.shell.program import LazyGroup
-from mirotwin.verify.checks.expect import struct_of
-from mirotwin.verify.checks.registry import CHECKS
+from mirotwin.verify.checks.expect import CHECKS, struct_of
 
 
 class ScenariosGroup(LazyGroup):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from miro_exact.bad_input import BadInput
 from mirotwin.rerun.job import load_stream, rerun_job
 from mirotwin.verify.cases.case import is_bare_case
-from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.steps.running import Outcome
 
 

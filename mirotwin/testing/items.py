@@ -14,7 +14,7 @@ from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.artifacts import SUMMARY, case_of, folder_of, leave_test, page_of, story, test_line
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.cases.artifacts import PAGE, case_debug_line, case_line, clear, report_line
+from mirotwin.verify.cases.artifacts import PAGE, case_lines, clear, report_line
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.rig_options import marker_options, rig_options
 
@@ -99,7 +99,7 @@ def tell(
     if folder is not None:
         where = str(_relative(item.config, folder))
         own = foreign_path(rig.options.image) is None
-        lines += [] if case is None else [case_line(where, own), case_debug_line(where, own)]
+        lines += [] if case is None else case_lines(where, own)
     text = story(rig, failures, lines)
     if folder is not None and not rig.written:
         text += f"\n{report_line(where)}"

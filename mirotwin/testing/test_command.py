@@ -37,7 +37,7 @@ from mirotwin.shell.program import (
     tell_notes,
 )
 from mirotwin.testing.case_test import CaseTests
-from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_debug_line, case_line, report_line
+from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.interface import in_ms
@@ -205,8 +205,8 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
         case = Path(outcome.left) / CASE
         if case.exists():
             own = not case.with_name(FIRMWARE).exists()
-            show_line(f"    {case_line(outcome.left, own)}")
-            show_line(f"    {case_debug_line(outcome.left, own)}")
+            for line in case_lines(outcome.left, own):
+                show_line(f"    {line}")
         show_line(f"    {report_line(outcome.left)}")
     if not passed and outcome.verdict != "error":
         show_line(f"    {again}")

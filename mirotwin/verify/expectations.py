@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import click
@@ -11,9 +11,9 @@ from miro_exact.bad_input import amount
 from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
 from mirotwin.shell.command import Option
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
+from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.checks.registry import ALWAYS_ON
 
 if TYPE_CHECKING:
     from mirotwin.verify.steps.player import Player
@@ -65,23 +65,27 @@ def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
     return tuple(map(as_setting, expected))
 
 
-def report_failures(checks: Checks) -> int:
-    """Says on stderr which checks failed and which had nothing to judge; returns the exit code.
+def told(checks: Checks) -> Iterator[tuple[bool, str]]:
+    """Which checks failed and which had nothing to judge, a line each, and whether it failed.
 
     Firmware faults have lines and an exit code of their own.
     """
-    code = DONE
     for verdict in checks.verdicts():
         if verdict.verdict == "not judged" and verdict.name not in ALWAYS_ON:
-            complain(f"expectation not judged: {verdict.name}: the run had no occasion for it")
+            yield False, f"expectation not judged: {verdict.name}: the run had no occasion for it"
         failures = [one for one in checks.failures if one.check == verdict.name and not one.fault]
         for failure in failures[:LINES]:
-            complain(f"expectation failed: {failure}")
-        if failures:
-            code = EXPECTATION_FAILED
-            more = verdict.failures - min(len(failures), LINES)
-            if more:
-                complain(f"expectation failed: {verdict.name}: {more} more times")
+            yield True, f"expectation failed: {failure}"
+        if failures and verdict.failures > LINES:
+            yield True, f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times"
+
+
+def report_failures(checks: Checks) -> int:
+    """Says the same on stderr; returns the exit code."""
+    code = DONE
+    for failed, line in told(checks):
+        complain(line)
+        code = EXPECTATION_FAILED if failed else code
     return code
 
 

@@ -19,16 +19,13 @@ A case names its check and never the file that holds it: what is played again mu
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
-import tomli_w
 
-from miro_exact.bad_input import BadInput, one_line
-from miro_protocol import stream, stream_header
+from miro_exact.bad_input import BadInput
+from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
 from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import DOWN, Transmission
@@ -44,6 +41,7 @@ from mirotwin.verify.bare.exchange import (
 )
 from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.bare.run import BarePlayback
+from mirotwin.verify.cases.case import stream_text
 from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
 
@@ -117,17 +115,9 @@ def case_text(
     failure: BareFailure | None = None,
 ) -> str:
     """The stream file; a case, if something failed."""
-    header: dict[str, Any] = {"version": importlib.metadata.version("mirotwin")}
-    if image.sha256:
-        header["firmware_sha256"] = image.sha256
-    if failure is not None:
-        header["verdict"] = one_line(str(failure))
-    header["end_tick"] = end_tick
-    if failure is not None:
-        header["expect"] = {failure.check: True}
-    header["bare"] = msgspec.to_builtins(line)
-    text = tomli_w.dumps(header).rstrip("\n")
-    return stream.format_stream([stream.Entry(one) for one in script], stream_header.of_text(text))
+    expect = {} if failure is None else {"expect": {failure.check: True}}
+    more = {"end_tick": end_tick, **expect, "bare": msgspec.to_builtins(line)}
+    return stream_text(script, image, {}, str(failure or ""), more)
 
 
 def load_case_firmware(path: str, firmware: str | None) -> Image:

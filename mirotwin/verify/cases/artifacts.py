@@ -77,14 +77,13 @@ MOST_BYTES = 1 << 20
 """An image of 8 KB is a file of 23 KB."""
 
 
-def case_line(folder: str, own: bool, name: str = CASE) -> str:
-    """The command that gives the verdict of the case in `folder` again; `own`: with the robot's own firmware."""
-    return replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+def case_lines(folder: str, own: bool, name: str = CASE) -> tuple[str, str]:
+    """The commands that give the verdict of the case in `folder` again, and that stand at the check that failed.
 
-
-def case_debug_line(folder: str, own: bool, name: str = CASE) -> str:
-    """The command that stands at the failed check of that case."""
-    return debug_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+    `own`: with the robot's own firmware.
+    """
+    case, image = f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}"
+    return replay_line(case, image), debug_line(case, image)
 
 
 def report_line(folder: str) -> str:

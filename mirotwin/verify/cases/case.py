@@ -29,6 +29,7 @@ from miro_exact.bad_input import one_line
 from miro_protocol import files, stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN
+from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.world import World
@@ -74,23 +75,27 @@ SUFFIX = ".stream"
 
 def case_text(world: World, trace: Trace, expect: Mapping[str, Any], verdict: str) -> str:
     """The case of `world` as it is now. `expect`: the check that failed, as in `[expect]`; `verdict`: what it said."""
+    more = {"end_tick": world.tick, "expect": dict(expect), "scenario": tables_of(world.scenario)}
+    return stream_text(trace.script(), world.image, {"seed": world.seed}, verdict, more)
+
+
+def stream_text(
+    script: Sequence[ScriptItem],
+    image: Image,
+    first: Mapping[str, Any],
+    verdict: str,
+    more: Mapping[str, Any],
+) -> str:
+    """A stream file with these keys in its header: `first`, what is known of the image, the verdict, and `more`."""
     from importlib.metadata import version  # slow to import
 
-    header: dict[str, Any] = {"version": version("mirotwin"), "seed": world.seed}
-    if world.image.sha256:  # else it comes from no file
-        header["firmware_sha256"] = world.image.sha256
+    header: dict[str, Any] = {"version": version("mirotwin"), **first}
+    if image.sha256:  # else it comes from no file
+        header["firmware_sha256"] = image.sha256
     if verdict:
         header["verdict"] = one_line(verdict)
-    header["end_tick"] = world.tick
-    header["expect"] = dict(expect)
-    header["scenario"] = tables_of(world.scenario)
-    return stream.format_stream(
-        _in_order(trace.script()), stream_header.of_text(tomli_w.dumps(header).rstrip("\n"))
-    )
-
-
-def _in_order(happened: Sequence[ScriptItem]) -> Sequence[stream.Entry]:
-    return [stream.Entry(one) for one in happened]
+    text = tomli_w.dumps({**header, **more}).rstrip("\n")
+    return stream.format_stream([stream.Entry(one) for one in script], stream_header.of_text(text))
 
 
 def tables_of(scenario: Scenario) -> dict[str, Any]:

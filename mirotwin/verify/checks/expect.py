@@ -16,14 +16,45 @@ from typing import Any, cast
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_host.plugins import PluginError
+from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks.interface import Check, problem_of_class
-from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
+
+ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
+
+CHECKS: Registry[object] = Registry(
+    "mirotwin.checks",
+    word="check",
+    key="check",
+    base="mirotwin.verify.checks.interface:Check",
+    own={
+        "no_fault": "mirotwin.verify.checks.faults:NoFault",
+        "lm629_protocol": "mirotwin.verify.checks.faults:Lm629Protocol",
+        "main_loop_alive": "mirotwin.verify.checks.faults:MainLoopAlive",
+        "stack_clear": "mirotwin.verify.checks.faults:StackClear",
+        "acts_at_all": "mirotwin.verify.checks.alive:ActsAtAll",
+        "failsafe_stop_ms": "mirotwin.verify.checks.failsafe:FailsafeStop",
+        "motors_off_ms": "mirotwin.verify.checks.failsafe:MotorsOff",
+        "moves_only_when_fresh": "mirotwin.verify.checks.reception:MovesOnlyWhenFresh",
+        "accepts_only_sent": "mirotwin.verify.checks.reception:AcceptsOnlySent",
+        "acts_within_ms": "mirotwin.verify.checks.reception:ActsWithin",
+        "back_in_sync_within_ms": "mirotwin.verify.checks.reception:BackInSync",
+        "frames_accepted_min": "mirotwin.verify.checks.reception:FramesAccepted",
+        "answers_within_ms": "mirotwin.verify.checks.answers:AnswersWithin",
+        "answers_only_in_turn": "mirotwin.verify.checks.answers:AnswersOnlyInTurn",
+        "happens": "mirotwin.verify.checks.happens:Happens",
+        "never_happens": "mirotwin.verify.checks.happens:NeverHappens",
+        "wheels_within_m_s": "mirotwin.verify.checks.wheels:WheelsWithin",
+        "tracks_within_cm": "mirotwin.verify.checks.course:TracksWithin",
+        "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
+        "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
+        "conforms_to": "mirotwin.verify.conform.rule_monitor:ConformsTo",
+    },
+)
+"""By name; none is imported before it is named."""
 
 EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 """What a message writes for a parameter without a default."""
@@ -39,13 +70,12 @@ def struct_of(name: str) -> type[Check]:
 
 def expectations_of(scenario: Scenario, origin: str) -> dict[RobotId, list[Check]]:
     """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
-    end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
-    for_all = checks_of_table(scenario, origin, "expect", scenario.expect, end_tick)
+    for_all = checks_of_table(scenario, origin, "expect", scenario.expect)
     found: dict[RobotId, list[Check]] = {}
     for index, network in enumerate(scenario.networks):
         for at, robot in enumerate(network.robot):
             path = f"network[{index}].robot[{at}].expect"
-            own = checks_of_table(scenario, origin, path, robot.expect, end_tick)
+            own = checks_of_table(scenario, origin, path, robot.expect)
             wanted = {**{name: struct_of(name)() for name in ALWAYS_ON}, **for_all, **own}
             found[index, robot.slot] = [check for check in wanted.values() if check is not None]
     return found
@@ -57,7 +87,7 @@ def says_anything(scenario: Scenario) -> bool:
 
 
 def checks_of_table(
-    scenario: Scenario, origin: str, path: str, table: Mapping[str, Any], end_tick: int
+    scenario: Scenario, origin: str, path: str, table: Mapping[str, Any]
 ) -> dict[str, Check | None]:
     """The checks of one table at `path`; None for one that is not expected. Raises ScenarioError."""
     found: dict[str, Check | None] = {}
@@ -70,7 +100,7 @@ def checks_of_table(
         if problem := problem_of_class(struct):
             raise ScenarioError(origin, place, problem, "repair the check")
         found[name] = check = _check(scenario, origin, place, struct, name, value)
-        problem = "" if check is None else _problem(check, origin, place, end_tick)
+        problem = "" if check is None else _problem(check, origin, place, scenario.end_tick)
         if problem:
             raise ScenarioError(origin, place, problem, "give an earlier time, or a longer duration_s")
     return found

@@ -6,11 +6,17 @@ from typing import Literal
 
 import msgspec
 
+from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.orders import WheelOrders
 from miro_sim.world.events import SIDES, Event
 
 _LOW_BITS = 56
 _WHATS: tuple[Literal["off", "stop", "drive"], ...] = ("off", "stop", "drive")
+
+
+def saturated(word: int) -> int:
+    """A velocity as firmware cuts it off."""
+    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
 
 
 class Order(msgspec.Struct, frozen=True):

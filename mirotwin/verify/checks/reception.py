@@ -11,12 +11,11 @@ from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, TeamFrame
 from miro_protocol.robot_rules import NO_WORD, DrivingRule, OriginRule
-from miro_protocol.table import VELOCITY_SATURATION
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
-from mirotwin.verify.checks.orders import Orders
+from mirotwin.verify.checks.orders import Orders, saturated
 
 WithinMs = Annotated[float, Meta(gt=0.0, le=60_000.0)]
 Words = tuple[int, int]
@@ -253,7 +252,3 @@ def words_of(frame: Received, subject: Subject) -> Words | None:
         return None
     left, right = message.velocities[subject.slot]
     return saturated(left), saturated(right)
-
-
-def saturated(word: int) -> int:
-    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))

@@ -41,8 +41,7 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
     IMAGE_FILES,
-    case_debug_line,
-    case_line,
+    case_lines,
     leave_image,
     report_line,
 )
@@ -281,8 +280,8 @@ def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:
     names = [name for outcome in outcomes for name, _ in outcome.cases]
     own = not (artifacts / FIRMWARE).exists()
     for name in names:
-        show_line(case_line(f"{artifacts}", own, name))
-        show_line(case_debug_line(f"{artifacts}", own, name))
+        for line in case_lines(f"{artifacts}", own, name):
+            show_line(line)
     if names:
         show_line(report_line(f"{artifacts / names[0]}"))
 

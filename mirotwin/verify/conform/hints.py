@@ -11,7 +11,7 @@ from miro_protocol.decoder import TelemetryDecoder
 from miro_protocol.events import Damaged
 from miro_protocol.table import SEQ_MODULUS, SYNC, TELEMETRY, TICKS_PER_MS, VELOCITY_SATURATION, FrameType
 from miro_protocol.transmission import follows
-from mirotwin.verify.checks.orders import Order
+from mirotwin.verify.checks.orders import Order, saturated
 from mirotwin.verify.conform.sealing import mistake_in
 
 if TYPE_CHECKING:
@@ -37,10 +37,6 @@ def in_words(order: Order) -> str:
     return number(order.word)
 
 
-def cut_off(word: int) -> int:
-    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
-
-
 def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
     """The one mistake that makes both orders of this frame; or ""."""
     found = (told[0].velocity, told[1].velocity)
@@ -50,7 +46,7 @@ def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
     if at_limit or any(order.what != "drive" for order in told) or found == wanted:
         return ""
     for what, pair in _mistakes(frame, slot):
-        for one, other in (pair, (cut_off(pair[0]), cut_off(pair[1]))):
+        for one, other in (pair, (saturated(pair[0]), saturated(pair[1]))):
             if (one << 8, other << 8) == found:
                 return what
     for shift in _SHIFTS:

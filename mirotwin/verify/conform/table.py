@@ -13,7 +13,6 @@ from mirotwin.verify.conform.rules import (
     driving,
     failsafe,
     fresh,
-    long,
     reception,
     service,
     sound,
@@ -30,10 +29,10 @@ CHAPTERS: tuple[Chapter, ...] = (
     sound.CHAPTER,
     chips.CHAPTER,
     boot.STRAPS,
-    long.CHAPTER,
+    sound.LONG,
 )
 ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
-LONG: tuple[Rule, ...] = tuple(long.CHAPTER.rules)
+LONG: tuple[Rule, ...] = tuple(sound.LONG.rules)
 RULES: tuple[Rule, ...] = tuple(rule for rule in ALL if rule not in LONG)
 """Those that are tried unless others are asked for."""
 _BY_ID = {rule.id: rule for rule in ALL}

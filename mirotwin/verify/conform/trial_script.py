@@ -31,10 +31,10 @@ from miro_protocol.table import (
 )
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_NAME
-from mirotwin.verify.checks.orders import Order
+from miro_sim.periods import Axis
+from mirotwin.verify.checks.orders import Order, saturated
 from mirotwin.verify.conform.hints import (
     characters,
-    cut_off,
     in_a_row,
     in_words,
     no_answer,
@@ -75,7 +75,7 @@ class Frame:
     def for_robot(self, slot: int) -> tuple[int, int]:
         """The velocities of a robot, as it has to cut them off."""
         left, right = self.words[slot]
-        return cut_off(left), cut_off(right)
+        return saturated(left), saturated(right)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,10 +166,10 @@ class TrialScript:
         pairs[slot] = (left, right)
         return tuple(pairs)
 
-    def ask(self, slot: int, what: str = "", **how: Unpack[How]) -> Frame:
+    def ask(self, slot: int, what: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
         """A question to the robot in `slot`, with the next number that asks it."""
         step = asking_step(self.seq, slot, self.n)
-        return self.team(ask=True, step=step, what=what or f"question to robot {slot}", **how)
+        return self.team(words, ask=True, step=step, what=what or f"question to robot {slot}", **how)
 
     def service(self, slot: int, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:
         payload = (bytes([slot, opcode]) + data).ljust(self.form.payload_size, b"\0")
@@ -310,6 +310,19 @@ class TrialScript:
             return None
 
         self.expect(until, f"{frame.what} not acted on", test, slots)
+
+    def chips_keep(
+        self, after_tick: int, until_tick: int, wanted: str, wrong: Callable[[str, Axis], str]
+    ) -> None:
+        """`wrong` says nothing of a chip, by its side and state at the start of each control period in between."""
+
+        def test(observed: Observed) -> Found:
+            for tick, side, chip in observed.chips(after_tick, until_tick):
+                if found := wrong(side, chip):
+                    return tick, found
+            return None
+
+        self.expect(until_tick, wanted, test)
 
     def answered(
         self,

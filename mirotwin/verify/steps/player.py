@@ -20,15 +20,15 @@ from typing import Protocol
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
+from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.world.conditions import Answer, Condition, WheelSpeeds, When, answer_fields, speeds_of
+from miro_sim.world.conditions import Answer, Condition, Reached, WheelSpeeds, When, answer_fields, speeds_of
 from miro_sim.world.events import Event
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step
-from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.sender import Host
 
 
@@ -255,3 +255,17 @@ def player_of(world: World, steps: Sequence[Step], origin: str) -> Player | None
     """The player of these steps; None where there are none. Raises ScenarioError for a symbol that is unknown."""
     check_symbols(steps, world.image, origin)
     return Player(world, steps, origin) if steps else None
+
+
+def check_symbols(steps: Sequence[Step], image: Image, origin: str) -> None:
+    """Raises ScenarioError for a step that waits for a symbol which the image does not have."""
+    for step in steps:
+        condition = getattr(step, "condition", None)
+        if not isinstance(condition, Reached) or condition.symbol is None:
+            continue
+        place = f"step {step.number}.symbol"
+        symbol = image.symbols.find(condition.symbol)
+        if symbol is None or symbol.space != "code":
+            what = "is no symbol of" if symbol is None else "is not in code memory:"
+            remedy = "C names are those of functions that are not static; `mirotwin fw disasm` shows them"
+            raise ScenarioError(origin, place, f"{condition.symbol!r} {what} {image.path}", remedy)

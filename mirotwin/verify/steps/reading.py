@@ -18,7 +18,7 @@ from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Heard, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table, expectations_of
-from mirotwin.verify.steps import plan
+from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.steps.keys import (
     PLAIN,
     VERBS,
@@ -26,6 +26,7 @@ from mirotwin.verify.steps.keys import (
     HoldStep,
     NeverStep,
     PauseMs,
+    SaveStep,
     SendStep,
     Step,
     WaitStep,
@@ -47,7 +48,7 @@ _TIMES_OF = {
 def steps_of(scenario: Scenario, origin: str) -> list[Step]:
     """The steps of a scenario, of which each can be done in its run. Raises ScenarioError with the place."""
     steps = [_Table(scenario, origin, index, table).step() for index, table in enumerate(scenario.step)]
-    plan.check_order(steps, scenario, origin)
+    check_order(steps, scenario, origin)
     return steps
 
 
@@ -55,6 +56,38 @@ def everything(scenario: Scenario, origin: str) -> None:
     """What a scenario says to checks and in steps: raises ScenarioError for what cannot be meant."""
     expectations_of(scenario, origin)
     steps_of(scenario, origin)
+
+
+def problem(step: Step, scenario: Scenario) -> str:
+    """Why this step cannot be done in this scenario, as `key: what; remedy`, or the empty string."""
+    networks = scenario.networks
+    if step.network >= len(networks):
+        there = "there is one" if len(networks) == 1 else f"there are {len(networks)}, from 0 on"
+        return f"network: there is no network {step.network}; {there}"
+    return step.problem(networks[step.network])
+
+
+def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
+    """Raises ScenarioError for what the steps together make impossible.
+
+    That is the first step for which the run is too short, if all waits took no time at all, and a file that is saved
+    twice.
+    """
+    end, begins = scenario.end_tick, 0
+    saved: dict[str, int] = {}
+    for step in steps:
+        place = f"step {step.number}"
+        last = begins + step.needs_ticks()
+        if begins >= end or last > end:
+            goes = f" and goes on to {in_ms(last)}" if last > begins else ""
+            what = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
+            raise ScenarioError(origin, place, what, "give a longer duration_s, or shorter times")
+        begins += step.lasts_ticks()
+        if isinstance(step, SaveStep):
+            if step.save in saved:
+                what = f"step {saved[step.save]} saves {step.save}, too"
+                raise ScenarioError(origin, f"{place}.save", what, "give each its own name")
+            saved[step.save] = step.number
 
 
 class _Table:
@@ -78,7 +111,7 @@ class _Table:
                 "", f"has both {verbs[0]} and {verbs[1]}", "one action or one wait a step: make two of it"
             )
         step = self._step(verbs[0])
-        what, _, remedy = plan.problem(step, self.scenario).partition("; ")
+        what, _, remedy = problem(step, self.scenario).partition("; ")
         if what:
             key, _, rest = what.partition(": ")
             self.refuse(key if rest else "", rest or what, remedy)
@@ -165,9 +198,8 @@ class _Table:
 
     def with_checks(self, step: CheckStep) -> CheckStep:
         """The checks of a step's table, in the words of `[expect]`."""
-        end_tick = plan.end_tick(self.scenario)
         place = f"step {self.index + 1}.check"
-        made = checks_of_table(self.scenario, self.origin, place, step.check, end_tick)
+        made = checks_of_table(self.scenario, self.origin, place, step.check)
         return msgspec.structs.replace(
             step, checks=tuple(check for check in made.values() if check is not None)
         )

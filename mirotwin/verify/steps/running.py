@@ -24,17 +24,14 @@ from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.expectations import told
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
-from mirotwin.verify.steps.plan import check_symbols
-from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.player import Player, check_symbols
 from mirotwin.verify.steps.reading import everything, steps_of
 
 Verdict = Literal["passed", "failed", "fault", "error", "not observable"]
 SCENARIO = "scenario.toml"
 """The whole scenario with all that was set, in the folder of a file that failed."""
-LINES = 5
-"""Failures of one check that are listed."""
 
 
 class Outcome(msgspec.Struct, frozen=True):
@@ -152,16 +149,9 @@ def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str,
     ]
     if player.failure is not None:
         lines.append(f"step failed: {player.failure}")
-    notes = []
-    for group in (checks, *player.checks):
-        for verdict in group.verdicts():
-            if verdict.verdict == "not judged" and verdict.name not in ALWAYS_ON:
-                notes.append(f"expectation not judged: {verdict.name}: the run had no occasion for it")
-            found = [one for one in group.failures if one.check == verdict.name and not one.fault]
-            lines += [f"expectation failed: {failure}" for failure in found[:LINES]]
-            if found and verdict.failures > LINES:
-                lines.append(f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times")
-    return tuple(lines), tuple(notes)
+    found = [one for group in (checks, *player.checks) for one in told(group)]
+    lines += [line for failed, line in found if failed]
+    return tuple(lines), tuple(line for failed, line in found if not failed)
 
 
 def stem_of(path: str) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, ticks
 from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
 from miro_host.integrator import Integration
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
@@ -164,6 +164,15 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                 f"network: {len(self.networks)} networks, each of which takes as much time as a run;"
                 f" at most {MAX_NETWORKS}, make several scenarios of them"
             )
+
+    @property
+    def periods(self) -> int:
+        """Control periods of a run, which ends by itself with the one in which its duration does."""
+        return max(1, -(-ticks(self.duration_s) // CONTROL_PERIOD_TICKS))
+
+    @property
+    def end_tick(self) -> int:
+        return self.periods * CONTROL_PERIOD_TICKS
 
 
 def without_expectations(scenario: Scenario) -> Scenario:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_exact.domain import MAX_SEED
 from miro_exact.state import TICK, Flat, Octets
 from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
@@ -98,7 +98,7 @@ class World:
         self.scenario = scenario
         self.seed = seed
         self.image = image
-        self.periods = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS))
+        self.periods = scenario.periods
         self.networks = [
             Network(
                 network,

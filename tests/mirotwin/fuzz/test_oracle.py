@@ -11,7 +11,7 @@ from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import TargetFailure, target_for
 from mirotwin.fuzz.triage import Triage
-from mirotwin.verify.checks.registry import CHECKS
+from mirotwin.verify.checks.expect import CHECKS
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from miro_sim.scenario.file import builtin_text, parse
 from mirotwin.commands import main
 from mirotwin.shell.program import MainGroup
-from mirotwin.verify.checks.registry import CHECKS
+from mirotwin.verify.checks.expect import CHECKS
 
 
 def mirotwin(*arguments):

@@ -4,7 +4,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from mirotwin.testing.rig import Rig
-from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.rig_options import marker_options, rig_options
 from tests.mirotwin.testing.rigs import HERE
 

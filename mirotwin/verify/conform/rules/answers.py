@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import partial
 
 from miro_exact.clock import TICKS_PER_SECOND
-from miro_protocol.frames import asking_step
 from miro_protocol.table import (
     BITS_PER_CHARACTER,
     ROBOT_BIT_TICKS,
@@ -268,18 +267,11 @@ def positions(script: TrialScript) -> None:
         script.team(script.same(slot, 13000, -12000), gap_ms=50.0)
     _says(script, "the real positions", _positions)
     for _ in range(_AT_SPEED):
-        question = script.team(
-            script.same(slot, 13000, -12000),
-            ask=True,
-            step=asking_step(script.seq, slot, script.n),
-            what="question at speed",
-            gap_ms=36.0,
-        )
+        question = script.ask(slot, "question at speed", script.same(slot, 13000, -12000), gap_ms=36.0)
         script.answered(
             question, slot, f"positions of one sample each in the answer to {question.what}", _read_at_once
         )
-    script.team(script.same(slot, 0, 0), gap_ms=60.0)
-    for _ in range(6):
+    for _ in range(7):
         script.team(script.same(slot, 0, 0), gap_ms=60.0)
     _stands(script, slot)
     _run_away(script)
@@ -287,13 +279,7 @@ def positions(script: TrialScript) -> None:
 
 
 def _stands(script: TrialScript, slot: int) -> None:
-    question = script.team(
-        script.same(slot, 0, 0),
-        ask=True,
-        step=asking_step(script.seq, slot, script.n),
-        what=f"question to robot {slot}",
-        gap_ms=70.0,
-    )
+    question = script.ask(slot, words=script.same(slot, 0, 0), gap_ms=70.0)
     script.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
 
 

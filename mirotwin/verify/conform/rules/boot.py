@@ -6,6 +6,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import MOTOR_OFF
+from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
@@ -45,11 +46,8 @@ def reset_together(script: TrialScript) -> None:
     script.obeyed(first)
     end = script.now
 
-    def shown(observed: Observed) -> Found:
-        for tick, side, chip in observed.chips(ms(BOOTED_MS), first.tick):
-            if chip.status not in (0x80, 0xC0):
-                return tick, f"{chip.status:02X}h of the {side} one"
-        return None
+    def shown(side: str, chip: Axis) -> str:
+        return f"{chip.status:02X}h of the {side} one" if chip.status not in (0x80, 0xC0) else ""
 
     def alone(observed: Observed) -> Found:
         resets = [(one.tick, one.side) for one in observed.commands if one.opcode == _RESET]
@@ -72,7 +70,8 @@ def reset_together(script: TrialScript) -> None:
                 return tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
         return None
 
-    script.expect(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
+    up = ms(BOOTED_MS)
+    script.chips_keep(up, first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
     script.expect(first.tick, "RSTI 0000h", other_mask)
     script.expect(end, "RESET sent to both LM629 or none", alone)
     script.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
@@ -99,16 +98,13 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
                 return order.tick, f"the {order.side} one told {in_words(order)}"
         return None
 
-    def driven(observed: Observed) -> Found:
-        for tick, side, chip in observed.chips(after_tick + ms(BOOTED_MS), until_tick):
-            if chip.pwm_magnitude:
-                return tick, f"the {side} one driven"
-            if not chip.status & MOTOR_OFF:
-                return tick, f"status {chip.status:02X}h of the {side} LM629"
-        return None
+    def driven(side: str, chip: Axis) -> str:
+        if chip.pwm_magnitude:
+            return f"the {side} one driven"
+        return "" if chip.status & MOTOR_OFF else f"status {chip.status:02X}h of the {side} LM629"
 
     script.expect(until_tick, "both motors off", ordered)
-    script.expect(until_tick, "both motors off", driven)
+    script.chips_keep(after_tick + ms(BOOTED_MS), until_tick, "both motors off", driven)
 
 
 @STRAPS.rule(

@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
+from miro_sim.periods import Axis
 from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
 from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.trial_script import Found, TrialScript
+from mirotwin.verify.conform.trial_script import TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01
@@ -71,15 +72,11 @@ def _tells_of_them(script: TrialScript) -> None:
     for _ in range(2):
         script.wait(520.0)
         script.answered(script.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
-    end = script.now
 
-    def driven(observed: Observed) -> Found:
-        for tick, side, chip in observed.chips(0, end):
-            if chip.pwm_magnitude:
-                return tick, f"the {side} one driven"
-        return None
+    def driven(side: str, chip: Axis) -> str:
+        return f"the {side} one driven" if chip.pwm_magnitude else ""
 
-    script.expect(end, "both motors off", driven)
+    script.chips_keep(0, script.now, "both motors off", driven)
 
 
 def _free(answer: Answer, observed: Observed) -> str:

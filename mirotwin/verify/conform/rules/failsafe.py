@@ -14,6 +14,7 @@ from miro_protocol.table import (
 )
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
+from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
@@ -160,14 +161,10 @@ def off(script: TrialScript) -> None:
     off_behind(script, last)
     script.wait_until(last.end_tick + ms(700.0))
 
-    def driven(observed: Observed) -> Found:
-        for tick, side, chip in observed.chips(last.end_tick + ms(501.0), script_end):
-            if chip.pwm_magnitude or not chip.status & MOTOR_OFF:
-                return tick, f"the {side} one on"
-        return None
+    def driven(side: str, chip: Axis) -> str:
+        return f"the {side} one on" if chip.pwm_magnitude or not chip.status & MOTOR_OFF else ""
 
-    script_end = script.now
-    script.expect(script_end, "both motors off", driven)
+    script.chips_keep(last.end_tick + ms(501.0), script.now, "both motors off", driven)
 
 
 @CHAPTER.rule(

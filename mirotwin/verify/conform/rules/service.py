@@ -61,7 +61,9 @@ def filter_words(script: TrialScript) -> None:
     script.obeyed(script.team())
 
 
-def _filter_taken(script: TrialScript, frame: Frame, words: Words) -> None:
+def _filter_taken(
+    script: TrialScript, frame: Frame, words: Words, wanted: str = "", slots: tuple[int, ...] = ()
+) -> None:
     deadline = frame.end_tick + ACTING_TICKS
 
     def test(observed: Observed) -> Found:
@@ -71,7 +73,8 @@ def _filter_taken(script: TrialScript, frame: Frame, words: Words) -> None:
                 return deadline, f"{_listed(found)} in the {side} one"
         return None
 
-    script.expect(deadline, f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}", test)
+    wanted = wanted or f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}"
+    script.expect(deadline, wanted, test, slots)
 
 
 def _listed(words: Words | None) -> str:
@@ -163,24 +166,11 @@ def addressed(script: TrialScript) -> None:
             frame = script.service(slot, opcode, data, f"service frame to robot {slot}, opcode {opcode}")
             script.untouched(frame, others)
             if opcode == Opcode.FILTER:
-                _only_of(script, frame, slot, words)
+                _filter_taken(script, frame, words, f"{_listed(words)} in force after {frame.what}", (slot,))
     script.obeyed(script.team())
     absent = script.n - 2
     if absent not in script.topology.slots:
         script.untouched(script.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
-
-
-def _only_of(script: TrialScript, frame: Frame, slot: int, words: Words) -> None:
-    deadline = frame.end_tick + ACTING_TICKS
-
-    def test(observed: Observed) -> Found:
-        for side in SIDES:
-            found = observed.set_to(side, deadline)
-            if found != words:
-                return deadline, f"{_listed(found)} in the {side} one"
-        return None
-
-    script.expect(deadline, f"{_listed(words)} in force after {frame.what}", test, (slot,))
 
 
 @CHAPTER.rule(

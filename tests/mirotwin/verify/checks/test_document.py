@@ -7,8 +7,7 @@ import pytest
 
 from miro_sim.scenario.file import parse
 from miro_sim.world.conditions import Fault
-from mirotwin.verify.checks.expect import expectations_of, struct_of
-from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
+from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, expectations_of, struct_of
 
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "mirotwin/verify/checks/README.md").read_text(encoding="utf-8")

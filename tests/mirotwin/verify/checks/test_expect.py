@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import load, parse
-from mirotwin.verify.checks.expect import expectations_of, says_anything, struct_of
-from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
+from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, expectations_of, says_anything, struct_of
 from tests.host.distribution import install
 
 TWO = """
