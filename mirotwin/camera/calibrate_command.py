@@ -35,7 +35,6 @@ from mirotwin.shell.options import (
     Engine,
     FiniteNumber,
     ScenarioName,
-    choose_engine,
 )
 from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
 from mirotwin.shell.program import tell_notes
@@ -131,7 +130,6 @@ def calibrate(options: CalibrateOptions) -> None:
 
     Prints what remains between measured and drawn pixels. `track` takes the files of --out and --colours-out.
     """
-    choose_engine(options.engine)
     points, scenario, samples = options.points, options.scenario, options.samples
     if points is None and scenario is None:
         raise click.UsageError("Give either --points or --scenario.")

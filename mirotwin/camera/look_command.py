@@ -22,7 +22,6 @@ from mirotwin.shell.options import (
     ScenarioArgument,
     Seed,
     Settings,
-    choose_engine,
     plain_parameters,
     refuse_steps,
 )
@@ -57,7 +56,6 @@ def look(options: LookOptions) -> int:
     measured posture as an arrow, its number and the confidence (1: as expected, 0: nearly refused). Lost robots are
     named.
     """
-    choose_engine(options.engine)
     scenario, seed, network, at = options.scenario, options.seed, options.network, options.at
     text = load(scenario, options.settings)
     tell_notes(text.notes)

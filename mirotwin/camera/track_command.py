@@ -17,7 +17,7 @@ from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.tracker import CentroidKind, Sighting, Tracker
 from mirotwin.shell.command import Argument, Option, Options, Word, command_of
-from mirotwin.shell.options import JSON, NETWORK, PATH, Engine, choose_engine
+from mirotwin.shell.options import JSON, NETWORK, PATH, Engine
 from mirotwin.shell.program import complain, show_line
 
 _DEGREES = 57.29577951308232
@@ -93,7 +93,6 @@ def track(options: TrackOptions) -> None:
         mirotwin camera calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
         mirotwin camera track frames --calibration camera.toml --colours colours.toml --numbers 0
     """
-    choose_engine(options.engine)
     robots, as_json = options.numbers or DEFAULT_NUMBERS, options.as_json
     tracker = _tracker(options, robots)
     from mirotwin.camera.stills import stills  # loads the pictures' library

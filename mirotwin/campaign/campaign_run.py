@@ -20,7 +20,7 @@ from mirotwin.campaign.running import Tally
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine, choose_engine
+from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
 from mirotwin.shell.outputs import told_when_full
 from mirotwin.shell.program import (
     BAD_INPUT,
@@ -69,7 +69,6 @@ def run(options: CampaignOptions) -> int:
     Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
     a check. The rows say which.
     """
-    choose_engine(options.engine)
     require_arrow()
     plan = load_plan(options.file, (*options.settings, *as_settings(options.expected)))
     tell_notes(plan.notes)

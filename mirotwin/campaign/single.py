@@ -76,7 +76,7 @@ def _run(job: Work) -> RunOutcome:
         _move(world, player, tracks, recorder)
     wall_s = now_s() - began_s
     checks.finish()
-    summary = summarise(world, tracks, job.engine, wall_s)
+    summary = summarise(world, tracks, wall_s)
     verdicts = _verdicts(checks, player)
     failure = _failure(checks, player)
     return RunOutcome(

@@ -21,7 +21,7 @@ from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, debugged_image, load_images
-from mirotwin.shell.options import AT, RESUME, choose_engine
+from mirotwin.shell.options import AT, RESUME
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
 from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
@@ -127,8 +127,7 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | N
         return None, None
     if is_bare_case(path):
         return _bare_case(options)
-    choose_engine(options.engine)
-    job = load_job(path, options.firmware, options.engine, options.settings)
+    job = load_job(path, options.firmware, options.settings)
     if not job.case.verdict:
         return None, None
     world = job.world_of()
@@ -136,7 +135,6 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | N
 
 
 def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
-    choose_engine(options.engine)
     path = options.subject
     image = load_case_firmware(path, options.firmware)
     again, verdict = rerun_bare_case(path, image, options.check)

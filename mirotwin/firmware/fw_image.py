@@ -20,7 +20,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, sources_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
-from mirotwin.shell.options import FORCE, NAME, OUT, SEED, Engine, Whole, choose_engine
+from mirotwin.shell.options import FORCE, NAME, OUT, SEED, Engine, Whole
 from mirotwin.shell.outputs import OutputFolder, check_new, whole_file
 from mirotwin.shell.program import show_line
 from mirotwin.shell.progress import ProgressBar
@@ -40,7 +40,6 @@ def disasm(options: DisasmOptions) -> None:
     Symbols come from the .map and .cdb beside the image, C lines from its .rst or .cdb; without them addresses stand
     for both.
     """
-    choose_engine(None)
     loaded = load_firmware(options.image, SPACE_BYTES)
 
     names = SymbolNames(loaded)
@@ -98,7 +97,6 @@ def vectors(options: VectorsOptions) -> None:
     them. tests/vectors/README.md describes the format.
     """
     folder = OutputFolder(options.out, options.force, NAMES)
-    choose_engine(options.engine)
 
     with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):

@@ -17,7 +17,7 @@ from mirotwin.firmware.bare_options import (
 )
 from mirotwin.firmware.terminal import check_terminal, run_terminal
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.options import NAME, PATH, Engine, choose_engine
+from mirotwin.shell.options import NAME, PATH, Engine
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.progress import ProgressBar
 
@@ -64,7 +64,6 @@ def run(options: FwRunOptions) -> int:
         check_not_input(dump, "--dump", image, *options.more, *bare.files)
     if options.terminal:
         check_terminal(bare)
-    choose_engine(options.engine)
     loaded = load_bare_image(image, bare, named=False)
     for one in options.more:
         loaded = loaded.merged(load_bare_image(one, bare, named=False))

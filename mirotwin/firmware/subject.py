@@ -34,7 +34,6 @@ from mirotwin.shell.options import (
     SLOT,
     TO,
     Engine,
-    choose_engine,
     plain_parameters,
     refuse_steps,
 )
@@ -143,7 +142,6 @@ def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
 
 def _bare_run(options: SubjectOptions) -> BareRun:
     _refuse(options, "an image on the bare processor", "seed", "firmware", "settings", "network", "slot")
-    choose_engine(options.engine)
     image = load_bare_image(options.subject, options.bare)
     until = target_of(options.subject, image, options.bare)
 
@@ -157,7 +155,6 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
     periods = None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
-        choose_engine(options.engine)
         text = load(subject, options.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, subject)
@@ -166,7 +163,7 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
             world = World(text.scenario, options.seed or 0, image)
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
-        job = load_job(subject, options.firmware, options.engine, options.settings)
+        job = load_job(subject, options.firmware, options.settings)
         periods = job.recorded[-1].index + 1 if job.recorded else None
         with plain_parameters(subject):
             world = job.world_of()

@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 import click
 
+from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
@@ -30,7 +31,6 @@ from mirotwin.fuzz.triage import Crash, Triage
 from mirotwin.shell.command import command_of
 from mirotwin.shell.debug_files import sources_of
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import choose_engine
 from mirotwin.shell.program import Terminated, complain
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
@@ -56,7 +56,7 @@ def fuzz(options: FuzzOptions) -> int:
 
     Exit code 1: something was found and confirmed, or --covering was not reached.
     """
-    active = cast(Literal["compiled", "python"], choose_engine(options.engine))
+    active = cast(Literal["compiled", "python"], engines.active())
     firmware = load_bare_firmware(options.image) if options.bare else load_firmware(options.image)
     robots, slot = int(options.robots), options.slot
     if slot >= robots:

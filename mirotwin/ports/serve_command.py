@@ -29,7 +29,6 @@ from mirotwin.shell.options import (
     ScenarioArgument,
     Seed,
     Settings,
-    choose_engine,
     plain_parameters,
 )
 from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
@@ -85,8 +84,7 @@ def serve(options: ServeOptions) -> int:
 
     Exit code 1: a check failed; 3: the firmware did what it must not.
     """
-    active, seed = choose_engine(options.engine), options.seed
-    settings = (*options.settings, *as_settings(options.expected))
+    seed, settings = options.seed, (*options.settings, *as_settings(options.expected))
     text = live_scenario(options.scenario, settings, expectations_of)
     tell_notes(text.notes)
     default = Path("runs") / f"{text.scenario.name}-{seed}-live"
@@ -116,7 +114,7 @@ def serve(options: ServeOptions) -> int:
         session = Session(
             world, Pace(options.pace), selector, ports, tell, _end_tick(options.duration), options.once
         )
-        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, session=session)
+        run_files = RunFiles(folder, source, world, hold, checks, text.settings, session=session)
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
             if checks.failures:

@@ -18,7 +18,7 @@ from mirotwin.recording.capture.layout import Layouts, look
 from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.capture.source import READ_ERRORS, Source, open_source
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.options import JSON, NAME, QUIET, Engine, choose_engine
+from mirotwin.shell.options import JSON, NAME, QUIET, Engine
 from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -64,7 +64,6 @@ def decode(options: DecodeOptions) -> int:
     first bytes tell which, and the first line printed says so. Any bytes can be decoded. A capture that is cut
     short or damaged is reported with the offset, after everything before it, and the exit code is 2.
     """
-    choose_engine(options.engine)
     format, robots, direction = options.format, options.robots, options.direction
     with Input(options.file) as given:
         if format is None:

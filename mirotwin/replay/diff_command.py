@@ -29,7 +29,7 @@ from mirotwin.rerun.job import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
-from mirotwin.shell.options import ALL, NAME, QUIET, Engine, choose_engine
+from mirotwin.shell.options import ALL, NAME, QUIET, Engine
 from mirotwin.shell.outputs import file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 
@@ -60,7 +60,6 @@ def diff(options: DiffOptions) -> int:
 
     Exit code 4 when the recordings differ, 0 when they hold the same, whatever they were made from.
     """
-    choose_engine(options.engine)
     compare, sources = options.compare, checked_sources(options.sources)
     a, b = file_in(options.a), file_in(options.b)
     recordings = _read(a), _read(b)

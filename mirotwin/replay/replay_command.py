@@ -40,7 +40,6 @@ from mirotwin.shell.options import (
     SET,
     Engine,
     StackFrom,
-    choose_engine,
 )
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
@@ -147,13 +146,12 @@ def replay(options: ReplayOptions) -> int:
     file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
     if is_bare_case(file):
         _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
-        choose_engine(options.engine)
         return replay_bare_case(file, options.firmware, options.check, options.quiet)
     _refuse(file, "is for a case of a bare processor", options.given("check"))
     settings = (*options.settings, *as_settings(options.expected))
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job = load_job(file, options.firmware, options.engine, settings, options.seed, options.stack_from)
+    job = load_job(file, options.firmware, settings, options.seed, options.stack_from)
     if not job.recorded and not options.desk.port:
         _refuse(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
@@ -168,7 +166,7 @@ def replay(options: ReplayOptions) -> int:
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
         file = str(record_at_port(job, desk, options.out, options.force, options.quiet))
-        job = load_job(file, None, options.engine)
+        job = load_job(file, None)
     if job.origin:
         from mirotwin.replay.replay_port import compare_with_twin
 

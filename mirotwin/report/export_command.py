@@ -20,7 +20,7 @@ from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.decode_command import FORMAT
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine, choose_engine
+from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 from mirotwin.shell.progress import ProgressBar
@@ -133,7 +133,6 @@ def export(options: ExportOptions) -> int:
     if out != STDIN:
         check_new(Path(out), "--out", options.force)
         check_not_input(Path(out), "--out", options.file)
-    choose_engine(options.engine)
     to = options.target or DEFAULTS.get(Path(out).suffix, "pcapng")
     if to == "foxglove" and network is not None:
         raise click.UsageError("--network does not go with --as foxglove, which writes all networks.")

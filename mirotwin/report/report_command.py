@@ -61,7 +61,6 @@ def report(options: ReportOptions) -> int:
         frames=not options.no_frames,
         firmware=options.firmware,
         sources=tuple(checked_sources(options.sources)),
-        engine=options.engine,
         quiet=options.quiet,
     )
     made = page_of(wanted)

@@ -42,7 +42,6 @@ class PageSubject(msgspec.Struct, frozen=True):
     frames: bool
     firmware: str | None
     sources: Sequence[str]
-    engine: str | None
     quiet: bool
 
     @property
@@ -69,7 +68,7 @@ def page_of(wanted: PageSubject) -> bytes:
     if is_bare_case(file):
         what = "is a case of a bare processor, which has no robot to show"
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
-    job = load_job(file, wanted.firmware, wanted.engine)
+    job = load_job(file, wanted.firmware)
     if job.origin:
         return port_page(job, wanted.quiet)
     return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job))
@@ -78,7 +77,7 @@ def page_of(wanted: PageSubject) -> bytes:
 def page_of_failure(folder: str) -> bytes:
     """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
     require_bokeh()
-    return page_of(PageSubject(folder, 0, None, True, None, (), None, True))
+    return page_of(PageSubject(folder, 0, None, True, None, (), True))
 
 
 def _file_of(subject: str) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from miro_exact import engine
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import ErrorSample, Tracks
@@ -207,7 +208,7 @@ def settling_text(samples: Sequence[ErrorSample]) -> str:
     return f"settled at {settling_s:.2f} s"
 
 
-def summarise(world: World, tracks: Tracks, engine: str, wall_s: float, begin_tick: int = 0) -> Summary:
+def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) -> Summary:
     """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
     gains = gains_of(world.scenario)
     counters: Mapping[str, Mapping[str, Any]] = world.counters()
@@ -218,7 +219,7 @@ def summarise(world: World, tracks: Tracks, engine: str, wall_s: float, begin_ti
     return Summary(
         scenario=world.scenario.name,
         seed=world.seed,
-        engine=engine,
+        engine=engine.active(),
         digest=tracks.digest,
         simulated_s=seconds(world.tick),
         wall_s=wall_s,

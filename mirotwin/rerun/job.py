@@ -34,7 +34,7 @@ from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.shell.command import command_line, operand
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import choose_engine, plain_parameters
+from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
 from mirotwin.verify.cases.artifacts import image_beside
@@ -300,8 +300,7 @@ class Job(msgspec.Struct, frozen=True):
 
 def load_job(
     file: str,
-    firmware: str | None,
-    engine: str | None,
+    firmware: str | None = None,
     settings: Sequence[str] = (),
     seed: int | None = None,
     stack_from: int | None = None,
@@ -313,7 +312,6 @@ def load_job(
     """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
-    choose_engine(engine)
     if MAGIC.startswith(data[: len(MAGIC)]):
         recording = parse(data, file)
         if recording.broken_off:
@@ -336,11 +334,10 @@ def load_job(
     return _job_of_stream(given, file, settings, image, seed, case)
 
 
-def load_stream(file: str, engine: str | None, firmware: str | None) -> Job:
+def load_stream(file: str, firmware: str | None) -> Job:
     """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
     data = read_input(file)
-    choose_engine(engine)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     case = Case(given.header.verdict or "", given.header.end_tick or 0)

@@ -17,7 +17,7 @@ from mirotwin.run.run_stops import Stops
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
-from mirotwin.shell.options import choose_engine, plain_parameters
+from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
 from mirotwin.shell.program import tell_notes
 from mirotwin.shell.progress import ProgressBar
@@ -55,7 +55,7 @@ def run(options: RunOptions) -> int:
     Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
     not.
     """
-    active, seed, record = choose_engine(options.engine), options.seed, options.record
+    seed, record = options.seed, options.record
     text = load(options.scenario, (*options.settings, *as_settings(options.expected)), everything)
     tell_notes(text.notes)
     steps = steps_of(text.scenario, text.origin)
@@ -93,16 +93,7 @@ def run(options: RunOptions) -> int:
             saved.fill(views, hold)
         recorded = views if options.record_frames else []
         run_files = RunFiles(
-            folder,
-            source,
-            world,
-            active,
-            hold,
-            checks,
-            text.settings,
-            recorded,
-            player,
-            stops=stops,
+            folder, source, world, hold, checks, text.settings, recorded, player, stops=stops
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, options.quiet)
         summary = run_files.fill(bar, None if options.no_figure else text.scenario.title)

@@ -61,7 +61,6 @@ class RunFiles:
     folder: OutputFolder
     source: RunSource
     world: World
-    engine: str
     hold: Hold
     checks: Checks
     settings: tuple[str, ...] = ()
@@ -140,7 +139,7 @@ class RunFiles:
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick
         return replace(
-            summarise(self.world, self.tracks, self.engine, self._wall_s, begin_tick),
+            summarise(self.world, self.tracks, self._wall_s, begin_tick),
             complete=complete,
             reason=reason,
             set=self.settings,

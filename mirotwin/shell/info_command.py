@@ -10,7 +10,7 @@ from miro_exact import hot_modules
 from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.console import facts_table, show
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import FIRMWARE, Engine, choose_engine
+from mirotwin.shell.options import FIRMWARE, Engine
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
@@ -50,7 +50,7 @@ class InfoOptions(Options, frozen=True, kw_only=True):
 @command_of(InfoOptions)
 def info(options: InfoOptions) -> int:
     """Shows versions, the engine, and the firmware image with its hash."""
-    active = choose_engine(options.engine)
+    active = engines.active()
     broken = _broken_modules(active)
     image = load_firmware(options.firmware, named=False)
     table = facts_table(overflow="fold")

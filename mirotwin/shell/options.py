@@ -63,6 +63,15 @@ class PathType(click.Path):
         return super().convert(value, param, ctx)
 
 
+class EngineName(click.Choice):  # type: ignore[type-arg, unused-ignore]
+    """An engine: it has to be that of this process (`program.settle_engine`)."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        name = super().convert(value, param, ctx)
+        engines.select(name)
+        return name
+
+
 class ScenarioName(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """A built-in scenario, or a file; a shell completes the names of both."""
 
@@ -135,17 +144,10 @@ StackFrom = Annotated[
 Engine = Annotated[
     str | None,
     Option(
-        type=click.Choice(engines.ENGINES),
+        type=EngineName(engines.ENGINES),
         help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
     ),
 ]
-
-
-def choose_engine(engine: str | None) -> str:
-    """Refuses an engine that is not the one of this process (`program.settle_engine`); returns its name."""
-    if engine is not None:
-        engines.select(engine)
-    return engines.active()
 
 
 def refuse_steps(scenario: Scenario, origin: str) -> None:

@@ -19,9 +19,8 @@ from mirotwin.verify.steps.running import Outcome
 class CaseTests:
     """Runs cases on `firmware` (None: the robot's own). `checks`: those of --check; `unused`: those without a case."""
 
-    def __init__(self, firmware: str | None, engine: str | None, checks: Sequence[str]) -> None:
+    def __init__(self, firmware: str | None, checks: Sequence[str]) -> None:
         self.firmware = firmware
-        self.engine = engine
         self.checks = checks
         self.unused = set(checks)
 
@@ -42,7 +41,7 @@ class CaseTests:
         return next((text for text in self.checks if text.rpartition(":")[2] == name), None)
 
     def _run(self, path: str) -> Outcome:
-        job = load_stream(path, self.engine, self.firmware)
+        job = load_stream(path, self.firmware)
         again = rerun_job(job, job.case.end_tick or None)
         failure = again.failure
         lines: tuple[str, ...] = () if failure is None else (f"expectation failed: {failure}",)

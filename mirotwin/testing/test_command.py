@@ -24,7 +24,6 @@ from mirotwin.shell.options import (
     Engine,
     Firmware,
     Seed,
-    choose_engine,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
 from mirotwin.shell.program import (
@@ -121,7 +120,6 @@ def test(options: TestOptions) -> int:
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
     none. Where several apply: 2, then 3, then 1. 5: nothing was judged, because a port shows none of it.
     """
-    choose_engine(options.engine)
     word, junit, desk = options.word, options.junit, options.desk
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
@@ -148,7 +146,7 @@ def test(options: TestOptions) -> int:
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
     times_s: list[float] = []
-    cases = CaseTests(options.firmware, options.engine, options.checks)
+    cases = CaseTests(options.firmware, options.checks)
     lines = []
     for file in chosen:
         began_s = time.perf_counter()

@@ -45,7 +45,7 @@ def summary_of(run):
         tick=len(run) * CONTROL_PERIOD_TICKS,
         counters=lambda: COUNTERS,
     )
-    return summarise(world, Tracks(run), "compiled", 0.5)
+    return summarise(world, Tracks(run), 0.5)
 
 
 def samples(*errors):

@@ -33,7 +33,7 @@ from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.held_signals import Hold, held_signals
-from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine, choose_engine
+from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine
 from mirotwin.shell.outputs import OutputError, OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -61,7 +61,6 @@ def reproduce(options: ReproduceOptions) -> int:
     for each run, and of each controller and start the recording of the run with the median error. Running it again
     gives the same bytes.
     """
-    choose_engine(options.engine)
     seeds, force, quiet, out = options.seeds, options.force, options.quiet, options.out or Path(".")
     began_s = time.monotonic()
     names = [*_pictures(), ROWS, *(group.recording for group in GROUPS)]

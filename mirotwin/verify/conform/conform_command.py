@@ -26,7 +26,6 @@ from mirotwin.shell.options import (
     SEED,
     Engine,
     StackFrom,
-    choose_engine,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
 from mirotwin.shell.program import (
@@ -109,7 +108,6 @@ def conform(options: ConformOptions) -> int:
     Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials; 5: no rule
     was judged.
     """
-    choose_engine(options.engine)
     if options.listing and (given := options.given(*_OF_TRIALS)):
         raise click.UsageError(f"{given[0]} does not go with --list.")
     every = EVERY_RULE if options.long or options.listing else RULES

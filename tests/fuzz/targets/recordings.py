@@ -152,7 +152,7 @@ def _recording():
         if " periods" not in outcome or "0 periods" in outcome:
             return outcome
         try:
-            load_job(str(path), None, None)
+            load_job(str(path))
         except BadInput as error:
             return f"{outcome}, {refused(error)}"
         return f"{outcome}, a job"

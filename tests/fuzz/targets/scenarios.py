@@ -95,7 +95,7 @@ def _case():
         said = io.StringIO()
         with contextlib.redirect_stderr(said):
             try:
-                job = load_job(str(path), None, None)
+                job = load_job(str(path))
             except BadInput as error:
                 return refused(error)
             assert all(line.isprintable() for line in said.getvalue().splitlines())
