@@ -39,7 +39,7 @@ from mirotwin.shell.options import (
 )
 from mirotwin.shell.program import tell_notes
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.shell.times import Time
+from mirotwin.shell.times import Time, window
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
@@ -75,18 +75,15 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
 
     @property
     def from_tick(self) -> int:
-        return 0 if self.from_time is None else self.from_time.ticks(self.bare.crystal_hz)
+        return window(self.from_time, self.to_time, self.bare.crystal_hz)[0]
 
     @property
     def to_tick(self) -> int | None:
-        return None if self.to_time is None else self.to_time.ticks(self.bare.crystal_hz)
+        return window(self.from_time, self.to_time, self.bare.crystal_hz)[1]
 
 
 def open_window(options: WindowOptions) -> Run:
     """The run that was asked for, at its first tick. Raises BadInput where the window is not in it."""
-    if options.to_tick is not None and options.to_tick <= options.from_tick:
-        place = f"--from {options.from_tick}t --to {options.to_tick}t"
-        raise BadInput("", place, "the window is empty", "--to must be later")
     run = open_run(options)
     begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
     if options.to_tick is not None and options.to_tick <= begin_tick:

@@ -22,7 +22,7 @@ from mirotwin.recording.compare import (
 )
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import FROM, JSON, TO, FiniteNumber, Whole
-from mirotwin.shell.times import Time
+from mirotwin.shell.times import Time, window
 
 _TICKS_PER_MS = TICKS_PER_SECOND // 1000
 _APPLIES = {
@@ -85,23 +85,21 @@ class CompareOptions(Options, frozen=True, kw_only=True):
                     whose = " or ".join(f"--compare {each}" for each in kinds)
                     what = f"does not apply to --compare {self.kind}"
                     raise BadInput("", option, what, f"give {whose} with it")
-        rule = self.rule
-        if rule.to_tick is not None and rule.to_tick <= rule.from_tick:
-            place = f"--from {rule.from_tick}t --to {rule.to_tick}t"
-            raise BadInput("", place, "the window is empty", "--to must be later")
+        window(self.from_time, self.to_time)
 
     @property
     def rule(self) -> CompareRule:
         """The comparison that was asked for."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
+        from_tick, to_tick = window(self.from_time, self.to_time)
         usual = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
         return CompareRule(
             kind=self.kind,
             within_ticks=usual if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
             within_counts=WITHIN_COUNTS if counts is None else counts,
             within_counts_per_sample=WITHIN_COUNTS_PER_SAMPLE if per_sample is None else per_sample,
-            from_tick=0 if self.from_time is None else self.from_time.ticks(),
-            to_tick=None if self.to_time is None else self.to_time.ticks(),
+            from_tick=from_tick,
+            to_tick=to_tick,
         )
 
     def check_reaches(self, file: str, recorded: Sequence[Period]) -> None:

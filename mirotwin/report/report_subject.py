@@ -1,9 +1,10 @@
-"""What `mirotwin report` is given: a run, a case or a failed test, and all that its page is made from."""
+"""`mirotwin report`: a run, a case or a failed test as one page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import tomli_w
@@ -14,16 +15,19 @@ from miro_exact.inputs import read_input
 from miro_robot.image import Image
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
+from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job, replaying
-from mirotwin.shell.debug_files import source_folders
-from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
+from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine, plain_parameters
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, REPORT
 from mirotwin.verify.cases.case import is_bare_case, tables_of
 from mirotwin.verify.cases.replay_line import replay_line
@@ -31,24 +35,58 @@ from mirotwin.verify.checks.expect import expectations_of
 
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
+SMALLER = "leave the camera's frames out with --no-frames, or look at a part with --from and --to"
 
 
-class PageSubject(msgspec.Struct, frozen=True):
-    """What the page is about. `to_tick` None: to the end."""
-
-    subject: str
-    from_tick: int
-    to_tick: int | None
-    frames: bool
-    firmware: str | None
-    sources: Sequence[str]
-    quiet: bool
+class ReportOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "report"
+    subject: Annotated[str, Argument("RUN|CASE|TEST-FAILURE", NAME)]
+    out: Annotated[
+        Path | None,
+        OUT.saying("The page to write. Default: report.html, which replaces an earlier page."),
+    ] = None
+    from_time: Annotated[Time | None, FROM] = None
+    to_time: Annotated[Time | None, TO.saying("End there. Default: the end of the run.")] = None
+    no_frames: Annotated[bool, Option(help="Leave out the camera's frames that a run has recorded.")] = False
+    firmware: Annotated[
+        str | None,
+        FIRMWARE.saying(
+            "Case, recording: image to run instead of its own; what it does otherwise is on the page."
+        ),
+    ] = None
+    sources: SourceFolders = ()
+    force: Annotated[bool, FORCE] = False
+    quiet: Annotated[bool, QUIET] = False
+    engine: Engine = None
 
     @property
     def shown(self) -> range:
         """Numbers of the control periods that are wanted."""
-        last = 1 << 62 if self.to_tick is None else -(-self.to_tick // CONTROL_PERIOD_TICKS)
-        return range(self.from_tick // CONTROL_PERIOD_TICKS, last)
+        from_tick, to_tick = window(self.from_time, self.to_time)
+        last = 1 << 62 if to_tick is None else -(-to_tick // CONTROL_PERIOD_TICKS)
+        return range(from_tick // CONTROL_PERIOD_TICKS, last)
+
+
+@command_of(ReportOptions)
+def report(options: ReportOptions) -> int:
+    """Writes one HTML file that needs no network: look at it in any browser, send it, keep it with a build.
+
+    RUN is a folder of `mirotwin run`, or a recording (run.mcap, run.part.mcap); CASE a case (FILE.stream) as `test`,
+    `fuzz` and `conform` leave it; TEST-FAILURE the folder that a failed test of pytest or `mirotwin test` leaves.
+    `mirotwin campaign page` makes the page of a campaign.
+
+    A run is made again for its page, with the recorded bytes: the profile of the firmware, its coverage, the fate of
+    each frame and the verdicts of the checks come from that, and where it differs from the recording is said.
+    """
+    subject = options.subject
+    place = place_of_page(options.out, options.force, subject, options.firmware)
+    if is_campaign(subject):
+        remedy = f"`mirotwin campaign page {subject}` makes its page"
+        raise BadInput(subject, "", "holds the results of a campaign", remedy)
+    checked_sources(options.sources)
+    made = page_of(options)
+    check_size(made, subject, SMALLER)
+    return write_page(place, made, options.quiet)
 
 
 def is_campaign(subject: str) -> bool:
@@ -59,11 +97,9 @@ def is_campaign(subject: str) -> bool:
         return file.read(len(PARQUET)) == PARQUET
 
 
-def page_of(wanted: PageSubject) -> bytes:
+def page_of(wanted: ReportOptions) -> bytes:
     """The page; of robots at a port, it shows them beside their twin. Raises BadInput, and OSError as `open` does."""
-    if wanted.to_tick is not None and wanted.to_tick <= wanted.from_tick:
-        place = f"--from {wanted.from_tick}t --to {wanted.to_tick}t"
-        raise BadInput("", place, "the window is empty", "--to must be later")
+    window(wanted.from_time, wanted.to_time)
     file = _file_of(wanted.subject)
     if is_bare_case(file):
         what = "is a case of a bare processor, which has no robot to show"
@@ -77,7 +113,7 @@ def page_of(wanted: PageSubject) -> bytes:
 def page_of_failure(folder: str) -> bytes:
     """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
     require_bokeh()
-    return page_of(PageSubject(folder, 0, None, True, None, (), True))
+    return page_of(ReportOptions(subject=folder, quiet=True))
 
 
 def _file_of(subject: str) -> str:
@@ -89,7 +125,7 @@ def _file_of(subject: str) -> str:
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 
 
-def _reproduced(wanted: PageSubject, job: Job, until_tick: int | None) -> Reproduction:
+def _reproduced(wanted: ReportOptions, job: Job, until_tick: int | None) -> Reproduction:
     with plain_parameters(job.file, "replayed"):
         world = job.world_of()
     total = until_tick or job.scenario.end_tick
@@ -97,17 +133,18 @@ def _reproduced(wanted: PageSubject, job: Job, until_tick: int | None) -> Reprod
         return reproduce(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
 
 
-def _of_recording(wanted: PageSubject, job: Job) -> Material:
-    file, image = job.file, job.runs_on
-    recorded = [period for period in job.recorded if period.index in wanted.shown]
+def _of_recording(wanted: ReportOptions, job: Job) -> Material:
+    file, image, shown = job.file, job.runs_on, wanted.shown
+    recorded = [period for period in job.recorded if period.index in shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-        place = f"--from {wanted.from_tick}t"
+        from_tick, _ = window(wanted.from_time, wanted.to_time)
+        place = f"--from {from_tick}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
     again = _reproduced(wanted, job, end_tick)
     other = job.image is None or job.image.code != image.code
-    extras = extras_of(file, recorded[0].tick, end_tick, wanted.frames)
+    extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
     notes = []
     if extras.broken_off:
@@ -115,7 +152,7 @@ def _of_recording(wanted: PageSubject, job: Job) -> Material:
             f"This run was broken off: the page shows {amount(len(recorded), 'control period')} that it recorded."
         )
     if other:
-        recorded = [period for period in again.periods if period.index in wanted.shown]
+        recorded = [period for period in again.periods if period.index in shown]
         extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
         notes.append(_played_with(image, "recording", job.image))
     what = f"Another firmware ({image.path.name})" if other else "This page's own run of it"
@@ -135,9 +172,10 @@ def _of_recording(wanted: PageSubject, job: Job) -> Material:
     )
 
 
-def _of_case(wanted: PageSubject, job: Job) -> Material:
+def _of_case(wanted: ReportOptions, job: Job) -> Material:
     file, image = job.file, job.runs_on
-    ends = [tick for tick in (job.case.end_tick, wanted.to_tick) if tick]
+    _, to_tick = window(wanted.from_time, wanted.to_time)
+    ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
     again = _reproduced(wanted, job, min(ends, default=None))
     report = Path(file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
@@ -177,7 +215,7 @@ def _said(job: Job, again: Reproduction) -> list[str]:
     return [f"What was recorded{now}. Recorded: {verdict}"]
 
 
-def _about(kind: str, wanted: PageSubject, job: Job, notes: Sequence[str]) -> PageHeader:
+def _about(kind: str, wanted: ReportOptions, job: Job, notes: Sequence[str]) -> PageHeader:
     name = Path(job.file).name
     return PageHeader(
         kind=kind,

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import msgspec
 
-from miro_exact.bad_input import shortened
+from miro_exact.bad_input import BadInput, shortened
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.shell.command import Word
 
@@ -74,6 +74,18 @@ class TimeType(Word):
         number = found[1]
         ticks = "" if self.on_wall else f", {number.partition('.')[0] or 0}t for ticks of the crystal"
         return f"it has no unit: write {number}s for seconds{ticks}"
+
+
+def window(
+    from_time: Time | None, to_time: Time | None, crystal_hz: int = TICKS_PER_SECOND
+) -> tuple[int, int | None]:
+    """The ticks that --from and --to ask for; None: to the end. Raises BadInput where there are none between."""
+    from_tick = 0 if from_time is None else from_time.ticks(crystal_hz)
+    to_tick = None if to_time is None else to_time.ticks(crystal_hz)
+    if to_tick is not None and to_tick <= from_tick:
+        place = f"--from {from_tick}t --to {to_tick}t"
+        raise BadInput("", place, "the window is empty", "--to must be later")
+    return from_tick, to_tick
 
 
 def wall_time(longest_s: float) -> Word:
