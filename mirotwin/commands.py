@@ -113,7 +113,7 @@ SECTIONS = {
     "Recorded data": {
         "replay": Lazy("mirotwin.replay.replay_command", "Sends recorded bytes again and compares."),
         "diff": Lazy("mirotwin.replay.diff_command", "Compares two recordings."),
-        "report": Lazy("mirotwin.report.report_subject", "Makes one page of a run, a case or a failed test."),
+        "report": Lazy("mirotwin.report.report_command", "Makes one page of a run, a case or a failed test."),
         "decode": Lazy("mirotwin.recording.decode_command", "Decodes captured bytes to frames and damage."),
         "export": Lazy(
             "mirotwin.report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."

@@ -183,7 +183,7 @@ def test(options: TestOptions) -> int:
 
 
 def _page(folder: str) -> None:
-    from mirotwin.report.report_subject import page_of_failure  # loads the pages' library
+    from mirotwin.report.report_command import page_of_failure  # loads the pages' library
 
     (Path(folder) / PAGE).write_bytes(page_of_failure(folder))
 
