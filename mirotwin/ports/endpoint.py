@@ -8,7 +8,8 @@ counted, as by a serial port's driver: the robots do not wait.
 from __future__ import annotations
 
 from collections.abc import Callable
-from selectors import BaseSelector
+from selectors import EVENT_READ, EVENT_WRITE, BaseSelector
+from typing import Any
 
 import msgspec
 
@@ -76,6 +77,7 @@ class Endpoint:
         self.clients = self.refused = 0
         self.bytes_in = self.bytes_out = self.dropped = 0
         self._client_bytes = (0, 0)
+        self._watched = 0
 
     def receive(self) -> bytes:
         """What the client has sent, at most what the transmit buffer has room for. Notices who comes and goes."""
@@ -117,6 +119,19 @@ class Endpoint:
         )
 
     # ---- for derived classes -----------------------------------------------------------------------------
+
+    def watch(self, file: Any, reads: bool, writes: bool) -> None:
+        """Lets the selector wake where `file` can be read, and where it can be written."""
+        wanted = (EVENT_READ if reads else 0) | (EVENT_WRITE if writes else 0)
+        if wanted == self._watched:
+            return
+        if not self._watched:
+            self.selector.register(file, wanted)
+        elif not wanted:
+            self.selector.unregister(file)
+        else:
+            self.selector.modify(file, wanted)
+        self._watched = wanted
 
     def has_come(self, client: str) -> None:
         self.client = client

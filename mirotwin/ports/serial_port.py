@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import threading
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from serial.serialutil import (
@@ -126,9 +128,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
     @property
     def in_waiting(self) -> int:
         """Bytes that are there."""
-        with self._lock:
-            self._there()
-            self._time.catch_up()
+        with self._caught_up():
             self._note_poll(len(self._inbox))
             return len(self._inbox)
 
@@ -140,27 +140,23 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     def read(self, size: int = 1) -> bytes:
         """See the head of this file. Raises SerialException once the run is over and all is read."""
-        world = self._there().world
-        deadline = gap_end = NEVER_TICK
-        first, there = True, 0
-        while True:
-            with self._lock:
-                self._there()
-                self._time.catch_up()
-                if first and self._timeout is not None:
-                    deadline = world.tick + ticks(self._timeout)
-                if self._inter_byte_timeout is not None and len(self._inbox) > there:
-                    there = len(self._inbox)
-                    gap_end = world.tick + ticks(self._inter_byte_timeout)
-                if self._read_ends(size, min(deadline, gap_end)):
-                    return self._inbox.take(size)
-                tick = min(deadline, gap_end, self._limit_tick)
-                self._time.advance(tick, for_byte=True)
-            self._time.rest(tick)
-            first = False
+        there, gap_end, found = 0, NEVER_TICK, b""
 
-    def _read_ends(self, size: int, deadline: int) -> bool:
-        world = self._there().world
+        def until(world: World, deadline: int) -> int | None:
+            nonlocal there, gap_end, found
+            if self._inter_byte_timeout is not None and len(self._inbox) > there:
+                there = len(self._inbox)
+                gap_end = world.tick + ticks(self._inter_byte_timeout)
+            deadline = min(deadline, gap_end)
+            if not self._read_ends(world, size, deadline):
+                return deadline
+            found = self._inbox.take(size)
+            return None
+
+        self._wait(self._timeout, until, for_byte=True)
+        return found
+
+    def _read_ends(self, world: World, size: int, deadline: int) -> bool:
         if len(self._inbox) >= size:
             return True
         if self._cancel_read:
@@ -180,44 +176,36 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._cancel_read = True
 
     def reset_input_buffer(self) -> None:
-        with self._lock:
-            self._there()
-            self._time.catch_up()
+        with self._caught_up():
             self._inbox.clear()
 
     # ---- writing -----------------------------------------------------------------------------------------
 
     def write(self, data: Any) -> int:
         """See the head of this file. Raises SerialTimeoutException where the buffer has no room in time."""
-        data = to_bytes(data)
-        world = self._there().world
-        deadline = NEVER_TICK
-        sent, first = 0, True
-        while True:
-            with self._lock:
-                self._there()
-                self._time.catch_up()
-                if first and self._write_timeout is not None:
-                    deadline = world.tick + ticks(self._write_timeout)
-                if why := self._why_over():
-                    raise SerialException(why)
-                if taken := data[sent : sent + self._radio.room]:
-                    self._radio.send(taken)
-                    sent += len(taken)
-                    self._polls = 0
-                if sent == len(data) or self._cancel_write:
-                    self._cancel_write = False
-                    return sent
-                if world.tick >= deadline:
-                    if self._write_timeout == 0:
-                        return sent
-                    raise SerialTimeoutException("Write timeout")
-                wanted = min(len(data) - sent, TRANSMIT_CHARACTERS)
-                room_tick = self._radio.free_tick - (TRANSMIT_CHARACTERS - wanted) * HOST_CHARACTER_TICKS
-                tick = min(deadline, max(room_tick, world.tick + 1), self._limit_tick)
-                self._time.advance(tick, for_byte=False)
-            self._time.rest(tick)
-            first = False
+        data, sent = to_bytes(data), 0
+
+        def until(world: World, deadline: int) -> int | None:
+            nonlocal sent
+            if why := self._why_over():
+                raise SerialException(why)
+            if taken := data[sent : sent + self._radio.room]:
+                self._radio.send(taken)
+                sent += len(taken)
+                self._polls = 0
+            if sent == len(data) or self._cancel_write:
+                self._cancel_write = False
+                return None
+            if world.tick >= deadline:
+                if self._write_timeout == 0:
+                    return None
+                raise SerialTimeoutException("Write timeout")
+            wanted = min(len(data) - sent, TRANSMIT_CHARACTERS)
+            room_tick = self._radio.free_tick - (TRANSMIT_CHARACTERS - wanted) * HOST_CHARACTER_TICKS
+            return min(deadline, max(room_tick, world.tick + 1))
+
+        self._wait(self._write_timeout, until)
+        return sent
 
     def cancel_write(self) -> None:
         """The write of another thread, or else the next one, returns how much it has written."""
@@ -229,36 +217,26 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._drain(self._write_timeout)
 
     def _drain(self, timeout_s: float | None) -> None:
-        deadline = NEVER_TICK
-        while True:
-            with self._lock:
-                world = self._there().world
-                self._time.catch_up()
-                if deadline == NEVER_TICK and timeout_s is not None:
-                    deadline = world.tick + ticks(timeout_s)
-                if not self._radio.waiting:
-                    return
-                if why := self._why_over():
-                    raise SerialException(why)
-                if world.tick >= deadline:
-                    raise SerialTimeoutException("Write timeout")
-                tick = min(self._radio.free_tick, deadline, self._limit_tick)
-                self._time.advance(tick, for_byte=False)
-            self._time.rest(tick)
+        def until(world: World, deadline: int) -> int | None:
+            if not self._radio.waiting:
+                return None
+            if why := self._why_over():
+                raise SerialException(why)
+            if world.tick >= deadline:
+                raise SerialTimeoutException("Write timeout")
+            return min(self._radio.free_tick, deadline)
+
+        self._wait(timeout_s, until)
 
     @property
     def out_waiting(self) -> int:
         """Characters that are not sent yet."""
-        with self._lock:
-            self._there()
-            self._time.catch_up()
+        with self._caught_up():
             return self._radio.waiting
 
     def reset_output_buffer(self) -> None:
         """Takes back what has not begun to be sent."""
-        with self._lock:
-            self._there()
-            self._time.catch_up()
+        with self._caught_up():
             self._radio.purge()
 
     # ---- lines that a radio does not have ----------------------------------------------------------------
@@ -291,6 +269,30 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         if self._recorded is None:
             raise PortNotOpenError()
         return self._recorded
+
+    @contextmanager
+    def _caught_up(self) -> Iterator[World]:
+        """The world, where it should be now; other threads wait meanwhile. Raises PortNotOpenError."""
+        with self._lock:
+            world = self._there().world
+            self._time.catch_up()
+            yield world
+
+    def _wait(
+        self, timeout_s: float | None, until: Callable[[World, int], int | None], for_byte: bool = False
+    ) -> None:
+        """Lets time pass to the tick that `until` gives for world and deadline, as often as it gives one."""
+        deadline = None
+        while True:
+            with self._caught_up() as world:
+                if deadline is None:
+                    deadline = NEVER_TICK if timeout_s is None else world.tick + ticks(timeout_s)
+                tick = until(world, deadline)
+                if tick is None:
+                    return
+                tick = min(tick, self._limit_tick)
+                self._time.advance(tick, for_byte)
+            self._time.rest(tick)
 
     def _why_over(self) -> str:
         """Why no more time passes, if so."""

@@ -42,7 +42,6 @@ class Session:
         self.once = once
         self.periods = min(world.periods, -(-end_tick // CONTROL_PERIOD_TICKS))
         self._slice_ticks = max(1, min(ticks(SLICE_S * pace.factor), LONGEST_SLICE_TICKS))
-        self._reported_ticks = 0
 
     @property
     def finished(self) -> bool:
@@ -71,10 +70,8 @@ class Session:
         if tick <= before:
             return
         self.world.run_to(tick)
-        if self.pace.note(before, tick, due_tick) and due_tick - tick >= 2 * self._reported_ticks:
-            self._reported_ticks = due_tick - tick
-            behind_ms = 1000.0 * seconds(due_tick - tick)
-            self.tell(f"{seconds(tick):.3f} s: {behind_ms:.0f} ms behind the wall clock")
+        if behind := self.pace.note(before, tick, due_tick):
+            self.tell(f"{seconds(tick):.3f} s: {behind}")
         received: dict[int, bytes] = {}
         for endpoint in self.endpoints:
             port = endpoint.port

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import socket
-from selectors import EVENT_READ, EVENT_WRITE
+from selectors import EVENT_READ
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import ticks
@@ -39,7 +39,6 @@ class TcpEndpoint(Endpoint):
         self._socket: socket.socket | None = None
         self._wire = bytearray()
         self._input_over_tick = -1
-        self._watched = 0
         self.selector.register(self._listener, EVENT_READ)
 
     def receive(self) -> bytes:
@@ -141,28 +140,16 @@ class TcpEndpoint(Endpoint):
 
     def _put_out(self, why: str = "has gone") -> None:
         assert self._socket is not None
-        if self._watched:
-            self.selector.unregister(self._socket)
-        self._watched = 0
+        self.watch(self._socket, reads=False, writes=False)
         self._socket.close()
         self._socket = None
         self.has_gone(why)
 
     def _watch(self) -> None:
         """Lets the selector wake for what can be done with the client now."""
-        if self._socket is None:
-            return
-        reads = self.port.room and self._input_over_tick < 0
-        wanted = (EVENT_READ if reads else 0) | (EVENT_WRITE if self._wire else 0)
-        if wanted == self._watched:
-            return
-        if not self._watched:
-            self.selector.register(self._socket, wanted)
-        elif not wanted:
-            self.selector.unregister(self._socket)
-        else:
-            self.selector.modify(self._socket, wanted)
-        self._watched = wanted
+        if self._socket is not None:
+            reads = self.port.room > 0 and self._input_over_tick < 0
+            self.watch(self._socket, reads, writes=bool(self._wire))
 
 
 def _keep_alive(found: socket.socket) -> None:

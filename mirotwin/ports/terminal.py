@@ -12,7 +12,6 @@ import os
 import select
 from contextlib import suppress
 from pathlib import Path
-from selectors import EVENT_READ, EVENT_WRITE
 from typing import Any
 
 from miro_exact.bad_input import BadInput
@@ -51,7 +50,6 @@ class PtyEndpoint(Endpoint):
         super().__init__(context, self.path if link is None else f"{link}")
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN)
-        self._watched = 0
         self._told = False
 
     def _make_raw(self) -> None:
@@ -133,17 +131,8 @@ class PtyEndpoint(Endpoint):
 
     def _watch(self, leave: bool = False) -> None:
         """Lets the selector wake for the terminal while somebody has it open: a closed one would never let it sleep."""
-        reads = EVENT_READ if self.port.room else 0
-        wanted = reads | (EVENT_WRITE if self.out else 0) if self.client and not leave else 0
-        if wanted == self._watched:
-            return
-        if not self._watched:
-            self.selector.register(self._master, wanted)
-        elif not wanted:
-            self.selector.unregister(self._master)
-        else:
-            self.selector.modify(self._master, wanted)
-        self._watched = wanted
+        looks = bool(self.client) and not leave
+        self.watch(self._master, looks and self.port.room > 0, looks and len(self.out) > 0)
 
 
 def _is_terminal(link: Path) -> bool:

@@ -6,7 +6,7 @@ import logging
 from contextlib import suppress
 from typing import Protocol
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
 from mirotwin.ports.endpoint import ByteFifo
@@ -63,7 +63,6 @@ class RealTime:
         self.port = port
         self.inbox = inbox
         self.pace = pace
-        self._reported_ticks = 0
 
     def catch_up(self) -> None:
         world = self.port.world
@@ -72,12 +71,8 @@ class RealTime:
         while world.tick < due and not world.stopped and self.pace.tick() < latest:
             world.run_to(min(due, world.tick + CONTROL_PERIOD_TICKS))
             self.inbox.add(self.port.received())
-        now = self.pace.tick()
-        if self.pace.note(world.tick, world.tick, now) and now - world.tick >= 2 * self._reported_ticks:
-            self._reported_ticks = now - world.tick
-            _log.warning(
-                "tick %d: %.0f ms behind the wall clock", world.tick, 1000.0 * seconds(now - world.tick)
-            )
+        if behind := self.pace.note(world.tick, world.tick, self.pace.tick()):
+            _log.warning("tick %d: %s", world.tick, behind)
 
     def advance(self, tick: int, for_byte: bool) -> None:
         """Only the wall clock does that."""

@@ -25,6 +25,7 @@ class Pace:
         self.factor = factor
         self.late_ticks = 0
         self.late_s = 0.0
+        self._told_ticks = 0
         self.start(0)
 
     def start(self, tick: int) -> None:
@@ -37,14 +38,20 @@ class Pace:
         since_s = time.monotonic() - self._began_s
         return self._began_tick + int(since_s * self.factor * TICKS_PER_SECOND)
 
-    def note(self, from_tick: int, to_tick: int, due_tick: int) -> bool:
-        """Counts that a world went on from one tick to the other when it should have been at `due_tick`; is it late?"""
+    def note(self, from_tick: int, to_tick: int, due_tick: int) -> str:
+        """Counts that a world went on from one tick to the other when it should have been at `due_tick`.
+
+        By how much it is behind, for people; "" where it is not late, or not twice as late as they were told last.
+        """
         behind = due_tick - to_tick
         self.late_ticks = max(self.late_ticks, behind)
         if behind < LATE_TICKS:
-            return False
+            return ""
         self.late_s += seconds(to_tick - from_tick)
-        return True
+        if behind < 2 * self._told_ticks:
+            return ""
+        self._told_ticks = behind
+        return f"{1000.0 * seconds(behind):.0f} ms behind the wall clock"
 
     def wait_s(self, tick: int) -> float:
         """Wall time until virtual time should be at `tick`; 0 where it should be there already."""
