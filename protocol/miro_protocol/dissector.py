@@ -3,15 +3,18 @@
 A packet is a run of characters without a pause, as `pcapng.py` writes them, so the spacing rule holds within it and
 ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is the number of
 robots with which the CRC is good, because the layout byte differs for 3 and 5. A packet may hold several frames.
+
+`dissector.lua` is the part that no table decides. XOR is done by a table of nibbles there, because Wireshark's Lua has
+had bit operators under three names since 5.1.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from miro_protocol import crc, table, whitening
-from miro_protocol.dissector_code import CODE
 from miro_protocol.pcapng import EVENTS
 from miro_protocol.table import DOWNLINK, TELEMETRY, Field, Format, FrameType, Opcode
 from miro_protocol.transmission import DOWN, UP
@@ -27,7 +30,9 @@ local miro = Proto("miro", "Mirotwin radio")
 def render() -> str:
     """The whole script, ending in a newline."""
     parts = (_numbers(), _formats(), _common_fields(), _payload_fields(), _experts(), _preferences())
-    return _HEAD + "".join("\n" + "".join(f"{line}\n" for line in part) for part in parts) + CODE
+    code = Path(__file__).with_suffix(".lua").read_text(encoding="utf-8")
+    tables = ("\n" + "".join(f"{line}\n" for line in part) for part in parts)
+    return f"{_HEAD}{''.join(tables)}\n{code}"
 
 
 def _numbers() -> Iterator[str]:

@@ -1,9 +1,3 @@
-"""The part of the Wireshark dissector that no table decides: Lua code, as text.
-
-XOR is done by a table of nibbles, because Wireshark's Lua has had bit operators under three names since 5.1.
-"""
-
-CODE = r"""
 local event_type = Field.new("rtacser.eventtype")
 
 local function xor(a, b)
@@ -196,4 +190,3 @@ PAYLOADS = {
 for kind, name in pairs(TYPES) do PAYLOADS[kind] = PAYLOADS[name] end
 
 DissectorTable.get("rtacser.data"):add_for_decode_as(miro)
-"""
