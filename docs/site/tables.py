@@ -67,9 +67,7 @@ def key_sections(root: type) -> Iterator[str]:
 
 def parts_of(key: str) -> list[type]:
     """The structs of our own laws, estimators and references, if it is the key that names one."""
-    from miro_host.estimators.registry import ESTIMATORS
-    from miro_host.laws.registry import LAWS
-    from miro_host.references.registry import REFERENCES
+    from miro_host.registries import ESTIMATORS, LAWS, REFERENCES
 
     registry: Any = {"controller": LAWS, "estimator": ESTIMATORS, "reference": REFERENCES}.get(key)
     return [registry.find(name) for name in registry.own] if registry is not None else []

@@ -12,13 +12,13 @@ from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.dynamic_feedback import DynamicFeedbackParameters
 from miro_host.laws.interface import LawInput, Velocities, errors
 from miro_host.laws.kanayama import KanayamaParameters
-from miro_host.laws.registry import LAWS
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.interface import Reference
 from miro_host.references.line import StraightLine
 from miro_host.references.ramp import Ramp
+from miro_host.registries import LAWS
 from tests.host.driving import apart, drive, starts
 from tests.naive import host_laws as naive
 

@@ -18,11 +18,11 @@ from miro_host.laws.epsilon_tracking import (
     point,
 )
 from miro_host.laws.interface import LawInput
-from miro_host.laws.registry import LAWS
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
+from miro_host.registries import LAWS
 from tests.host.driving import apart, drive
 from tests.naive import host_laws as naive
 from tests.naive.host_ideal_loop import drive_at_velocities

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from miro_exact.state import restore, snapshot
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
 from miro_host.estimators.predict import NoEstimator, PredictParameters, moved
-from miro_host.estimators.registry import ESTIMATORS
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.line import StraightLine
+from miro_host.registries import ESTIMATORS
 from miro_host.wheels import Wheels
 
 HERE = Posture(0.07, 0.02, -0.38)

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from miro_host.laws.registry import LAWS
 from miro_host.laws.yang_kim import Gains
 from miro_host.plugins import PluginError
+from miro_host.registries import LAWS
 from tests import children
 from tests.host.distribution import install
 
@@ -57,7 +57,7 @@ def test_our_own_law_is_found_without_a_look_at_other_distributions(monkeypatch)
 def test_naming_laws_imports_none_of_them():
     code = "import sys, miro_sim.scenario.keys; print([name for name in sys.modules if name.startswith('miro_host')])"
     done = children.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "miro_host.laws.registry" in done.stdout
+    assert "miro_host.registries" in done.stdout
     for name in ("miro_host.laws.yang_kim", "miro_host.estimators.predict", "miro_host.references.interface"):
         assert f"'{name}'" not in done.stdout
 

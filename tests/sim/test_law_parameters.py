@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from miro_host.laws.registry import LAWS
+from miro_host.registries import LAWS
 from miro_sim.scenario.file import ScenarioError, load
 
 PLACE = "network.robot.controller"

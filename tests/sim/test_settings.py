@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from miro_host.laws.registry import LAWS
+from miro_host.registries import LAWS
 from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse, written
 from tests.naive.tables import scalar_places
 

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
-from miro_host.estimators.registry import AnyEstimator
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
+from miro_host.registries import AnyEstimator
 from miro_host.telemetry_receiver import LastTelemetry
 
 NOTHING: Mapping[str, float] = {}

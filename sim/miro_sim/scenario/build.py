@@ -16,9 +16,8 @@ from miro_host.pilot import Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, raised
-from miro_host.references.checked import CheckedReference
-from miro_host.references.interface import ReferenceParameters, Trajectory
-from miro_host.references.registry import REFERENCES
+from miro_host.references.interface import CheckedReference, ReferenceParameters, Trajectory
+from miro_host.registries import REFERENCES
 from miro_host.wheels import Wheels
 from miro_protocol.table import DOWNLINK
 from miro_sim.plant.drive import DifferentialDrive

@@ -11,10 +11,16 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, ticks
-from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
 from miro_host.integrator import Integration
-from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
-from miro_host.references.registry import AnyReference
+from miro_host.registries import (
+    DEFAULT_ESTIMATOR,
+    DEFAULT_LAW,
+    ESTIMATORS,
+    LAWS,
+    AnyEstimator,
+    AnyReference,
+    Controller,
+)
 from miro_host.wheels import MAX_WORD_BITS, MIN_WORD_BITS
 from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options

@@ -5,11 +5,9 @@ from typing import Any
 
 import msgspec
 
-from miro_host.estimators.registry import ESTIMATORS, AnyEstimator
-from miro_host.laws.registry import LAWS, Controller
 from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
-from miro_host.references.registry import REFERENCES, AnyReference
+from miro_host.registries import ESTIMATORS, LAWS, REFERENCES, AnyEstimator, AnyReference, Controller
 
 REGISTRIES: dict[type, Registry[Any]] = {
     AnyReference: REFERENCES,

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from miro_host.laws.registry import LAWS
+from miro_host.registries import LAWS
 from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec

@@ -8,9 +8,9 @@ import pytest
 
 from miro_host.plugins import PluginError
 from miro_host.references.arc import Arc, ArcRef
-from miro_host.references.checked import CheckedReference
+from miro_host.references.interface import CheckedReference
 from miro_host.references.line import LineRef, StraightLine
-from miro_host.references.registry import REFERENCES
+from miro_host.registries import REFERENCES
 from miro_sim.scenario.file import parse
 from tests.host.distribution import install
 

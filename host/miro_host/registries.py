@@ -1,0 +1,68 @@
+"""The names of laws, estimators and references. None is imported before a scenario names it.
+
+`Controller`, `AnyEstimator` and `AnyReference` are the parameters of any; a plug-in's own struct derives from the base
+in its table. They are plain classes, because msgspec reads a struct as itself and never as one derived from it.
+"""
+
+from miro_host.plugins import Registry
+
+
+class Controller:
+    """Parameters of any law."""
+
+    __slots__ = ()
+
+
+class AnyEstimator:
+    """Parameters of any estimator."""
+
+    __slots__ = ()
+
+
+class AnyReference:
+    """Parameters of any reference."""
+
+    __slots__ = ()
+
+
+DEFAULT_LAW = "yang_kim"
+LAWS: Registry[Controller] = Registry(
+    "mirotwin.laws",
+    word="law",
+    key="law",
+    base="miro_host.laws.interface:LawParameters",
+    own={
+        "yang_kim": "miro_host.laws.yang_kim:Gains",
+        "body_frame": "miro_host.laws.body_frame:BodyFrameParameters",
+        "kanayama": "miro_host.laws.kanayama:KanayamaParameters",
+        "dynamic_feedback": "miro_host.laws.dynamic_feedback:DynamicFeedbackParameters",
+        "epsilon_tracking": "miro_host.laws.epsilon_tracking:EpsilonTrackingParameters",
+    },
+    default=DEFAULT_LAW,
+)
+DEFAULT_ESTIMATOR = "none"
+ESTIMATORS: Registry[AnyEstimator] = Registry(
+    "mirotwin.estimators",
+    word="estimator",
+    key="kind",
+    base="miro_host.estimators.interface:EstimatorParameters",
+    own={
+        "none": "miro_host.estimators.predict:NoEstimator",
+        "ekf": "miro_host.estimators.ekf:EkfParameters",
+        "ekf+telemetry": "miro_host.estimators.ekf_telemetry:EkfTelemetryParameters",
+        "predict": "miro_host.estimators.predict:PredictParameters",
+    },
+    default=DEFAULT_ESTIMATOR,
+)
+REFERENCES: Registry[AnyReference] = Registry(
+    "mirotwin.references",
+    word="reference",
+    key="kind",
+    base="miro_host.references.interface:ReferenceParameters",
+    own={
+        "line": "miro_host.references.line:LineRef",
+        "arc": "miro_host.references.arc:ArcRef",
+        "sine": "miro_host.references.sine:SineRef",
+        "waypoints": "miro_host.references.waypoints:WaypointsRef",
+    },
+)
