@@ -40,10 +40,10 @@ from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
 from miro_sim.scenario.settings import EXPECT, in_text
-from mirotwin.campaign import builtin
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
 
+BUILTIN = Path(__file__).parent / "builtin"
 MOST_RUNS = 1_000_000_000
 """More is a mistake in the file."""
 SCENARIO, FIRMWARE = "scenario", "firmware"
@@ -87,15 +87,20 @@ class CampaignFile(msgspec.Struct, frozen=True):
     design: Design
 
 
+def builtin_names() -> list[str]:
+    """Campaigns that are part of the program: `mirotwin campaign bench1`."""
+    return sorted(path.stem for path in BUILTIN.glob("*.toml"))
+
+
 def read(path: Path) -> CampaignFile:
     """The campaign of a file, or the built-in one of that name. Raises BadInput with the place of what is wrong."""
-    own = None if path.exists() else builtin.place(str(path))
-    if own is not None:
+    if not path.exists() and str(path) in builtin_names():
+        own = BUILTIN / f"{path}.toml"
         return msgspec.structs.replace(parse(own.read_text(encoding="utf-8"), own), path=str(path))
     try:
         text = read_input(path, TEXT_KIB << 10).decode("utf-8")
     except FileNotFoundError:
-        remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin.names())}"
+        remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin_names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
     except UnicodeDecodeError:
         raise BadInput(path, "", "not UTF-8 text", "save the file as UTF-8") from None

@@ -19,9 +19,9 @@ from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
-from miro_sim.scenario.profiles import ProfileError, with_profiles
+from miro_sim.scenario.profiles import Refused, with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
-from miro_sim.scenario.variants import VariantError, with_variant
+from miro_sim.scenario.variants import with_variant
 
 _BUILTIN = Path(__file__).parent / "builtin"
 Also = Callable[[Scenario, str], object]
@@ -195,7 +195,11 @@ def _checked(
 
 def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
-    complete = _with_profiles(_with_variant(raw, origin) if "variant" in raw else raw, origin)
+    try:
+        complete = with_variant(raw) if "variant" in raw else raw
+    except Refused as error:
+        raise ScenarioError(origin, "variant", error.what, error.remedy) from None
+    complete = _with_profiles(complete, origin)
     try:
         check_numbers(complete)
         scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
@@ -208,14 +212,6 @@ def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     return scenario
 
 
-def _with_variant(raw: dict[str, Any], origin: str) -> dict[str, Any]:
-    """The same with the keys of the variant that the file names."""
-    try:
-        return with_variant(raw)
-    except VariantError as error:
-        raise ScenarioError(origin, "variant", error.what, error.remedy) from None
-
-
 def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
     """The same with the keys of profiles in the radio tables; what has another shape is left alone."""
     networks = raw.get("network")
@@ -226,7 +222,7 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
         if isinstance(network, dict) and isinstance(network.get("radio"), dict):
             try:
                 network = {**network, "radio": with_profiles(network["radio"])}
-            except ProfileError as error:
+            except Refused as error:
                 path = f"network[{index}].radio.profile"
                 raise ScenarioError(origin, path, error.what, error.remedy) from None
         complete.append(network)

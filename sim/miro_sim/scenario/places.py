@@ -24,6 +24,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import RobotSpec, Scenario
 
 if TYPE_CHECKING:
+    from miro_host.eye.lens import Lens
     from miro_host.references.interface import Trajectory
 
 STEP_M = 0.005
@@ -125,10 +126,6 @@ def _off_pitch(at: Posture) -> tuple[str, str] | None:
     return None
 
 
-if TYPE_CHECKING:
-    from miro_host.eye.lens import Lens
-    from miro_host.posture import Posture
-
 _CORNERS = [(x, y) for x in (pitch.LEFT_M, pitch.RIGHT_M) for y in (pitch.BOTTOM_M, pitch.TOP_M)]
 MOST_SLOPE = 5.0
 """A ray further from the vertical than 79 degrees sees nothing of use."""
@@ -156,7 +153,7 @@ def check_camera(scenario: Scenario, origin: str) -> None:
         what = f"hangs at ({100.0 * lens.x_m:.0f}, {100.0 * lens.y_m:.0f}) cm, beside the pitch"
         raise ScenarioError(origin, "camera.lens", what, "hang it above the pitch, and tilt it")
     for x_m, y_m in _CORNERS:
-        if not (_sees(lens, x_m, y_m, 0.0) and _draws(lens, x_m, y_m, ROBOT_HEIGHT_M)):
+        if not _sees(lens, x_m, y_m, 0.0) or _pixel(lens, x_m, y_m, ROBOT_HEIGHT_M) is None:
             what = f"does not see the pitch's corner ({100.0 * x_m:.0f}, {100.0 * y_m:.0f}) cm"
             raise ScenarioError(origin, "camera.lens", what, _REMEDY)
     if isinstance(camera, PixelCamera) and len(scenario.networks) > len(TEAMS):
@@ -192,17 +189,14 @@ def _edge() -> Iterator[tuple[float, float]]:
         yield float(WIDTH), float(j)
 
 
-def _draws(lens: Lens, x_m: float, y_m: float, z_m: float) -> bool:
+def _pixel(lens: Lens, x_m: float, y_m: float, z_m: float) -> tuple[float, float] | None:
+    """Where the lens draws it; None where it cannot."""
     try:
-        lens.pixel(x_m, y_m, z_m)
+        return lens.pixel(x_m, y_m, z_m)
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def _sees(lens: Lens, x_m: float, y_m: float, z_m: float) -> bool:
-    try:
-        u, v = lens.pixel(x_m, y_m, z_m)
-    except ValueError:
-        return False
-    return 0.0 <= u <= WIDTH and 0.0 <= v <= HEIGHT
+    at = _pixel(lens, x_m, y_m, z_m)
+    return at is not None and 0.0 <= at[0] <= WIDTH and 0.0 <= at[1] <= HEIGHT

@@ -14,11 +14,11 @@ ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
 Table = dict[str, Any]
 
 
-class ProfileError(BadInput):
-    """A `profile` that names none, or does not go with the rest: what, and what to write instead."""
+class Refused(BadInput):
+    """A key or a value that cannot be used, of which the caller knows the place: what, and what to write instead."""
 
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__("", "profile", what, remedy)
+    def __init__(self, what: str, remedy: str = "") -> None:
+        super().__init__("", "", what, remedy)
 
 
 @cache
@@ -29,19 +29,19 @@ def profiles() -> Mapping[str, Mapping[str, Any]]:
 
 
 def keys_of(name: str) -> Table:
-    """The keys that a profile sets. Raises ProfileError."""
+    """The keys that a profile sets. Raises Refused."""
     if name not in profiles():
         remedy = did_you_mean(name, profiles(), f"profiles: {', '.join(profiles())}")
-        raise ProfileError(f"{name!r} is no profile", remedy)
+        raise Refused(f"{name!r} is no profile", remedy)
     return {key: value for key, value in profiles()[name].items() if key != "about"}
 
 
 def with_profiles(radio: Table) -> Table:
-    """A radio table with the keys of its profiles filled in; its own keys win. Raises ProfileError."""
+    """A radio table with the keys of its profiles filled in; its own keys win. Raises Refused."""
     named = radio.get("profile", [])
     names = [named] if isinstance(named, str) else named
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ProfileError(
+        raise Refused(
             f"expected a name or a list of names, got {named!r}", "see `mirotwin scenarios profiles`"
         )
     merged: Table = {}
@@ -59,11 +59,11 @@ def _check_slicer(names: list[str], radio: Table, merged: Table) -> None:
         return
     what = f"{slicers[-1]} needs eb_n0_db, and"
     if "bit_error_rate" in radio:
-        raise ProfileError(
+        raise Refused(
             f"{what} bit_error_rate is given in its place", "leave one of them out, or give eb_n0_db instead"
         )
     taker = [name for name in names if "bit_error_rate" in keys_of(name)][-1]
-    raise ProfileError(
+    raise Refused(
         f"{what} {taker} sets bit_error_rate in its place",
         f"leave one of them out, name {slicers[-1]} after {taker}, or give eb_n0_db",
     )

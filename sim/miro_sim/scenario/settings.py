@@ -16,8 +16,8 @@ from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec
 from miro_sim.scenario.plugins import REGISTRIES
-from miro_sim.scenario.profiles import ERROR_KEYS
-from miro_sim.scenario.variants import VariantError, impose
+from miro_sim.scenario.profiles import ERROR_KEYS, Refused
+from miro_sim.scenario.variants import impose
 
 Table = dict[str, Any]
 EXPECT = "expect."
@@ -71,14 +71,6 @@ def _inside(path: str, above: str) -> bool:
     return path == above or path.startswith((f"{above}.", f"{above}["))
 
 
-class _Refused(Exception):
-    """A KEY that leads nowhere: what, remedy."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        self.what = what
-        self.remedy = remedy
-
-
 def in_text(table: Table, above: str = "") -> list[str]:
     """The settings KEY=VALUE that a table of them says; a table inside it stands for its keys."""
     import tomli_w  # only tables of settings need it
@@ -106,9 +98,7 @@ def _make(raw: Table, text: str, origin: str, option: str) -> Setting:
             return Setting(text, "variant", option=option)
         made = _Path(text).put(raw, keys, value, "")
         return msgspec.structs.replace(made, option=option)
-    except _Refused as refused:
-        raise ScenarioError(origin, _option(text, option), refused.what, refused.remedy) from None
-    except VariantError as error:
+    except Refused as error:
         raise ScenarioError(origin, _option(text, option), error.what, error.remedy) from None
     except RecursionError:
         raise ScenarioError(origin, _option(text, option), "nested too deeply") from None
@@ -118,15 +108,15 @@ def _read(text: str) -> tuple[list[str], Any]:
     key, equals, value = text.partition("=")
     keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not equals or not all(keys):
-        raise _Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
+        raise Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
     if not _is_utf8(text):
-        raise _Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
+        raise Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
     path = ".".join(keys)
     try:
         return keys, value_of(value, path)
     except TomlError as error:
         place = "" if error.place in ("", path) else f"{error.place}: "
-        raise _Refused(f"{place}{error.what}", error.remedy) from None
+        raise Refused(f"{place}{error.what}", error.remedy) from None
 
 
 def _is_utf8(text: str) -> bool:
@@ -150,7 +140,7 @@ class _Path:
         if isinstance(at, list):
             return self._put_in_list(at, keys, value, path)
         if not isinstance(at, dict):
-            raise _Refused(f"{path} is a value and has no keys", f"end KEY with {path.rpartition('.')[2]}")
+            raise Refused(f"{path} is a value and has no keys", f"end KEY with {path.rpartition('.')[2]}")
         key, *rest = keys
         key_path = f"{path}.{key}" if path else key
         if rest:
@@ -171,13 +161,13 @@ class _Path:
         if not keys[0].isdecimal():
             if len(at) != 1:
                 ways = f"name one of them: {path}.0 to {path}.{len(at) - 1}" if at else "give a whole list"
-                raise _Refused(f"{path} has {len(at)} entries", ways)
+                raise Refused(f"{path} has {len(at)} entries", ways)
             return self.put(at[0], keys, value, f"{path}[0]")
         index, *rest = keys
         number = int(index[:9])
         if number >= len(at):
             what = f"{path} has {len(at)} {'entry' if len(at) == 1 else 'entries'}, numbered from 0"
-            raise _Refused(
+            raise Refused(
                 what,
                 "give the whole list to add one, or add it to the file that `mirotwin scenarios show NAME` prints",
             )

@@ -11,8 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from miro_exact.bad_input import BadInput, did_you_mean
-from miro_sim.scenario.profiles import overridden
+from miro_exact.bad_input import did_you_mean
+from miro_sim.scenario.profiles import Refused, overridden
 
 Table = dict[str, Any]
 
@@ -29,13 +29,6 @@ DISTURBING_CHASSIS = (
 )
 
 
-class VariantError(BadInput):
-    """A `variant` that does not exist, and what to write instead."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__("", "variant", what, remedy)
-
-
 @cache
 def variants() -> Mapping[str, Mapping[str, Any]]:
     """Name -> `about` and keys of the variants, in the order of their file."""
@@ -44,7 +37,7 @@ def variants() -> Mapping[str, Mapping[str, Any]]:
 
 
 def impose(raw: Table, name: object) -> None:
-    """Makes the tables of a scenario those of the variant, whatever they say. Raises VariantError."""
+    """Makes the tables of a scenario those of the variant, whatever they say. Raises Refused."""
     variant = _named(name)
     raw.pop("variant", None)
     if "camera" in variant:
@@ -66,7 +59,7 @@ def impose(raw: Table, name: object) -> None:
 
 
 def with_variant(raw: Table) -> Table:
-    """The same tables with what the variant of the file says where the file says nothing. Raises VariantError.
+    """The same tables with what the variant of the file says where the file says nothing. Raises Refused.
 
     A camera of another kind, and a radio with a profile, are what the file says.
     """
@@ -106,7 +99,7 @@ def _filled(given: Any, default: Table) -> Any:
 def _named(name: object) -> Mapping[str, Any]:
     if not isinstance(name, str) or name not in variants():
         remedy = did_you_mean(str(name), variants(), f"variants: {', '.join(variants())}")
-        raise VariantError(f"{name!r} is no variant", remedy)
+        raise Refused(f"{name!r} is no variant", remedy)
     return variants()[name]
 
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
-from mirotwin.campaign import builtin
+from mirotwin.campaign.file import BUILTIN
 from mirotwin.campaign.plan import load_plan
 from mirotwin.campaign.rows import ResultRows
 from mirotwin.commands import main
@@ -34,7 +34,7 @@ def test_the_campaign_files_of_the_tree_can_be_run(name, runs):
 
 
 def test_the_scenarios_are_those_whose_hashes_the_page_has():
-    files = sorted((builtin.FOLDER / "bench1").glob("*.toml"))
+    files = sorted((BUILTIN / "bench1").glob("*.toml"))
     now = {f"bench1/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in files}
     assert now == fixed(), "another scenario is another benchmark: bench2"
 
@@ -47,8 +47,8 @@ def test_the_benchmark_has_five_scenarios_with_fifty_seeds_each():
 
 
 def test_the_plan_is_the_same_wherever_the_program_is_installed(tmp_path):
-    for path in builtin.FOLDER.rglob("*.toml"):
-        copy = tmp_path / path.relative_to(builtin.FOLDER)
+    for path in BUILTIN.rglob("*.toml"):
+        copy = tmp_path / path.relative_to(BUILTIN)
         copy.parent.mkdir(exist_ok=True)
         copy.write_bytes(path.read_bytes())
     assert load_plan(tmp_path / "bench1.toml").hash == load_plan("bench1").hash
@@ -82,5 +82,5 @@ def test_an_entry_is_a_law_in_every_scenario_and_its_figures_and_digests_are_in_
 
 @pytest.mark.parametrize("name", ["line", "turned", "arc", "radio", "slip"])
 def test_each_scenario_says_which_law_the_first_entry_has(name):
-    scenario = load(str(builtin.FOLDER / "bench1" / f"{name}.toml")).scenario
+    scenario = load(str(BUILTIN / "bench1" / f"{name}.toml")).scenario
     assert type(scenario.networks[0].robot[0].controller).__module__ == "miro_host.laws.yang_kim"
