@@ -128,7 +128,7 @@ class Regions:
         for row in range(self.height):
             before = 0
             for column in range(width):
-                kind = table[(data[at] >> 4) << 12 | (data[at + 1] >> 2) << 6 | data[at + 2] >> 2]
+                kind = table[(data[at] & 0xF0) << 8 | (data[at + 1] & 0xFC) << 4 | data[at + 2] >> 2]
                 at += 3
                 if kind == before:
                     continue

@@ -1,5 +1,5 @@
 cimport cython
-from miro_exact cimport dmath
+from miro_exact.dmath cimport sincos
 from miro_sim.pitch cimport rays, scene, sensor
 
 cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _BAND
@@ -62,6 +62,8 @@ cdef class Camera:
     @cython.locals(first=int, middle=int, reach=int, length='long long', place=int, way='long long', turn='long long',
                    drift='long long')
     cdef void _bound(self, int body) noexcept
+    @cython.locals(out=bytearray)
+    cpdef bytearray window(self, long long left, long long top, long long width, long long height)
     @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, bytearray out)
     @cython.locals(column=int, sure=bint, total='long long')

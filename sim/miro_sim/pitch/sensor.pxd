@@ -1,7 +1,8 @@
 cimport cython
-from miro_exact cimport dmath, rng
+from miro_exact cimport rng
+from miro_exact.dmath cimport sincos
 
-cdef long long _MASK, _FRAME_BLOCKS, _LINE_BLOCKS, _FULL
+cdef long long _MASK, _FRAME_BLOCKS, _LINE_BLOCKS, _FULL, _TICKS
 cdef int _BITS, _WIDTH, _GREY, _PAD
 
 
@@ -27,7 +28,11 @@ cdef class Sensor:
     cdef short noise_cr[352]
     cdef unsigned int words[448]
 
+    @cython.locals(light=double)
     cpdef begin(self, long long frame, long long tick, int samples)
+    @cython.locals(twice_hz='long long', turns=double, phase=double, sine_end=double, sine_begin=double, cosine=double,
+                   mean=double, _=double)
+    cdef double _lamps(self, long long tick) except? -1.0
     @cython.locals(red=int, green=int, blue=int)
     cdef void put(self, int column, long long total, long long light) noexcept
     @cython.locals(value='long long')

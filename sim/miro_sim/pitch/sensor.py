@@ -27,7 +27,7 @@ _BITS = 21
 _MASK = (1 << 21) - 1
 _FRAME_BLOCKS = 1 << 15
 _LINE_BLOCKS = 107
-_TICKS = 24_000_000
+_TICKS = 24_000_000  # in a second, which has whole periods
 _DRAWS = 4096
 _WIDTH = 320
 _PAD = 8  # places of a line's array before its first pixel, for what the low-pass sees beyond the border
@@ -131,7 +131,7 @@ class Sensor:
         """The mean light of the lamps during the exposure; 1 on average over time."""
         twice_hz = 2 * self.settings.mains_hz
         turns = self.settings.exposure_s * twice_hz
-        phase = float(tick * twice_hz % _TICKS) / _TICKS
+        phase = float(tick % _TICKS * twice_hz % _TICKS) / _TICKS
         sine_end, _ = sincos(6.283185307179586 * (phase + 0.5 * turns))
         sine_begin, cosine = sincos(6.283185307179586 * (phase - 0.5 * turns))
         mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 1e-6 else cosine
