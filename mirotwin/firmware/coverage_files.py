@@ -84,7 +84,7 @@ def read_tracefile(path: Path) -> Tracefile:
 
 def table(tracefile: Tracefile) -> Table:
     """A row a file and a total: lines, branches, and the lines that never ran."""
-    result = plain_table("file", "lines", "branches", "never ran", overflow="fold")
+    result = plain_table("file", "lines", "branches", "never ran")
     for path in sorted(tracefile):
         one = {path: tracefile[path]}
         result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))

@@ -161,7 +161,7 @@ def _digests(compare: CompareOptions, recordings: tuple[Recording, Recording], n
 def _print_sources(sources: Sequence[SourceDifference]) -> None:
     if not sources:
         return
-    table = plain_table("made from", *WORDS, overflow="fold")
+    table = plain_table("made from", *WORDS)
     for one in sources:
         table.add_row(one.key, one.one, one.other)
     show(table)

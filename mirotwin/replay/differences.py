@@ -34,7 +34,7 @@ def print_differences(found: Sequence[Difference], everything: bool, words: tupl
     table = plain_table("period", "tick", "t [s]", justify="right")
     table.add_column("channel", no_wrap=True)
     for word in words:
-        table.add_column(word, overflow="fold")
+        table.add_column(word)
     if not everything:
         table.add_column("in all", justify="right")
     for one, count in rows:
@@ -119,7 +119,7 @@ def print_frames(job: Job, replayed: Sequence[Period], everything: bool, to_tick
     table = plain_table("tick", "t [s]", justify="right")
     table.add_column("")
     table.add_column("from")
-    table.add_column("frame", overflow="fold")
+    table.add_column("frame")
     for line in shown:
         sender = "host" if line.direction == DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
         if len(robots) > 1:

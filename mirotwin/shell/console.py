@@ -28,16 +28,22 @@ def plain_table(*names: str, bold: bool = False, **style: Any) -> Table:
     return table
 
 
-def facts_table(**style: Any) -> Table:
+def facts_table() -> Table:
     """A table of names and what is to be said of each."""
-    table = plain_table("", "", bold=True, **style)
+    table = plain_table("", "", bold=True)
     table.show_header = False
     return table
 
 
 def show(result: RenderableType) -> None:
-    """Prints a result on stdout. No line of text is folded; tables in a file or a pipe are not padded."""
+    """Prints a result on stdout. No line of text is folded; tables in a file or a pipe are not padded.
+
+    In a narrow terminal a word that is too long for its column is folded, not cut: it may be a digest or a name.
+    """
     whole = isinstance(result, str)  # a path is one word, however long
+    if isinstance(result, Table):
+        for column in result.columns:
+            column.overflow = "fold"
     if sys.stdout.isatty():
         _Plain(highlight=False, markup=False).print(result, soft_wrap=whole)
         return

@@ -53,7 +53,7 @@ def info(options: InfoOptions) -> int:
     active = engines.active()
     broken = _broken_modules(active)
     image = load_firmware(options.firmware, named=False)
-    table = facts_table(overflow="fold")
+    table = facts_table()
     table.add_row("mirotwin", version_of("mirotwin"))
     table.add_row("Python", f"{platform.python_version()} ({platform.python_implementation()})")
     table.add_row("platform", platform.platform())

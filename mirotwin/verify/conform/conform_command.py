@@ -201,7 +201,7 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
             line = {"rule": rule.id, "name": rule.name, "text": rule.text, "source": rule.source}
             click.echo(msgspec.json.encode(line | {"presupposes": rule.presupposes}))
         return
-    table = plain_table("rule", "name", "what a robot has to do", overflow="fold")
+    table = plain_table("rule", "name", "what a robot has to do")
     for rule in rules:
         table.add_row(rule.id, rule.name, rule.text)
     show(table)
@@ -246,7 +246,7 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
     if begin:
         show(begin)
     names = {rule.id: rule.name for rule in rules}
-    table = plain_table("rule", "name", "verdict", "first failure", overflow="fold")
+    table = plain_table("rule", "name", "verdict", "first failure")
     for outcome in causes_first(outcomes):
         if (quiet and not outcome.failures) or (outcome.cause and not everything):
             continue
