@@ -12,30 +12,31 @@ import math
 
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_exact.dmath import sincos
-from miro_host.posture import Posture
 from miro_sim.pitch.ground import ROBOT_HALF_M
 
 GRID_TICKS = 24_000
 """1 ms: at 1.46 m/s each two robots close in by 2.9 mm."""
 CIRCLE_M = 0.05304
 """Radius of the circle around it, rounded up."""
+Pose = tuple[float, float, float]
+"""x and y in m, heading in rad."""
 
 
-def touch(one: Posture, other: Posture) -> bool:
+def touch(one: Pose, other: Pose) -> bool:
     """Whether two robots' squares overlap or touch (separating axes)."""
-    dx, dy = other.x_m - one.x_m, other.y_m - one.y_m
+    dx, dy = other[0] - one[0], other[1] - one[1]
+    sin, cos = sincos(other[2] - one[2])
+    reach = ROBOT_HALF_M + ROBOT_HALF_M * (abs(sin) + abs(cos))
     for square in (one, other):
-        sin, cos = sincos(square.theta_rad)
-        turned = sincos(other.theta_rad - one.theta_rad)
-        reach = ROBOT_HALF_M + ROBOT_HALF_M * (abs(turned[0]) + abs(turned[1]))
+        sin, cos = sincos(square[2])
         if abs(dx * cos + dy * sin) > reach or abs(dy * cos - dx * sin) > reach:
             return False
     return True
 
 
-def next_look(tick: int, one: Posture, other: Posture, closing_m_s: float) -> int:
+def next_look(tick: int, one: Pose, other: Pose, closing_m_s: float) -> int:
     """The first tick of the grid after `tick` at which they may touch, as they stand at `tick`."""
-    dx, dy = other.x_m - one.x_m, other.y_m - one.y_m
+    dx, dy = other[0] - one[0], other[1] - one[1]
     gap_m = math.sqrt(dx * dx + dy * dy) - 2.0 * CIRCLE_M
     wait = 0
     if gap_m > 0.0:

@@ -1,7 +1,8 @@
 """The robots of a world as bodies on one pitch: which of them touch, seen at the ticks of the contact grid.
 
 Robots that may touch note where they are at each tick of the grid while they run alone (`Robot.run`). The notes are
-looked at after the piece. A report changes nothing.
+looked at after the piece. Of a pair that is too far apart to touch in it nothing is asked before it could meet. A
+report changes nothing.
 """
 
 from __future__ import annotations
@@ -10,8 +11,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from miro_exact.clock import NEVER_TICK
-from miro_host.posture import Posture
-from miro_sim.pitch.contact import GRID_TICKS, next_look, touch
+from miro_sim.pitch.contact import GRID_TICKS, Pose, next_look, touch
 from miro_sim.world.robot import Robot
 
 Pair = tuple[Robot, Robot]
@@ -20,7 +20,7 @@ Pair = tuple[Robot, Robot]
 class Bodies:
     """All robots of a world. `touching`: the pairs that touched at the last look."""
 
-    NOT_STATE = ("robots", "pairs", "looks", "touching")
+    NOT_STATE = ("robots", "pairs", "next_ticks", "next_tick", "looks", "touching")
 
     def __init__(self, robots: Sequence[Robot]) -> None:
         self.robots = robots
@@ -28,33 +28,49 @@ class Bodies:
             (one, other, one.drive.params.top_speed_m_s() + other.drive.params.top_speed_m_s())
             for one, other in combinations(robots, 2)
         ]
-        self.looks: list[tuple[int, Robot, Robot, float]] = []  # in this piece: the first tick of each pair
-        self.touching: list[Pair] = []
+        self.looks: list[tuple[int, int]] = []  # in this piece: index of a pair, and its first tick
+        self.start_again([])
 
-    def begin(self, tick: int, until_tick: int) -> None:
-        """A piece begins at `tick`: robots that may touch in it note where they are, from when they may."""
-        self.looks = []
-        at = {}
-        for robot in self.robots:
-            at[robot] = _posture(robot, tick)
-            robot.note_from(NEVER_TICK)
-        for one, other, closing_m_s in self.pairs:
-            look_tick = next_look(tick, at[one], at[other], closing_m_s)
-            if look_tick <= until_tick:
-                self.looks.append((look_tick, one, other, closing_m_s))
-                for robot in (one, other):
-                    robot.note_from(min(look_tick, robot.grid_tick))
+    def start_again(self, touching: list[Pair]) -> None:
+        """The robots are somewhere else than they were: `touching` are those that touch there."""
+        self.touching = touching
+        self.next_ticks = [0] * len(self.pairs)  # of each pair: it cannot touch before
+        self.next_tick = 0  # the first of them
 
     def start_at(self, tick: int) -> None:
         """Takes those that touch at `tick` for touching already: only what begins later is reported."""
-        self.touching = [
-            (one, other) for one, other, _ in self.pairs if touch(_posture(one, tick), _posture(other, tick))
-        ]
+        self.start_again(
+            [
+                (one, other)
+                for one, other, _ in self.pairs
+                if touch(one.drive.pose_at(tick), other.drive.pose_at(tick))
+            ]
+        )
+
+    def begin(self, tick: int, until_tick: int) -> None:
+        """A piece begins at `tick`: robots that may touch in it note where they are, from when they may."""
+        if self.looks:
+            self.looks = []
+            for robot in self.robots:
+                robot.note_from(NEVER_TICK)
+        if until_tick < self.next_tick:
+            return
+        at = {robot: robot.drive.pose_at(tick) for robot in self.robots}
+        for index, (one, other, closing_m_s) in enumerate(self.pairs):
+            if self.next_ticks[index] <= until_tick:
+                look_tick = next_look(tick, at[one], at[other], closing_m_s)
+                self.next_ticks[index] = look_tick
+                if look_tick <= until_tick:
+                    self.looks.append((index, look_tick))
+                    for robot in (one, other):
+                        robot.note_from(min(look_tick, robot.grid_tick))
+        self.next_tick = min(self.next_ticks)
 
     def look(self) -> list[tuple[int, Robot, Robot]]:
         """Which pairs have begun to touch in the piece, and when; in the order of time."""
         found = []
-        for tick, one, other, closing_m_s in self.looks:
+        for index, tick in self.looks:
+            one, other, closing_m_s = self.pairs[index]
             while tick < min(one.grid_tick, other.grid_tick):  # both have noted it
                 postures = _noted(one, tick), _noted(other, tick)
                 known = (one, other) in self.touching
@@ -65,13 +81,12 @@ class Bodies:
                         self.touching = [*self.touching, (one, other)]
                         found.append((tick, one, other))
                 tick = next_look(tick, *postures, closing_m_s)
+            self.next_ticks[index] = tick
+        if self.looks:
+            self.next_tick = min(self.next_ticks)
         return sorted(found, key=lambda touch: touch[0])
 
 
-def _posture(robot: Robot, tick: int) -> Posture:
-    return Posture(*robot.drive.pose_at(tick))
-
-
-def _noted(robot: Robot, tick: int) -> Posture:
+def _noted(robot: Robot, tick: int) -> Pose:
     """Where the robot was at a tick of the grid; its last note is of the one before `grid_tick`."""
-    return Posture(*robot.noted[(tick - robot.grid_tick) // GRID_TICKS])
+    return robot.noted[(tick - robot.grid_tick) // GRID_TICKS]

@@ -345,7 +345,7 @@ class World:
         self.state.load(mark.state)
         for network, records in zip(self.networks, mark.records, strict=True):
             network.put_back(records)
-        self.bodies.touching = mark.touching
+        self.bodies.start_again(mark.touching)
 
     def counters(self) -> dict[str, dict[str, int | None]]:
         """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""

@@ -11,6 +11,8 @@ import sys
 import time
 from dataclasses import dataclass, field
 
+from msgspec.structs import astuple
+
 from miro_exact.clock import CAMERA_FRAME_TICKS
 from miro_exact.rng import Stream
 from miro_host.eye import calibration_kinds
@@ -147,12 +149,12 @@ class Crowd:
             if other is not driver and _distance(at, other.at) < 0.12:
                 way = _distance(at, other.at)
                 share = (way - GAP_M) / way
-                nearer = Posture(
+                nearer = (
                     at.x_m + (other.at.x_m - at.x_m) * share,
                     at.y_m + (other.at.y_m - at.y_m) * share,
                     other.at.theta_rad,
                 )
-                if touch(at, nearer):
+                if touch(astuple(at), nearer):
                     return False
         return True
 

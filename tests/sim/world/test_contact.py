@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_host.posture import Posture
 from miro_sim.pitch.contact import GRID_TICKS, next_look, touch
 from miro_sim.pitch.ground import ROBOT_HALF_M as HALF_M
 from miro_sim.plant.params import DriveParams
@@ -44,11 +43,12 @@ PLACES = st.floats(-0.2, 0.2)
 HEADINGS = st.floats(-3.2, 3.2)
 
 
-def corners(posture):
-    cos, sin = math.cos(posture.theta_rad), math.sin(posture.theta_rad)
+def corners(pose):
+    x_m, y_m, theta_rad = pose
+    cos, sin = math.cos(theta_rad), math.sin(theta_rad)
     for ahead, aside in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
         x, y = ahead * HALF_M, aside * HALF_M
-        yield posture.x_m + x * cos - y * sin, posture.y_m + x * sin + y * cos
+        yield x_m + x * cos - y * sin, y_m + x * sin + y * cos
 
 
 def clipped(polygon, inside_of):
@@ -74,7 +74,7 @@ def clipped(polygon, inside_of):
 
 @given(PLACES, PLACES, HEADINGS, PLACES, PLACES, HEADINGS)
 def test_squares_touch_where_their_common_area_is_not_empty(x, y, theta, u, v, phi):
-    one, other = Posture(x, y, theta), Posture(u, v, phi)
+    one, other = (x, y, theta), (u, v, phi)
     area = clipped(list(corners(one)), list(corners(other)))
     if area > 1e-9:
         assert touch(one, other)
@@ -85,18 +85,18 @@ def test_squares_touch_where_their_common_area_is_not_empty(x, y, theta, u, v, p
 
 
 def test_squares_side_by_side_touch_up_to_their_edges():
-    assert touch(Posture(0, 0, 0), Posture(2 * HALF_M, 0.01, 0))
-    assert not touch(Posture(0, 0, 0), Posture(2 * HALF_M + 1e-9, 0.01, 0))
-    assert touch(Posture(0, 0, 0), Posture(HALF_M * (1 + math.sqrt(2)) - 1e-9, 0, math.pi / 4))
-    assert not touch(Posture(0, 0, 0), Posture(HALF_M * (1 + math.sqrt(2)) + 1e-9, 0, math.pi / 4))
+    assert touch((0, 0, 0), (2 * HALF_M, 0.01, 0))
+    assert not touch((0, 0, 0), (2 * HALF_M + 1e-9, 0.01, 0))
+    assert touch((0, 0, 0), (HALF_M * (1 + math.sqrt(2)) - 1e-9, 0, math.pi / 4))
+    assert not touch((0, 0, 0), (HALF_M * (1 + math.sqrt(2)) + 1e-9, 0, math.pi / 4))
 
 
 def test_no_look_is_needed_before_they_can_meet():
     speed = 2 * DriveParams().top_speed_m_s()
-    far = next_look(0, Posture(0, 0, 0), Posture(1, 0, 0), speed)
+    far = next_look(0, (0, 0, 0), (1, 0, 0), speed)
     assert far % GRID_TICKS == 0
     assert 0.13 < far / 24e6 < 0.30
-    assert next_look(5, Posture(0, 0, 0), Posture(0.1, 0, 0), speed) == GRID_TICKS
+    assert next_look(5, (0, 0, 0), (0.1, 0, 0), speed) == GRID_TICKS
 
 
 def head_on(gap_cm):
@@ -110,7 +110,7 @@ def test_two_robots_that_meet_are_reported_at_the_first_tick_of_the_grid_at_whic
     for tick, touching in ((event.tick - GRID_TICKS, False), (event.tick, True)):
         other = head_on(10.0)
         other.run_to(tick)
-        one, two = (Posture(*robot.drive.pose_at(tick)) for robot in other.networks[0].robots)
+        one, two = (robot.drive.pose_at(tick) for robot in other.networks[0].robots)
         assert touch(one, two) is touching
 
 
@@ -155,7 +155,7 @@ def touches_by_looking_always(world, end_tick):
     robots, found, before = world.networks[0].robots, [], []
     while world.tick < end_tick:
         world.run_to(world.tick + GRID_TICKS)
-        at = [Posture(*robot.drive.pose_at(world.tick)) for robot in robots]
+        at = [robot.drive.pose_at(world.tick) for robot in robots]
         now = [(a, b) for a, b in itertools.combinations(range(5), 2) if touch(at[a], at[b])]
         found += [(world.tick, (0, a), (0, b)) for a, b in now if (a, b) not in before]
         before = now
