@@ -327,8 +327,7 @@ class Timeline:
         if not isinstance(self.run, RobotRun):
             return []
         log = self.run.world.networks[self.robots[self.focus].network].log
-        events = (event for _, event in log.since(0, heard=False))
-        return [event for event in events if event.what in ("sent", "answer") and event.tick <= self.tick]
+        return [event for _, event in log.since(0, ("sent", "answer")) if event.tick <= self.tick]
 
     @contextmanager
     def _asking(self, traps: Mapping[int, Trap], tell: Callable[[Hit], bool]) -> Iterator[None]:

@@ -22,7 +22,7 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
 from miro_sim.radio.params import UP, Radio
 from miro_sim.radio.probability import ONE
-from miro_sim.world.events import SIDES, Event
+from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, ms_ticks
 from mirotwin.verify.checks.reception import words_of
@@ -116,26 +116,28 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.needed = 0 if radio is None else frames_needed(radio.params, downlink(subject.robots).wire_size)
         self.decoder = Decoder(subject.robots)
         self.freshness = Freshness()
+        self.board = subject.robot.board
+        self.listener = None if radio is None else radio.listeners[subject.slot]
         self.air = self.before = self._air()
         self.counted = self.shown = 0
         self.begun_tick = -1
-        self.reset_tick = self.subject.robot.board.left.reset_tick
+        self.chip = self.board.left
+        self.reset_tick = self.chip.reset_tick
         self.resets: list[int] = []  # of the LM629s, that are not judged yet
         self._begin()
 
     def _begin(self) -> None:
         self.waiting: list[Waiting] = []
-        self.wheels = {side: _Wheel() for side in SIDES}
+        self.left, self.right = _Wheel(), _Wheel()
         self.turned = False  # a wheel was told to turn since the processor began
         self.words: tuple[int | None, int | None] = (0, 0)
 
     def _air(self) -> tuple[int, ...]:
         """What changes when something comes between the transmitter and the robot."""
-        board, radio = self.subject.robot.board, self.subject.radio
-        if radio is None or not board.powered or board.held:
+        board, listener = self.board, self.listener
+        if listener is None or not board.powered or board.held or listener.link_state != UP:
             return ()
-        listener = radio.listeners[self.subject.slot]
-        return (listener.bit_errors,) if listener.link_state == UP else ()
+        return (listener.bit_errors,)
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick
@@ -144,7 +146,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
     def event(self, event: Event) -> None:
         if not self.needed or not event.good_stop:
             return
-        if all(wheel.told and wheel.driven for wheel in self.wheels.values()):
+        left, right = self.left, self.right
+        if left.told and left.driven and right.told and right.driven:
             self.words = (None, None)  # alive: what it is asked need not be known
             self.shown += 1
             self.judged = int(self.shown >= FRAMES)
@@ -163,22 +166,21 @@ class AliveMonitor(Monitor[ActsAtAll]):
             return
         self.before, self.air = self.air, self._air()
         due = self._due(tick) if self.waiting else []
-        for axis, wheel, word in zip(
-            (record.left, record.right), self.wheels.values(), self.words, strict=True
-        ):
-            wheel.look(axis, word)
+        left, right = self.words
+        self.left.look(record.left, left)
+        self.right.look(record.right, right)
         for _, air, words in due:
             if air and air == self.air:
                 self.counted += any(abs(word) >= SLOWEST for word in words)
                 self.judged = max(self.judged, int(self.counted >= self.needed))
-                for wheel, word in zip(self.wheels.values(), words, strict=True):
-                    wheel.ask(word)
+                self.left.ask(words[0])
+                self.right.ask(words[1])
         if due:
             self._judge(record, tick)
 
     def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
         """In the order of time. The board may have gone on: what it has done after `now` is kept for later."""
-        tick = self.subject.robot.board.left.reset_tick
+        tick = self.chip.reset_tick
         if tick != self.reset_tick:
             self.resets.append(tick)
             self.reset_tick = tick
@@ -204,7 +206,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
 
     def _judge(self, record: RobotPeriod, tick: int) -> None:
         """Fails where a wheel has just been asked so often."""
-        wheels = self.wheels.items()
+        wheels = (("left", self.left), ("right", self.right))
         untold = [side for side, wheel in wheels if wheel.untold == self.needed]
         undriven = [
             side for side, wheel in wheels if wheel.undriven == self.needed and wheel.untold < self.needed

@@ -59,7 +59,6 @@ def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
 T = TypeVar("T")
 Expected = Mapping[RobotId, Sequence[Check]]
 _FROM_RECEIVED = ("frame", "damaged")
-_CHARACTERS = ("received", "transmitted", *_FROM_RECEIVED)
 _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
@@ -162,8 +161,8 @@ class _RobotMonitors:
         self.network = network
         self.robot = robot
         self.monitors = [self._guarded(check, partial(checked_monitor, check, subject)) for check in checks]
-        self.of_periods = [monitor for monitor in self.monitors if type(monitor).period is not Monitor.period]
-        self.of_times = [monitor for monitor in self.monitors if type(monitor).until is not Monitor.until]
+        self.of_periods = [one for one in self.monitors if type(one).period is not Monitor.period]
+        self.of_times = [one for one in self.monitors if type(one).until is not Monitor.until]
         self.of_events: dict[str, list[Monitor[Any]]] = {}
         for monitor in self.monitors:
             for what in monitor.EVENTS:
@@ -171,10 +170,10 @@ class _RobotMonitors:
         self.receiver: RobotReceiver | None = None
         if any(what in self.of_events for what in _FROM_RECEIVED):
             self.receiver = RobotReceiver(network.spec.robots)
-        self.hears_board = any(what not in _FROM_PC for what in self.of_events)
-        self.hears_pc = bool(self.of_events)
-        self.hears_characters = "heard" in self.of_events
-        self.reads_characters = any(what in self.of_events for what in _CHARACTERS)
+        self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
+        self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
+        if self.receiver is not None:
+            self.heard_of_board.add("received")
         self.of_board, self.of_pc = Cursor(robot.log), Cursor(network.log)
         self.faults = len(robot.board.faults)
         self.waiting: list[Event] = []
@@ -184,16 +183,19 @@ class _RobotMonitors:
         """Tells the monitors of the control period that began at `begun_tick` and of events before `tick`."""
         self._tell_faults()
         for monitor in self.of_periods:
-            self._guarded(monitor.check, partial(monitor.period, record, begun_tick))
+            try:
+                monitor.period(record, begun_tick)
+            except (Exception, SystemExit) as error:
+                raise self._cannot_judge(monitor.check, error) from error
         self._tell_events(tick)
 
     def _tell_faults(self) -> None:
-        board = self.robot.board
-        if len(board.faults) > self.faults:
-            for fault in board.faults[self.faults :]:
+        faults = self.robot.board.faults
+        if len(faults) > self.faults:
+            for fault in faults[self.faults :]:
                 for monitor in self.monitors:
                     self._guarded(monitor.check, partial(monitor.fault, fault))
-            self.faults = len(board.faults)
+            self.faults = len(faults)
 
     def _tell_events(self, tick: int) -> None:
         if self.of_events:
@@ -202,18 +204,13 @@ class _RobotMonitors:
 
     def _gather(self) -> None:
         """What is new in the logs."""
-        if self.hears_pc:
-            self.lost += self.of_pc.lost
-            new = self.of_pc.read(self.hears_characters)
-            self.waiting += [event for _, event in new if self._concerns(event)]
-        if self.hears_board:
+        self.lost += self.of_pc.lost
+        for _, event in self.of_pc.read(self.heard_of_pc):
+            if event.what not in _RESTARTS or event.slot == self.robot.slot:
+                self.waiting.append(event)
+        if self.heard_of_board:
             self.lost += self.of_board.lost
-            self.waiting += [event for _, event in self.of_board.read(self.reads_characters)]
-
-    def _concerns(self, event: Event) -> bool:
-        if event.what in _RESTARTS:
-            return event.slot == self.robot.slot
-        return event.what in self.of_events
+            self.waiting += [event for _, event in self.of_board.read(self.heard_of_board)]
 
     def _tell(self, tick: int) -> None:
         self.waiting.sort(key=_BY_TICK)
@@ -240,7 +237,10 @@ class _RobotMonitors:
 
     def _tell_one(self, event: Event) -> None:
         for monitor in self.of_events.get(event.what, ()):
-            self._guarded(monitor.check, partial(monitor.event, event))
+            try:
+                monitor.event(event)
+            except (Exception, SystemExit) as error:
+                raise self._cannot_judge(monitor.check, error) from error
 
     def end(self, tick: int) -> None:
         """The run is over, perhaps within a control period."""
@@ -252,13 +252,15 @@ class _RobotMonitors:
     def _guarded(self, check: Check, call: Callable[[], T]) -> T:
         try:
             return call()
-        except PluginError as error:
-            raise PluginError(f"{self._named(check)}: {error.what}", error.remedy) from error
         except (Exception, SystemExit) as error:
-            raise PluginError(f"{self._named(check)}: {raised(error)}", "repair the check") from error
+            raise self._cannot_judge(check, error) from error
 
-    def _named(self, check: Check) -> str:
-        return f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
+    def _cannot_judge(self, check: Check, error: BaseException) -> PluginError:
+        """What to raise for what a check raised."""
+        named = f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
+        if isinstance(error, PluginError):
+            return PluginError(f"{named}: {error.what}", error.remedy)
+        return PluginError(f"{named}: {raised(error)}", "repair the check")
 
 
 def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool) -> Expectation:

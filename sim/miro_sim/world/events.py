@@ -21,7 +21,7 @@ touch       two robots have begun to touch, seen every millisecond        value 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import msgspec
 
@@ -43,7 +43,7 @@ Symbol = tuple[int, bool, int]
 """Character, whether its stop bit was good, start tick."""
 
 
-class Event(msgspec.Struct, frozen=True, kw_only=True):
+class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """Something that happened at `tick`, on a robot or (`slot` -1) at the PC of a network."""
 
     tick: int
@@ -91,7 +91,7 @@ class HostLog:
     known whose start bit began at a tick. `robots`: of the network.
     """
 
-    NOT_STATE = ("network", "robots", "known_tick", "end", "kept")
+    NOT_STATE = ("network", "robots", "known_tick", "end", "kept", "rare")
 
     def __init__(self, network: int, known_tick: Callable[[int], int], robots: int) -> None:
         self.network = network
@@ -99,6 +99,9 @@ class HostLog:
         self.known_tick = known_tick
         self.end = 0
         self.kept: deque[Event | Transmission | Received | Symbol] = deque(maxlen=KEPT)
+        self.rare: deque[tuple[int, Event | Transmission | Received]] = deque(
+            maxlen=KEPT
+        )  # all but the characters
 
     @property
     def first(self) -> int:
@@ -106,24 +109,37 @@ class HostLog:
 
     def note(self, one: Event | Transmission | Received) -> None:
         self.kept.append(one)
+        self.rare.append((self.end, one))
         self.end += 1
 
     def note_heard(self, symbols: Sequence[Symbol]) -> None:
         self.kept.extend(symbols)
         self.end += len(symbols)
 
-    def since(self, serial: int, heard: bool = True) -> Iterator[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept; `heard`: with the characters."""
-        for place in range(max(0, serial - self.first), len(self.kept)):
-            one = self.kept[place]
-            if isinstance(one, Event):
-                yield self.first + place, one
-            elif isinstance(one, Transmission):
-                yield self.first + place, self._sent(one)
-            elif isinstance(one, Received):
-                yield self.first + place, self._answer(one)
-            elif heard:
-                yield self.first + place, self._heard(*one)
+    def since(self, serial: int, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
+        """(serial number, event) of those from `serial` on that are kept; `kinds`: of these alone."""
+        first = self.first
+        serial = max(serial, first)
+        if kinds is None or "heard" in kinds:
+            every = [(number, self.kept[number - first]) for number in range(serial, self.end)]
+            return [
+                (number, self._event(one)) for number, one in every if kinds is None or _kind(one) in kinds
+            ]
+        found = []
+        for number, one in reversed(self.rare):
+            if number < serial:
+                break
+            if _kind(one) in kinds:
+                found.append((number, self._event(one)))
+        found.reverse()
+        return found
+
+    def _event(self, one: Event | Transmission | Received | Symbol) -> Event:
+        if isinstance(one, Event):
+            return one
+        if isinstance(one, Transmission):
+            return self._sent(one)
+        return self._answer(one) if isinstance(one, Received) else self._heard(*one)
 
     def _sent(self, sent: Transmission) -> Event:
         good = not sent.bad_stop
@@ -147,6 +163,17 @@ class HostLog:
         while self.end > serial and self.kept:
             self.kept.pop()
             self.end -= 1
+        while self.rare and self.rare[len(self.rare) - 1][0] >= self.end:
+            self.rare.pop()
+
+
+def _kind(one: Event | Transmission | Received | Symbol) -> str:
+    """Of what a host log keeps."""
+    if isinstance(one, Event):
+        return one.what
+    if isinstance(one, Transmission):
+        return "sent"
+    return "answer" if isinstance(one, Received) else "heard"
 
 
 def of_action(action: Action) -> Event:
@@ -156,9 +183,6 @@ def of_action(action: Action) -> Event:
         return Event(tick=action.tick, what="radio", network=action.network, value=value)
     what, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
     return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)
-
-
-_CHARACTERS = (event_log.RECEIVED, event_log.SENT)
 
 
 class RobotLog:
@@ -179,12 +203,24 @@ class RobotLog:
     def end(self) -> int:
         return self.log.end
 
-    def since(self, serial: int, heard: bool = True) -> Iterator[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept; `heard`: with the characters."""
+    def since(self, serial: int, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
+        """(serial number, event) of those from `serial` on that are kept; `kinds`: of these alone."""
+        found = []
         for number in range(max(serial, self.log.first), self.log.end):
-            found = self.log.event(number)
-            if heard or found[1] not in _CHARACTERS:
-                yield number, _event(*found, self.network, self.slot)
+            noted = self.log.event(number)
+            if kinds is None or _KINDS[noted[1]] in kinds:
+                found.append((number, _event(*noted, self.network, self.slot)))
+        return found
+
+
+_KINDS = {
+    event_log.RECEIVED: "received",
+    event_log.SENT: "transmitted",
+    event_log.COMMAND: "command",
+    event_log.FAULT: "fault",
+    event_log.REACHED: "reached",
+    event_log.TRUE: "true",
+}
 
 
 class Cursor:
@@ -199,11 +235,12 @@ class Cursor:
     @property
     def lost(self) -> int:
         """Events that were not read and are no longer kept."""
-        return max(0, self.log.first - self.next)
+        lost = self.log.first - self.next
+        return lost if lost > 0 else 0
 
-    def read(self, heard: bool = True) -> list[tuple[int, Event]]:
-        """(serial number, event) of what is new; `heard`: with the characters, which are most of it."""
-        found = list(self.log.since(self.next, heard))
+    def read(self, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
+        """(serial number, event) of what is new; `kinds`: of these alone."""
+        found = self.log.since(self.next, kinds)
         self.next = self.log.end
         return found
 

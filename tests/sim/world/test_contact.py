@@ -143,11 +143,7 @@ reference.speed_m_s = {4}
 
 
 def touches(world):
-    return [
-        (e.tick, (e.network, e.value), e.other)
-        for _, e in world.networks[0].log.since(0, heard=False)
-        if e.what == "touch"
-    ]
+    return [(e.tick, (e.network, e.value), e.other) for _, e in world.networks[0].log.since(0, ("touch",))]
 
 
 def touches_by_looking_always(world, end_tick):

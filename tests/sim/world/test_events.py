@@ -30,16 +30,20 @@ def test_a_cursor_gives_what_was_noted_after_it_was_made_once():
     assert cursor.read() == []
 
 
-def test_a_cursor_on_a_pc_may_leave_out_characters():
+def test_a_cursor_on_a_pc_may_read_events_of_some_kinds_alone():
     log = host_log()
-    with_characters, without = Cursor(log), Cursor(log)
+    every, some, none = Cursor(log), Cursor(log), Cursor(log)
     log.note_heard([(0x55, True, 10)])
     log.note(Event(tick=11, what="answer"))
-    assert [(serial, event.what, event.tick) for serial, event in with_characters.read()] == [
+    assert [(serial, event.what, event.tick) for serial, event in every.read()] == [
         (0, "heard", 17),
         (1, "answer", 11),
     ]
-    assert [event.what for _, event in without.read(heard=False)] == ["answer"]
+    assert [(serial, event.what) for serial, event in some.read(("heard", "sent"))] == [(0, "heard")]
+    assert [(serial, event.what) for serial, event in none.read(("answer",))] == [(1, "answer")]
+    log.cut(1)
+    log.note(Event(tick=12, what="sent"))
+    assert [(serial, event.what) for serial, event in log.since(0, ("answer", "sent"))] == [(1, "sent")]
 
 
 def test_what_a_pc_sent_and_was_answered_are_events_when_its_log_is_read():
@@ -48,7 +52,7 @@ def test_what_a_pc_sent_and_was_answered_are_events_when_its_log_is_read():
     (answer,) = TelemetryDecoder().feed(encode(TelemetryFrame(seq=3, slot=2), 3), 1000)
     log.note(Transmission(5, ">", b"ab", 0, (1,)))
     log.note(answer)
-    assert [event for _, event in cursor.read(heard=False)] == [
+    assert [event for _, event in cursor.read(("sent", "answer"))] == [
         Event(tick=5, what="sent", data=b"ab", good_stop=False),
         Event(tick=answer.last_tick + 7, what="answer", value=2, frame=answer),
     ]
@@ -62,12 +66,12 @@ def test_an_answer_that_no_robot_gives_is_of_no_slot():
     assert [event.value for _, event in cursor.read()] == [-1]
 
 
-def test_a_cursor_on_a_robot_may_leave_out_characters():
+def test_a_cursor_on_a_robot_may_read_events_of_some_kinds_alone():
     log = robot_log()
     cursor = Cursor(log)
     for kind in (RECEIVED, SENT, REACHED):
         log.log.note(kind, 5, 1, 0x41)
-    assert [(serial, event.what) for serial, event in cursor.read(heard=False)] == [(2, "reached")]
+    assert [(serial, event.what) for serial, event in cursor.read(("reached", "fault"))] == [(2, "reached")]
     assert cursor.read() == []
 
 
@@ -80,5 +84,6 @@ def test_a_cursor_counts_what_was_dropped_before_it_was_read():
     for tick in range(KEPT + 4):
         host.note(Event(tick=tick, what="sent"))
     assert (on_robot.lost, on_host.lost) == (3, 4)
+    assert list(host.since(0, ("sent",))) == list(host.since(0))
     assert [on_robot.read()[0][0], on_host.read()[0][0]] == [3, 4]
     assert (on_robot.lost, on_host.lost) == (0, 0)
