@@ -16,7 +16,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
 from types import FrameType
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, TextIO
 
 import click
 
@@ -83,13 +83,13 @@ def show_line(text: str) -> None:
     click.echo(one_line(text.expandtabs()))
 
 
-def _report(error: Exception) -> None:
-    """One line that requests a report, after the traceback if MIROTWIN_TRACEBACK is set."""
+def _report(error: Exception) -> str:
+    """A line that requests a report; the traceback comes before it if MIROTWIN_TRACEBACK is set."""
     if os.environ.get("MIROTWIN_TRACEBACK"):
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     text = f"{type(error).__name__}: {error}".rstrip(": ")
     ask = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
-    complain(f"internal error: {text}; {ask}")
+    return f"internal error: {text}; {ask}"
 
 
 def _said(error: click.UsageError) -> str:
@@ -122,12 +122,21 @@ def terminable() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _give_up_stdout() -> None:
+def _give_up(stream: TextIO) -> None:
     """What is still buffered has nowhere to go; without this the interpreter tries again when it ends."""
     try:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     except (OSError, ValueError):  # not a real file: nothing will be tried
         return
+
+
+def _ended(code: int, message: str) -> int:
+    """The exit code, after the line that says why; where stderr is full or its reader has gone, the code alone."""
+    try:
+        complain(message)
+    except OSError:
+        _give_up(sys.stderr)
+    return code
 
 
 class Lazy(NamedTuple):
@@ -226,8 +235,7 @@ class MainGroup(LazyGroup):
         if vars(sys)["stderr"] is None:  # `2>&-`: the next file to be opened would take its place
             sys.stderr = open(os.devnull, "w")  # noqa: SIM115
         if vars(sys)["stdout"] is None:  # `>&-`: the next file to be opened would take its place
-            complain("error: standard output is closed; send it to a file or a pipe")
-            return BAD_INPUT
+            return _ended(BAD_INPUT, "error: standard output is closed; send it to a file or a pipe")
         if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
             sys.stdout.reconfigure(errors="backslashreplace")
         settle_engine(sys.argv[1:] if args is None else args)
@@ -240,35 +248,27 @@ class MainGroup(LazyGroup):
             return BAD_INPUT
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else prog_name
-            complain(f"error: {_said(error)} See `{path} --help`.")
-            return BAD_INPUT
+            return _ended(BAD_INPUT, f"error: {_said(error)} See `{path} --help`.")
         except click.ClickException as error:
-            complain(f"error: {error.format_message()}")
-            return BAD_INPUT
+            return _ended(BAD_INPUT, f"error: {error.format_message()}")
         except BadInput as error:
             show_traceback(error)
-            complain(f"error: {error}")
-            return BAD_INPUT
+            return _ended(BAD_INPUT, f"error: {error}")
         except (ReaderGone, BrokenPipeError):
-            _give_up_stdout()
+            _give_up(sys.stdout)
             return SIGNALLED + SIGPIPE
         except OSError as error:
             reason = error.strerror or str(error) or type(error).__name__
             if error.filename is None:  # no file was being opened: stdout is full, or a disk
-                complain(f"error: reading or writing failed: {reason}")
-                _give_up_stdout()
-            else:
-                complain(f"error: {os.fsdecode(error.filename)}: {reason}")
-            return BAD_INPUT
+                _give_up(sys.stdout)
+                return _ended(BAD_INPUT, f"error: reading or writing failed: {reason}")
+            return _ended(BAD_INPUT, f"error: {os.fsdecode(error.filename)}: {reason}")
         except (click.Abort, KeyboardInterrupt):
-            complain("interrupted")
-            return INTERRUPTED
+            return _ended(INTERRUPTED, "interrupted")
         except Terminated as error:
-            complain(f"ended by {error}")
-            return SIGNALLED + error.number
+            return _ended(SIGNALLED + error.number, f"ended by {error}")
         except Exception as error:
-            _report(error)
-            return INTERNAL_ERROR
+            return _ended(INTERNAL_ERROR, _report(error))
         return code if isinstance(code, int) else DONE
 
 

@@ -1,7 +1,9 @@
 """The list of commands, and what is loaded for it."""
 
+import os
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -160,3 +162,17 @@ def test_a_quiet_run_with_its_figure_loads_neither_rich_nor_numpy(tmp_path):
         [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert (done.stdout, done.stderr) == ("set()\n", "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [["run", "nope"], ["test", "nope"], ["run", "--nope"]])
+def test_the_exit_code_stays_where_stderr_is_full_or_its_reader_has_gone(words):
+    command = [Path(sys.executable).with_name("mirotwin"), *words]
+    with open("/dev/full", "w") as full:
+        assert children.run(command, stderr=full, check=False).returncode == 2
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        assert children.run(command, stderr=writer, check=False).returncode == 2
+    finally:
+        os.close(writer)
