@@ -24,7 +24,7 @@ from miro_robot.image import Image, load_hex
 from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
-from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.inputs import seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from tests.mutants.build import CACHE, IMAGE

@@ -23,9 +23,8 @@ from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.harness.program import OPERATIONS
 from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
-from mirotwin.fuzz.inputs import SILENCE, input_of
+from mirotwin.fuzz.inputs import SILENCE, input_of, seeds
 from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
-from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import RobotTarget, target_for
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.expect import CHECKS

@@ -1,25 +1,120 @@
-"""`mirotwin fw run`: an image on the bare processor, with nothing but its serial port and pins connected."""
+"""`mirotwin fw run`: an image on the bare processor, with nothing but its serial port and pins connected.
+
+With --terminal the keyboard and the screen are a terminal on that port. This is one of the few places that know the
+wall clock. The machine does not: the same keys at the same machine cycles give the same bits. The terminal has its old
+settings back however the run ends: Ctrl-], the program's end, an exception, or a signal, which `shell.program` turns
+into an exception.
+"""
 
 from __future__ import annotations
 
+import os
+import select
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 
+from miro_exact.bad_input import BadInput, amount
+from miro_robot.bare.machine import BareMachine, Ended
 from mirotwin.firmware.bare_options import (
+    STDIN,
     BareOptions,
     load_bare_image,
     make_machine,
     report,
     target_of,
 )
-from mirotwin.firmware.terminal import check_terminal, run_terminal
+from mirotwin.firmware.code_place import place_of
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
+
+LEAVE = b"\x1d"  # Ctrl-]
+SLICE_S = 0.01  # of machine time between two looks at the keyboard
+LATEST_S = 0.1  # a machine that is later than this is not sped up to catch up
+READ_BYTES = 1024
+
+
+def check_terminal(options: BareOptions) -> None:
+    """Raises BadInput where there is no terminal to be live on."""
+    if vars(sys)["stdin"] is None or not sys.stdin.isatty():
+        raise BadInput(
+            "", "--terminal", "standard input is no terminal", "run it in one, or give input with --stdin"
+        )
+    if STDIN in options.stdin:
+        raise BadInput("", "--stdin", "- is the keyboard, which --terminal uses already", "name a file")
+    try:
+        import termios  # noqa: F401
+    except ImportError:
+        raise BadInput(
+            "", "--terminal", "this system has no POSIX terminals", "give input with --stdin"
+        ) from None
+
+
+def run_terminal(machine: BareMachine, target: int | None, options: BareOptions) -> Ended:
+    """Runs `machine`, which must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
+    hertz = options.crystal_hz / 12
+    slice_cycles = max(1, int(hertz * SLICE_S))
+    keyboard = sys.stdin.fileno()
+    left = False
+    with _raw(keyboard):
+        due_s = time.monotonic()
+        while True:
+            ended = machine.run(target, options.max_cycles, pause=machine.cpu.cycles + slice_cycles)
+            sys.stdout.buffer.flush()
+            if ended is not Ended.PAUSED:
+                break
+            due_s = max(due_s + SLICE_S, time.monotonic() - LATEST_S)
+            keys = _keys(keyboard, due_s)
+            if keys is None or LEAVE in keys:
+                left = True
+                break
+            if keys:
+                machine.input.add(keys)
+    if left:
+        complain(
+            f"left at {place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
+        )
+    return ended
+
+
+def _keys(keyboard: int, due_s: float) -> bytes | None:
+    """What was typed until `due_s`, which is waited for; None when the terminal has gone."""
+    keys = b""
+    while True:
+        left_s = due_s - time.monotonic()
+        if not select.select([keyboard], [], [], max(0.0, left_s))[0]:
+            return keys
+        try:
+            more = os.read(keyboard, READ_BYTES)
+        except OSError:
+            return None
+        if not more:
+            return None
+        keys += more
+        if left_s <= 0 or LEAVE in keys:
+            return keys
+
+
+@contextmanager
+def _raw(keyboard: int) -> Iterator[None]:
+    """Every key is handed on as it is, also Ctrl-C, and none is echoed."""
+    import termios
+    import tty
+
+    before = termios.tcgetattr(keyboard)
+    try:
+        tty.setraw(keyboard, termios.TCSANOW)
+        yield
+    finally:
+        termios.tcsetattr(keyboard, termios.TCSANOW, before)
 
 
 class FwRunOptions(Options, frozen=True, kw_only=True):

@@ -1,6 +1,13 @@
-"""What `mirotwin fuzz` says at the end: counts, coverage, crashes with the line that repeats each, and summary.json."""
+"""What `mirotwin fuzz` says while it is under way, a line that is drawn again or plain lines, and at its end: counts,
+coverage, crashes with the line that repeats each, and summary.json.
+
+This is one of the few places that know the wall clock.
+"""
 
 from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Self
 
 import msgspec
 
@@ -8,12 +15,69 @@ from miro_exact.bad_input import amount
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
-from mirotwin.fuzz.campaign import Campaign
-from mirotwin.fuzz.fuzz_progress import clock
+from mirotwin.fuzz.campaign import Campaign, Status
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
+from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
+
+if TYPE_CHECKING:
+    from rich.progress import ProgressColumn
+
+
+LINE_S = 10.0
+"""Wall time between two plain lines, where stderr is no terminal."""
+
+
+class FuzzProgress(ProgressBar):
+    """A context manager; `show(status)` may be called as often as one likes. `time_s` None: no end is known."""
+
+    PATIENCE_S = 0.0
+
+    def __init__(self, what: str, time_s: float | None, quiet: bool = False) -> None:
+        super().__init__(f"fuzzing {what}", time_s, quiet)
+        self._quiet = quiet
+        self._line_s = time.monotonic()
+
+    def __enter__(self) -> Self:
+        self.to(0.0, said="starting")
+        return self
+
+    def show(self, status: Status) -> None:
+        """Draws the line again, or writes one if the last is some time ago."""
+        if self._shown:
+            done = status.run_s if self.total is None else min(status.run_s, self.total)
+            self.to(done, said=said(status))
+        elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
+            self._line_s = time.monotonic()
+            left = "" if self.total is None else f", {clock(max(0.0, self.total - status.run_s))} left"
+            complain(f"{self.what}: {clock(status.run_s)}: {said(status)}{left}")
+
+    def _columns(self) -> list[ProgressColumn]:
+        from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
+        words = [TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]")]
+        return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
+
+
+def said(status: Status) -> str:
+    """Rates and counts of a campaign, in short."""
+    parts = [f"{status.executions_per_s:.0f}/s"]
+    if status.edges is not None:  # else the engine has not said yet
+        parts.append(amount(status.edges, "edge"))
+    parts.append(amount(status.crashes or "no", "crash", "crashes"))
+    if status.unconfirmed:
+        parts.append(f"{status.unconfirmed} unconfirmed")
+    return ", ".join(parts)
+
+
+def clock(time_s: float) -> str:
+    """A duration as minutes and seconds, `1:05`, or `2:00:00` with hours."""
+    minutes, seconds = divmod(int(time_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+
 
 COVERAGE = "coverage.info"
 SUMMARY = "summary.json"

@@ -19,7 +19,7 @@ from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.inputs import seeds
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS
 from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
 

@@ -11,7 +11,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path
 from miro_robot.image import FLASH_BYTES, Image, load_hex
-from miro_robot.image.symbols import STACK
+from miro_robot.image.symbol_files import STACK
 
 _Stamp = tuple[tuple[int, int] | None, ...]
 """Time and size of the image and of the symbol files beside it, None for one that is not there."""

@@ -12,8 +12,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import IMAGE_BYTES, InputError, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
-from miro_robot.image.symbol_files import Symbol, parse_cdb, parse_map, read_text
-from miro_robot.image.symbols import Symbols
+from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
 
 FLASH_BYTES = 8192  # of an AT89C52
 SPACE_BYTES = 0x10000

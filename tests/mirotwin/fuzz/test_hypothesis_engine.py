@@ -11,11 +11,11 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.harness.program import INPUTS, OPERATIONS
 from miro_robot.image import load_hex
-from mirotwin.fuzz import hypothesis_search
+from mirotwin.fuzz import hypothesis_process
 from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.hypothesis_inputs import inputs
-from mirotwin.fuzz.hypothesis_search import Explorer, explore
+from mirotwin.fuzz.hypothesis_process import Explorer, explore
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import target_for
 from tests.mirotwin.fuzz.toy import Toy
@@ -62,7 +62,7 @@ def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to():
 
 @pytest.mark.slow
 def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(monkeypatch):
-    monkeypatch.setattr(hypothesis_search, "ROUND_EXAMPLES", 60)
+    monkeypatch.setattr(hypothesis_process, "ROUND_EXAMPLES", 60)
     one, two, other = (kept_after(200, seed)[0] for seed in (1, 1, 2))
     assert one == two
     assert one != other

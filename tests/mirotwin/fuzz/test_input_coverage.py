@@ -1,8 +1,7 @@
 """What inputs reach, and the path that tells crashes apart."""
 
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.inputs import input_of
-from mirotwin.fuzz.seeds import seeds, sent, talks
+from mirotwin.fuzz.inputs import input_of, seeds, sent, talks
 from mirotwin.fuzz.target import target_for
 from tests.mirotwin.verify.checks.rig import own_image
 

@@ -8,8 +8,7 @@ from miro_protocol.actions import Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
-from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of
-from mirotwin.fuzz.seeds import seeds, sent, talks
+from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of, seeds, sent, talks
 
 NUMBERS = st.integers(-32767, 32767)
 

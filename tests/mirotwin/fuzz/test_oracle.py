@@ -7,8 +7,8 @@ from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
+from mirotwin.fuzz.inputs import seeds
 from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
-from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import TargetFailure, target_for
 from mirotwin.fuzz.triage import Triage
 from mirotwin.verify.checks.expect import CHECKS

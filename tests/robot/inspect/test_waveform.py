@@ -16,8 +16,7 @@ from miro_robot import inspect
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.inspect.signals import SIGNALS
-from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform, nanoseconds, tick_of
+from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform, nanoseconds, tick_of
 from miro_robot.lm629.chip import PWM_TICKS
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
