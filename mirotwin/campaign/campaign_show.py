@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
 import click
 import msgspec
-import numpy as np
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.campaign.columns import CHECK
-from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifference, difference
-from mirotwin.campaign.design import Value
-from mirotwin.campaign.rows import UNSETTLED, VERDICTS, ResultRows, paired, paired_levels
-from mirotwin.campaign.statistics import Figures, Interval, figures
+from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifference, differences
+from mirotwin.campaign.rows import UNSETTLED, VERDICTS, Arm, ResultRows, paired, paired_levels
+from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as show_table
@@ -26,15 +25,6 @@ from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
 MOST_GROUPS = 50
 """More are in --json only."""
-
-
-class GroupFigures(msgspec.Struct, frozen=True):
-    """Runs with the same levels of some factors."""
-
-    factors: dict[str, Value]
-    runs: int
-    verdicts: dict[str, int]
-    metrics: dict[str, Figures | None]
 
 
 class ShowOptions(Options, frozen=True, kw_only=True):
@@ -98,24 +88,9 @@ def show(options: ShowOptions) -> int:
 
 
 def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: bool) -> None:
-    columns = {name: rows.numbers(name) for name in metrics}
-    verdicts = rows.column("verdict")
     groups = rows.groups(by)
-    found, samples = [], rows.samples()
-    for levels, members in list(groups.items())[: None if as_json else MOST_GROUPS]:
-        numbers = {name: column[np.array(members)] for name, column in columns.items()}
-        seeds = samples[np.array(members)]
-        found.append(
-            GroupFigures(
-                factors=dict(zip(by, levels, strict=True)),
-                runs=len(members),
-                verdicts={name: [verdicts[row] for row in members].count(name) for name in VERDICTS},
-                metrics={
-                    name: figures(column[~np.isnan(column)], seeds[~np.isnan(column)])
-                    for name, column in numbers.items()
-                },
-            )
-        )
+    arms = rows.arms(by, groups, metrics)
+    found = [arm for arm, _ in islice(arms, None if as_json else MOST_GROUPS)]
     if as_json:
         _print_json({"results": str(rows.path), "runs": rows.count, "groups": found})
         return
@@ -127,7 +102,7 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
         )
 
 
-def _groups_table(groups: Sequence[GroupFigures]) -> Table:
+def _groups_table(groups: Sequence[Arm]) -> Table:
     table = plain_table(*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric")
     for name in ("of", "median", "95 % interval", "5 %", "95 %", "worst"):
         table.add_column(name, justify="right")
@@ -160,7 +135,7 @@ def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool)
     if not pairs:
         what = f"no run with {first} has a twin with {second}"
         raise BadInput(rows.path, "--between", what, "the campaign has to be complete")
-    found = _differences(rows, rows, pairs, metrics)
+    found = differences(metrics, rows, rows, pairs)
     if as_json:
         _print_json({"factor": name, "first": first, "second": second, "differences": found})
         return DONE
@@ -180,7 +155,7 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
     if seeds < FEWEST_FOR_GATE:
         what = f"has only {amount(seeds, 'seed')} in common with {rows.path}"
         raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
-    found = _differences(baseline, rows, pairs, metrics)
+    found = differences(metrics, baseline, rows, pairs)
     worse = [one for one in found if one.worse(tolerance)]
     ours, theirs = rows.column("digest"), baseline.column("digest")
     same = [theirs[first] == ours[second] for first, second in pairs].count(True)
@@ -206,13 +181,6 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
     for one in worse:
         complain(f"worse than {path}: {_sentence(one)}")
     return EXPECTATION_FAILED if worse else DONE
-
-
-def _differences(
-    first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]], metrics: Sequence[str]
-) -> list[MetricDifference]:
-    found = [difference(name, first, second, pairs) for name in metrics]
-    return [one for one in found if one is not None]
 
 
 def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from mirotwin.campaign.rows import ResultRows
-from mirotwin.campaign.statistics import Interval, mean, mean_interval, quantile
+from mirotwin.campaign.statistics import Interval, Numbers, Seeds, mean, mean_interval, quantile
 
 FEWEST_FOR_GATE = 20
 """Seeds below which a comparison fails or passes by the luck of a few."""
@@ -54,25 +54,39 @@ class MetricDifference(msgspec.Struct, frozen=True):
         return self.interval.low > allowed
 
 
+def both_have(
+    metric: str, first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
+) -> tuple[Numbers, Numbers, Seeds]:
+    """The metric's numbers in the pairs in which both have it, and the rows of `second` that these are."""
+    places = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    before, after = first.numbers(metric)[places[:, 0]], second.numbers(metric)[places[:, 1]]
+    both = ~(np.isnan(before) | np.isnan(after))
+    return before[both], after[both], places[both, 1]
+
+
+def differences(
+    metrics: Sequence[str], first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
+) -> list[MetricDifference]:
+    """Those of the metrics that both have in a pair."""
+    found = [difference(name, first, second, pairs) for name in metrics]
+    return [one for one in found if one is not None]
+
+
 def difference(
     metric: str, first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
 ) -> MetricDifference | None:
     """Of the pairs (row of `first`, row of `second`) in which both have the metric; None where there are none."""
-    before, after = first.numbers(metric), second.numbers(metric)
-    places = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    ours, theirs = before[places[:, 0]], after[places[:, 1]]
-    both = ~(np.isnan(ours) | np.isnan(theirs))
-    ours, theirs = ours[both], theirs[both]
-    if not len(ours):
+    before, after, places = both_have(metric, first, second, pairs)
+    if not len(before):
         return None
-    apart, seeds = theirs - ours, second.samples()[places[both, 1]]
+    apart, seeds = after - before, second.samples()[places]
     return MetricDifference(
         metric=metric,
         pairs=len(apart),
-        without=len(places) - len(apart),
+        without=len(pairs) - len(apart),
         seeds=len(np.unique(seeds)),
-        first=mean(ours),
-        second=mean(theirs),
+        first=mean(before),
+        second=mean(after),
         difference=mean(apart),
         interval=mean_interval(apart, seeds),
         median=quantile(np.sort(apart), 0.5),

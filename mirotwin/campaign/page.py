@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-import numpy as np
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.settings import EXPECT
-from mirotwin.campaign.comparison import GATED, MetricDifference, difference
+from mirotwin.campaign.comparison import GATED, MetricDifference, both_have, differences
 from mirotwin.campaign.design import Value, inline
 from mirotwin.campaign.results import ResultsInfo
-from mirotwin.campaign.rows import VERDICTS, ResultRows, paired_levels
-from mirotwin.campaign.statistics import Figures, figures
+from mirotwin.campaign.rows import VERDICTS, Arm, ResultRows, label_of, paired_levels
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, render, write_page
 from mirotwin.run.run_options import RunOptions
@@ -57,16 +55,6 @@ MOST_LEVELS = 6
 MOST_COMPARISONS = 12
 LISTED = 300
 """Runs that went wrong; the table says how many there are."""
-EVERYONE = "all runs"
-
-
-class ArmRow(msgspec.Struct, frozen=True):
-    """An arm in the table."""
-
-    label: str
-    runs: int
-    verdicts: dict[str, int]
-    metrics: dict[str, Figures | None]
 
 
 class Comparison(msgspec.Struct, frozen=True):
@@ -88,9 +76,8 @@ def campaign_page(path: Path) -> bytes:
         raise BadInput(path, "", "holds no runs", "give the results of a campaign")
     metrics = [name for name in METRICS if name in rows.metrics()]
     by = _by(rows)
-    groups = rows.groups(by)
     made: dict[str, Any] = {}
-    arms = _arms(rows, by, groups, metrics, made)
+    arms = _arms(rows, by, metrics, made)
     comparisons = _comparisons(rows, made)
     failed = _failed(rows)
     verdicts = rows.column("verdict")
@@ -120,44 +107,17 @@ def _by(rows: ResultRows) -> tuple[str, ...]:
     return factors
 
 
-def label_of(by: Sequence[str], levels: Sequence[Value]) -> str:
-    """An arm by its levels: texts by themselves, numbers with the last word of their key."""
-    if not by:
-        return EVERYONE
-    return ", ".join(
-        level if isinstance(level, str) else f"{name.rpartition('.')[2]} {level}"
-        for name, level in zip(by, levels, strict=True)
-    )
+def _arms(rows: ResultRows, by: tuple[str, ...], metrics: Sequence[str], made: dict[str, Any]) -> list[Arm]:
+    from mirotwin.campaign.plots import DrawnArm, spread  # loads Bokeh
 
-
-def _arms(
-    rows: ResultRows,
-    by: tuple[str, ...],
-    groups: dict[tuple[Value, ...], list[int]],
-    metrics: Sequence[str],
-    made: dict[str, Any],
-) -> list[ArmRow]:
-    from mirotwin.campaign.plots import Arm, spread  # loads Bokeh
-
-    verdicts = rows.column("verdict")
-    drawn: dict[str, list[Arm]] = {name: [] for name in metrics}
-    columns, samples = {name: rows.numbers(name) for name in metrics}, rows.samples()
+    drawn: dict[str, list[DrawnArm]] = {name: [] for name in metrics}
     found = []
-    for levels, members in groups.items():
-        label = label_of(by, levels)
-        of_arm: dict[str, Figures | None] = {}
-        for name, column in columns.items():
-            numbers = column[np.array(members)]
-            there = ~np.isnan(numbers)
-            numbers = numbers[there]
-            of_arm[name] = summary = figures(numbers, samples[np.array(members)][there])
+    for arm, numbers in rows.arms(by, rows.groups(by), metrics):
+        found.append(arm)
+        for name, summary in arm.metrics.items():
             if summary is not None:
-                drawn[name].append(Arm(label, numbers, summary))
-        counted = [verdicts[row] for row in members]
-        found.append(ArmRow(label, len(members), {name: counted.count(name) for name in VERDICTS}, of_arm))
-    for name, arms in drawn.items():
-        if arms:
-            made[f"plot-{name}"] = spread(name, arms)
+                drawn[name].append(DrawnArm(arm.label, numbers[name], summary))
+    made |= {f"plot-{name}": spread(name, arms) for name, arms in drawn.items() if arms}
     return found
 
 
@@ -172,32 +132,28 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[Comparison]:
             pairs = paired_levels(rows, factor, first, second)
             if not pairs or len(found) == MOST_COMPARISONS:
                 continue
-            differences = [one for name in GATED if (one := difference(name, rows, rows, pairs)) is not None]
-            shown = [
-                Apart(one, _apart(rows, one.metric, pairs)) for one in differences if one.metric in METRICS
-            ]
+            compared = differences(GATED, rows, rows, pairs)
+            shown = [Apart(one, _apart(rows, one.metric, pairs)) for one in compared if one.metric in METRICS]
             figure = ""
             if any(one.difference.first and one.difference.interval for one in shown):
                 figure = f"plot-pairs-{len(found)}"
                 made[figure] = apart(shown)
-            found.append(Comparison(factor, first, second, len(pairs), differences, figure))
+            found.append(Comparison(factor, first, second, len(pairs), compared, figure))
     return found
 
 
 def _apart(rows: ResultRows, metric: str, pairs: Sequence[tuple[int, int]]) -> Any:
-    numbers = rows.numbers(metric)
-    places = np.array(pairs, dtype=np.int64)
-    found = numbers[places[:, 1]] - numbers[places[:, 0]]
-    return found[~np.isnan(found)]
+    before, after, _ = both_have(metric, rows, rows, pairs)
+    return after - before
 
 
 def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
     """Run, arm, seed, verdict and what it said, of each run that has not passed."""
     factors = rows.about.factors
     columns = [rows.column(name) for name in ("run", "seed", "verdict", "error", "failure")]
-    levels = [rows.column(name) for name in factors]
+    levels = {name: rows.column(name) for name in factors}
     return [
-        (run, label_of(factors, [column[row] for column in levels]), seed, verdict, error or failure)
+        (run, label_of({name: levels[name][row] for name in factors}), seed, verdict, error or failure)
         for row, (run, seed, verdict, error, failure) in enumerate(zip(*columns, strict=True))
         if verdict != "passed"
     ]

@@ -32,7 +32,7 @@ LEAST = {"rms_position_cm": 0.01, "rms_theta_deg": 0.01, "settling_s": 0.05}
 LEAST_PERCENT = 0.1
 
 
-class Arm(msgspec.Struct, frozen=True):
+class DrawnArm(msgspec.Struct, frozen=True):
     """A row of a figure; `numbers` without what a run does not have."""
 
     label: str
@@ -47,7 +47,7 @@ class Apart(msgspec.Struct, frozen=True):
     numbers: Numbers
 
 
-def spread(metric: str, arms: Sequence[Arm]) -> Any:
+def spread(metric: str, arms: Sequence[DrawnArm]) -> Any:
     """A row for each arm, over one range."""
     labels = [wrapped(arm.label) for arm in arms]
     made = _rows(metric, labels)

@@ -6,22 +6,46 @@ Besides the figures of a run there are shares, 1 for a run of which it is true a
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Value, inline
 from mirotwin.campaign.results import ResultsInfo, read
-from mirotwin.campaign.statistics import Numbers, Seeds
+from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
 
 VERDICTS = ("failed", "fault", "error")
 UNSETTLED = "unsettled"
+EVERYONE = "all runs"
 NOT_FIGURES = ("settled",)
 """Has a share of its own."""
+
+
+class Arm(msgspec.Struct, frozen=True):
+    """Runs with the same levels of some factors."""
+
+    factors: dict[str, Value]
+    runs: int
+    verdicts: dict[str, int]
+    metrics: dict[str, Figures | None]
+
+    @property
+    def label(self) -> str:
+        return label_of(self.factors)
+
+
+def label_of(factors: Mapping[str, Value]) -> str:
+    """An arm by its levels: texts by themselves, numbers with the last word of their key."""
+    words = [
+        level if isinstance(level, str) else f"{name.rpartition('.')[2]} {level}"
+        for name, level in factors.items()
+    ]
+    return ", ".join(words) or EVERYONE
 
 
 class ResultRows:
@@ -89,14 +113,30 @@ class ResultRows:
     def groups(self, by: Sequence[str]) -> dict[tuple[Value, ...], list[int]]:
         """Values of the factors `by` -> the rows that have them, both in the order of the plan."""
         for name in by:
-            if name not in self.about.factors:
-                remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
-                raise BadInput(self.path, "--by", f"has no factor {name!r}", remedy)
+            self._check_factor(name, "--by")
         columns = [self.column(name) for name in by]
         found: dict[tuple[Value, ...], list[int]] = {}
         for row in range(self.count):
             found.setdefault(tuple(column[row] for column in columns), []).append(row)
         return found
+
+    def arms(
+        self, by: Sequence[str], groups: Mapping[tuple[Value, ...], list[int]], metrics: Sequence[str]
+    ) -> Iterator[tuple[Arm, dict[str, Numbers]]]:
+        """Each of the `groups` with its figures, and the numbers that these are made of."""
+        verdicts, seeds = self.column("verdict"), self.samples()
+        columns = {name: self.numbers(name) for name in metrics}
+        for levels, members in groups.items():
+            places = np.array(members)
+            there = {name: places[~np.isnan(column[places])] for name, column in columns.items()}
+            counted = [verdicts[row] for row in members]
+            arm = Arm(
+                factors=dict(zip(by, levels, strict=True)),
+                runs=len(members),
+                verdicts={name: counted.count(name) for name in VERDICTS},
+                metrics={name: figures(columns[name][of], seeds[of]) for name, of in there.items()},
+            )
+            yield arm, {name: columns[name][of] for name, of in there.items()}
 
     def keys(self, without: str = "") -> list[Hashable]:
         """What each row has in common with that of the same run elsewhere: all that is varied, and the seed."""
@@ -104,12 +144,15 @@ class ResultRows:
         columns = [self.column(name) for name in (*names, "seed")]
         return list(zip(*columns, strict=True))
 
+    def _check_factor(self, name: str, option: str) -> None:
+        if name not in self.about.factors:
+            remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
+            raise BadInput(self.path, option, f"has no factor {name!r}", remedy)
+
     def two_levels(self, text: str) -> tuple[str, Value, Value]:
         """FACTOR=A,B, or FACTOR alone where it has two levels. Raises BadInput."""
         name, equals, values = text.partition("=")
-        if name not in self.about.factors:
-            remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
-            raise BadInput(self.path, "--between", f"has no factor {name!r}", remedy)
+        self._check_factor(name, "--between")
         levels = self.levels(name)
         if not equals and len(levels) == 2:
             return name, levels[0], levels[1]

@@ -38,11 +38,7 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
         pieces.append(piece)
     made = BytesIO()
     result = convert(b"".join(pieces), given.label, made)
-    if out == STDIN:
-        sys.stdout.buffer.write(made.getbuffer())
-    else:
-        with whole_file(Path(out), "--out") as staging:
-            staging.write_bytes(made.getbuffer())
+    _write(out, [made.getvalue()])
     for note in result.notes:
         complain(note)
     if not quiet and out != STDIN:

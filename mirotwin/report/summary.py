@@ -13,7 +13,7 @@ from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import ErrorSample, Tracks
 from mirotwin.report.learnt import LearntCalibration, LearntWheels
-from mirotwin.report.theory import SlidingGains, Theory, gains_of, theory_of
+from mirotwin.report.theory import SlidingGains, Theory, gains_of, rms, theory_of
 from mirotwin.verify.checks.interface import Expectation
 
 if TYPE_CHECKING:
@@ -164,10 +164,10 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
         return Tracking(None, None, None, None, None, None)
     last = _last_second(samples)
     return Tracking(
-        rms_x_cm=_rms([sample.x_cm for sample in last]),
-        rms_y_cm=_rms([sample.y_cm for sample in last]),
-        rms_theta_deg=_rms([math.degrees(sample.theta_rad) for sample in last]),
-        rms_position_cm=_rms([sample.position_cm for sample in last]),
+        rms_x_cm=rms([sample.x_cm for sample in last]),
+        rms_y_cm=rms([sample.y_cm for sample in last]),
+        rms_theta_deg=rms([math.degrees(sample.theta_rad) for sample in last]),
+        rms_position_cm=rms([sample.position_cm for sample in last]),
         settling_s=_settling_s(samples),
         off_pitch_s=seconds(CONTROL_PERIOD_TICKS * len([sample for sample in samples if sample.off_pitch])),
     )
@@ -184,13 +184,6 @@ def rms_name(samples: Sequence[ErrorSample]) -> str:
 
 def _last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
     return [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
-
-
-def _rms(values: Sequence[float]) -> float:
-    total = 0.0
-    for value in values:
-        total += value * value
-    return math.sqrt(total / len(values))
 
 
 def _settling_s(samples: Sequence[ErrorSample]) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
@@ -154,13 +154,17 @@ def _disturbance(track: TheoryTrack, gains: SlidingGains) -> DisturbanceFigures 
     )
 
 
-def _sizes(values: array[float]) -> tuple[float, float]:
-    """Root mean square, and the largest without its sign."""
-    total = largest = 0.0
+def rms(values: Sequence[float]) -> float:
+    """Root mean square."""
+    total = 0.0
     for value in values:
         total += value * value
-        largest = max(largest, abs(value))
-    return math.sqrt(total / len(values)), largest
+    return math.sqrt(total / len(values))
+
+
+def _sizes(values: array[float]) -> tuple[float, float]:
+    """Root mean square, and the largest without its sign."""
+    return rms(values), max(map(abs, values))
 
 
 def _share_above(values: array[float], bound: float | None) -> float | None:

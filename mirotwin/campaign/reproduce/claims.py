@@ -125,24 +125,18 @@ def _asymptotic(table: Table) -> ClaimResult:
 def _heading(table: Table) -> ClaimResult:
     groups = [rows_of(table, figure, PAPER) for figure in (6, 7, 8)]
     headings = [middle(settled(rows), "rms_theta_deg") for rows in groups]
+    measured = [
+        f"not judged: 0 of {len(rows)} settle" if heading is None else number(heading)
+        for heading, rows in zip(headings, groups, strict=True)
+    ]
     judged = [heading <= 4.83 for heading in headings if heading is not None]
     return ClaimResult(
         "Figs. 6 to 8",
         "the heading error goes to zero, robustly",
         "its median rms over the runs that settle is within the measurement error of 4.83 degrees",
-        ", ".join(_or_why_not(heading, rows) for heading, rows in zip(headings, groups, strict=True))
-        + " degrees",
+        f"{', '.join(measured)} degrees",
         NOT_JUDGED if not judged else HOLDS if all(judged) and len(judged) == 3 else NOT,
     )
-
-
-def _or_why_not(value: float | None, rows: Sequence[RunRow]) -> str:
-    """A figure of the runs that settle."""
-    return number(value) if value is not None else _not_judged(rows)
-
-
-def _not_judged(rows: Sequence[RunRow]) -> str:
-    return f"not judged: 0 of {len(rows)} settle"
 
 
 def _motion(figure: int, words: str) -> Callable[[Table], ClaimResult]:
@@ -180,7 +174,7 @@ def _epsilon_fails(table: Table) -> ClaimResult:
         rows = [row for figure in (9, 10) for row in rows_of(table, figure, controller)]
         never = never_settled(rows)
         failing += bool(rows) and never >= MOST * len(rows)
-        measured.append(f"{controller.removeprefix('epsilon, ')}: {never} of {len(rows)} runs never settle")
+        measured.append(f"{_short(controller)}: {never} of {len(rows)} runs never settle")
     return ClaimResult(
         "Figs. 9, 10",
         "epsilon-tracking fails to converge",

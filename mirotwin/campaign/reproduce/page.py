@@ -121,12 +121,17 @@ def _cameras(table: Table) -> Iterator[str]:
     yield ""
 
 
+def _error(rows: Sequence[RunRow]) -> str:
+    """Its median and the 95 %."""
+    worst = percentile(rows, "rms_position_cm", 0.95)
+    return f"{number(middle(rows, 'rms_position_cm'))} / {number(worst)}"
+
+
 def _camera_line(table: Table, name: str, controller: str, camera: str, shown: Sequence[Start]) -> str:
     cells = []
     for start in shown:
         rows = rows_of(table, start.figure, controller, camera)
-        pair = middle(rows, "rms_position_cm"), percentile(rows, "rms_position_cm", 0.95)
-        cells.append(" / ".join(number(value) for value in pair))
+        cells.append(_error(rows))
     return f"| {name} | {NAMES[controller]} | " + " | ".join(cells) + " |"
 
 
@@ -140,14 +145,9 @@ def _disturbances(table: Table) -> Iterator[str]:
     yield "| disturbance | " + " | ".join(f"Fig. {start.figure}" for start in shown) + " |"
     yield "|---|---|---|---|"
     for disturbance in ("", *DISTURBANCES):
-        yield _disturbance_line(table, disturbance, shown)
+        cells = [disturbance or "none: Euler's rule, words of 16 bits, no noise"]
+        for start in shown:
+            rows = rows_of(table, start.figure, PAPER, "", disturbance)
+            cells.append(f"{_error(rows)} ({never_settled(rows)} of {len(rows)})")
+        yield "| " + " | ".join(cells) + " |"
     yield ""
-
-
-def _disturbance_line(table: Table, disturbance: str, shown: Sequence[Start]) -> str:
-    cells = [disturbance or "none: Euler's rule, words of 16 bits, no noise"]
-    for start in shown:
-        rows = rows_of(table, start.figure, PAPER, "", disturbance)
-        pair = middle(rows, "rms_position_cm"), percentile(rows, "rms_position_cm", 0.95)
-        cells.append(f"{' / '.join(number(value) for value in pair)} ({never_settled(rows)} of {len(rows)})")
-    return "| " + " | ".join(cells) + " |"

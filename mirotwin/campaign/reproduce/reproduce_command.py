@@ -63,7 +63,7 @@ def reproduce(options: ReproduceOptions) -> int:
     """
     seeds, force, quiet, out = options.seeds, options.force, options.quiet, options.out or Path(".")
     began_s = time.monotonic()
-    names = [*_pictures(), ROWS, *(group.recording for group in GROUPS)]
+    names = [*(f"{start.name}.svg" for start in STARTS), ROWS, *(group.recording for group in GROUPS)]
     folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
@@ -86,10 +86,6 @@ def reproduce(options: ReproduceOptions) -> int:
     if not quiet:
         show_line(f"{amount(len(found), 'run')} in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
     return _failures(found)
-
-
-def _pictures() -> list[str]:
-    return [f"{start.name}.svg" for start in STARTS]
 
 
 def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> list[RunRow]:
@@ -150,9 +146,6 @@ def _failures(found: Sequence[RunRow]) -> int:
         complain(f"{row.label}, seed {row.seed}: {row.error}")
     if failed:
         complain(f"{len(failed)} of {len(found)} runs failed; {ROWS} says which")
-    faults = 0
-    for row in found:
-        faults += row.faults
-    if faults:
+    if faults := sum(row.faults for row in found):
         complain(f"{faults} firmware faults; rows.csv says in which runs")
     return BAD_INPUT if failed else FIRMWARE_FAULT if faults else DONE

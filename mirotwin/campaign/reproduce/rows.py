@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from statistics import median
 from typing import Any
 
 import msgspec
@@ -81,11 +82,8 @@ def values(rows: Sequence[RunRow], name: str) -> list[float]:
 
 def middle(rows: Sequence[RunRow], name: str) -> float | None:
     """The median, None where no row has it."""
-    found = sorted(values(rows, name))
-    if not found:
-        return None
-    half = len(found) // 2
-    return found[half] if len(found) % 2 else 0.5 * (found[half - 1] + found[half])
+    found = values(rows, name)
+    return median(found) if found else None
 
 
 def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:

@@ -142,7 +142,7 @@ class _Conversion:
         elif topic.channel == FAULT and topic.slot >= 0:
             fault = self._faults.decode(record.data)
             line = notes.of_fault(topic.network, topic.slot, fault.tick, fault.text)
-            self._add(derived.log(fault.tick, line))
+            self._add(Said(derived.LOG, fault.tick, line))
         elif topic.channel == PERIOD and self._next < len(self.periods):
             period = self.periods[self._next]
             self._next += 1

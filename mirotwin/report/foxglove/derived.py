@@ -18,7 +18,6 @@ from mirotwin.report.foxglove import frames, notes, pitch, robots
 from mirotwin.report.foxglove.messages import (
     CompressedImage,
     FrameTransforms,
-    Log,
     SceneEntity,
     SceneUpdate,
     Timestamp,
@@ -121,11 +120,6 @@ def image(network: int, tick: int, png: bytes) -> Said:
     """The frame of a network's camera that was exposed at `tick`."""
     message = CompressedImage(time_of(tick), frames.camera_frame(network), png, "png")
     return Said(image_topic(network), tick, message)
-
-
-def log(tick: int, line: Log) -> Said:
-    """A line of the log."""
-    return Said(LOG, tick, line)
 
 
 def _networks(period: Period) -> list[int]:

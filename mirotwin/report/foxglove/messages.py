@@ -171,7 +171,3 @@ class Log(msgspec.Struct, frozen=True):
     name: str
     file: str = ""
     line: int = 0
-
-
-Message = FrameTransforms | SceneUpdate | CompressedImage | CameraCalibration | Log
-"""What is a whole message on a topic."""

@@ -24,6 +24,8 @@ from miro_sim.scenario.camera_keys import Ball
 from mirotwin.report.foxglove import shapes
 from mirotwin.report.foxglove.frames import PITCH
 from mirotwin.report.foxglove.messages import (
+    LINE_LIST,
+    LINE_LOOP,
     CubePrimitive,
     LinePrimitive,
     SceneEntity,
@@ -106,8 +108,8 @@ def _lines() -> Iterator[LinePrimitive]:
         low, high = MIDDLE_Y_M - AREA_HALF_M, MIDDLE_Y_M + AREA_HALF_M
         straight += [(end, MIDDLE_Y_M - GOAL_HALF_M), (end, MIDDLE_Y_M + GOAL_HALF_M)]
         straight += [(area, low), (area, high), (end, low), (area, low), (end, high), (area, high)]
-    yield shapes.pieces(straight, LINE_Z_M, LINE_WIDE_M, paint)
-    yield shapes.loop(_circle(), LINE_Z_M, LINE_WIDE_M, paint)
+    yield shapes.line(straight, LINE_Z_M, LINE_WIDE_M, paint, LINE_LIST)
+    yield shapes.line(_circle(), LINE_Z_M, LINE_WIDE_M, paint, LINE_LOOP)
 
 
 def _circle() -> Iterator[Point]:

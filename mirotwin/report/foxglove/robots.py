@@ -25,6 +25,7 @@ from miro_sim.scenario.keys import RobotSpec
 from mirotwin.report.foxglove import shapes
 from mirotwin.report.foxglove.frames import PITCH, measured_frame, reference_frame, robot_frame
 from mirotwin.report.foxglove.messages import (
+    LINE_LOOP,
     Color,
     CubePrimitive,
     Pose,
@@ -81,8 +82,8 @@ def _outline(frame: str, color: Color, at: Timestamp) -> SceneEntity:
     z_m = ROBOT_HEIGHT_M + 2.0 * TOP_M
     corners = ((HALF_M, HALF_M), (-HALF_M, HALF_M), (-HALF_M, -HALF_M), (HALF_M, -HALF_M))
     lines = (
-        shapes.loop(corners, z_m, OUTLINE_M, color),
-        shapes.strip(((0.0, 0.0), (HALF_M, 0.0)), z_m, OUTLINE_M, color),
+        shapes.line(corners, z_m, OUTLINE_M, color, LINE_LOOP),
+        shapes.line(((0.0, 0.0), (HALF_M, 0.0)), z_m, OUTLINE_M, color),
     )
     return SceneEntity(timestamp=at, frame_id=frame, id=frame, lines=lines)
 
@@ -115,7 +116,7 @@ class Trail:
             points = [*kept, *(() if posture is None else ((posture.x_m, posture.y_m),))]
             if posture is not None and index % EVERY == 0:
                 kept.append(points[-1])
-            line = shapes.strip(points, TRAIL_Z_M, WIDE_M, color)
+            line = shapes.line(points, TRAIL_Z_M, WIDE_M, color)
             yield SceneEntity(timestamp=at, frame_id=PITCH, id=f"{frame}/trail/{name}", lines=(line,))
 
 
@@ -131,7 +132,7 @@ def reference_points(robot: RobotSpec, duration_s: float) -> tuple[Point, ...]:
 
 def reference_line(network: int, slot: int, points: Iterable[Point], at: Timestamp) -> SceneEntity:
     """It as a line on the floor."""
-    line = shapes.strip(points, PATH_Z_M, WIDE_M, REFERENCE)
+    line = shapes.line(points, PATH_Z_M, WIDE_M, REFERENCE)
     name = f"{robot_frame(network, slot)}/path"
     return SceneEntity(timestamp=at, frame_id=PITCH, id=name, lines=(line,))
 

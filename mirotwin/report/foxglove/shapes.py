@@ -8,8 +8,6 @@ from functools import cache
 from miro_exact.dmath import exp, log, sincos
 from miro_sim.pitch.paints import PAINTS
 from mirotwin.report.foxglove.messages import (
-    LINE_LIST,
-    LINE_LOOP,
     LINE_STRIP,
     Color,
     CubePrimitive,
@@ -54,20 +52,8 @@ def ball(at: tuple[float, float, float], radius_m: float, color: Color) -> Spher
     return SpherePrimitive(Pose(Vector3(*at), STRAIGHT), Vector3(across, across, across), color)
 
 
-def strip(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
-    """From point to point, at one height."""
-    return _line(LINE_STRIP, points, z_m, wide_m, color)
-
-
-def loop(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
-    """From point to point and back to the first."""
-    return _line(LINE_LOOP, points, z_m, wide_m, color)
-
-
-def pieces(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
-    """From the first to the second point, from the third to the fourth, and so on."""
-    return _line(LINE_LIST, points, z_m, wide_m, color)
-
-
-def _line(kind: int, points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
+def line(
+    points: Iterable[Point], z_m: float, wide_m: float, color: Color, kind: int = LINE_STRIP
+) -> LinePrimitive:
+    """From point to point at one height; LINE_LOOP: back to the first, LINE_LIST: from each other one to the next."""
     return LinePrimitive(kind, ORIGIN, wide_m, False, tuple(Vector3(x, y, z_m) for x, y in points), color)

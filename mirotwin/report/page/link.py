@@ -29,7 +29,6 @@ from miro_sim.world.world import World
 
 OF_PC = ("answer", "reset", "power", "radio")
 RESTARTS = ("reset", "power")
-FATES = ("fresh", "repeated", "damaged", "lost", "open")
 ROBOT_CHARACTER_TICKS = CHARACTER_BITS * ROBOT_BIT_TICKS
 TOGETHER_TICKS = 3 * ROBOT_CHARACTER_TICKS
 """Characters with a longer pause between them are two noises."""

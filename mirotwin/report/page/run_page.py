@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import sys
 from array import array
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -85,7 +86,7 @@ def run_page(material: Material) -> bytes:
     marks = _within(again.marks, tracks)
     ticks = [*(one.tick for one in again.failures), *(one.tick for one in again.faults)]
     figures = figures_of(tracks, marks, [tick for tick in ticks if _shows(tracks, tick)])
-    functions = function_rows(again.profile)
+    functions, kinds = function_rows(again.profile), {mark.kind for mark in marks}
     values = {
         "about": material.about,
         "title": scenario.title,
@@ -100,7 +101,7 @@ def run_page(material: Material) -> bytes:
         "failures": again.failures[:FIRST],
         "more_failures": max(0, len(again.failures) - FIRST),
         "steps": material.steps,
-        "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if _count(marks, kind)],
+        "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, _counts(marks, lane)) for lane in lanes_of(marks)],
         "functions": functions,
         "functions_shown": SHOWN,
@@ -164,16 +165,8 @@ def _shows(tracks: PageTracks, tick: int) -> bool:
     return bool(tracks.ticks) and tracks.ticks[0] <= tick < tracks.ticks[-1] + CONTROL_PERIOD_TICKS
 
 
-def _count(marks: Sequence[LinkMark], kind: str) -> int:
-    return len([mark for mark in marks if mark.kind == kind])
-
-
 def _counts(marks: Sequence[LinkMark], lane: str) -> list[tuple[str, int]]:
-    found: dict[str, int] = {}
-    for mark in marks:
-        if mark.lane == lane:
-            found[mark.kind] = found.get(mark.kind, 0) + 1
-    return list(found.items())
+    return list(Counter(mark.kind for mark in marks if mark.lane == lane).items())
 
 
 def _data(

@@ -85,12 +85,6 @@ class PageTracks(msgspec.Struct, frozen=True):
     def times_s(self) -> list[float]:
         return [tick / TICKS_PER_SECOND for tick in self.ticks]
 
-    def index_at(self, tick: int) -> int:
-        """The control period under way at `tick`, as a place in these columns; the nearest one beyond the ends."""
-        if not self.ticks:
-            return 0
-        return max(0, min(len(self.ticks) - 1, (tick - self.ticks[0]) // CONTROL_PERIOD_TICKS))
-
 
 def tracks_of(
     periods: Sequence[Period], steered: Sequence[bool], delay_frames: int, shown: range | None = None
