@@ -9,8 +9,7 @@ import click
 import msgspec
 
 from miro_exact.bad_input import BadInput, amount
-from miro_robot.inspect.activity import Activity
-from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.coverage import counts_of
 from miro_robot.inspect.lcov import Tracefile, add
 from miro_robot.inspect.profile import Profile
@@ -24,7 +23,7 @@ from mirotwin.firmware.coverage_files import (
     table,
     write,
 )
-from mirotwin.firmware.subject import WindowOptions, image_name, look, open_window
+from mirotwin.firmware.subject import WindowOptions, look, open_window
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import SourceFolders, sources_of, with_debug_files
@@ -54,7 +53,7 @@ def profile(options: ProfileOptions) -> int:
     if options.as_json:
         click.echo(msgspec.json.format(msgspec.json.encode(result), indent=2))
     else:
-        _print(result, image_name(run))
+        _print(result, run.image.path.name)
     return code
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated
 
 from miro_exact import clock
@@ -112,7 +111,7 @@ def look(
     """
     first_tick = max(0, options.from_tick - early_ticks)
     last_tick = None if options.to_tick is None else options.to_tick + late_ticks
-    end_tick = _earlier(run.end_tick, last_tick)
+    end_tick = min((tick for tick in (run.end_tick, last_tick) if tick is not None), default=None)
     with ProgressBar(f"running {options.subject}", end_tick) as bar:
         try:
             with plain_parameters(options.subject):
@@ -126,10 +125,6 @@ def look(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
     return _verdict(run, options)
-
-
-def _earlier(one: int | None, other: int | None) -> int | None:
-    return min((tick for tick in (one, other) if tick is not None), default=None)
 
 
 def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
@@ -192,8 +187,3 @@ def _verdict(run: Run, options: SubjectOptions) -> int:
         return report_faults(run.world)
     assert isinstance(run, BareRun)
     return report(run.machine, run.ended, options.bare)
-
-
-def image_name(run: Run) -> str:
-    """What to call the image in output: its file's name."""
-    return Path(run.image.path).name

@@ -20,8 +20,8 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.inputs import seeds
+from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS
-from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
 
 NEVER_SLEEPS_CODE = len(NAMES)
 MAP_SIZE = 8192

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import click
@@ -12,7 +12,7 @@ from miro_exact.bad_input import amount
 from miro_exact.clock import seconds
 from miro_protocol.events import Damaged
 from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
-from miro_protocol.transmission import DOWN, Transmission
+from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
 from mirotwin.recording.capture.recorded import transmissions_of
 from mirotwin.recording.capture.rows import DecodedRow, rows
@@ -49,16 +49,15 @@ def print_differences(found: Sequence[Difference], everything: bool, words: tupl
 
 def print_firmwares(found: FirmwareDifference, words: tuple[str, str] = WORDS) -> None:
     """Lines on stderr: where two firmwares go apart."""
-    if found.changed is not None:
-        _print_instruction("the first changed instruction that is executed", found.changed, words)
-    if found.mapped is not None:
-        _print_instruction("the first changed instruction that is executed", found.mapped, words)
+    for one in (found.changed, found.mapped):
+        if one is not None:
+            _print_instruction("the first changed instruction that is executed", one, words)
     if found.effect is not None and found.effect != found.changed:
         _print_instruction("the states differ for good from here on", found.effect, words)
     if found.effect is not None and found.effect.parted is not None:
         complain(f"they go on at different places after {found.effect.parted}")
-    for one in found.variables[:LISTED]:
-        _print_variable(one, words)
+    for variable in found.variables[:LISTED]:
+        _print_variable(variable, words)
     if len(found.variables) > LISTED:
         complain(f"{len(found.variables) - LISTED} more variables differ; --json lists them")
     for note in found.notes:
@@ -110,24 +109,28 @@ SHOWN = 20
 def print_frames(job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None) -> None:
     """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
     robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
-    lines = sorted(
-        frame_lines(transmissions_of(job.recorded or replayed), robots), key=lambda line: line.tick
+    found = sorted(
+        rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
+        key=lambda row: row.event.start_tick,
     )
     if to_tick is not None:
-        lines = [line for line in lines if line.tick < to_tick]
-    shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
+        found = [row for row in found if row.event.start_tick < to_tick]
+    shown = found if everything else found[:SHOWN]
     table = plain_table("tick", "t [s]", justify="right")
     table.add_column("")
     table.add_column("from")
     table.add_column("frame")
-    for line in shown:
-        sender = "host" if line.direction == DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
+    for row in shown:
+        sender = "host" if row.direction == DOWN else "robot ?"
+        if isinstance(row.message, TelemetryFrame):
+            sender = f"robot {row.message.slot}"
         if len(robots) > 1:
-            sender = f"net{line.network} {sender}"
-        table.add_row(str(line.tick), f"{seconds(line.tick):.4f}", line.direction, sender, line.text)
+            sender = f"net{row.network} {sender}"
+        tick = row.event.start_tick
+        table.add_row(str(tick), f"{seconds(tick):.4f}", row.direction, sender, frame_text(row))
     show(table)
-    if len(shown) < len(lines):
-        show(f"{len(lines) - len(shown)} more of {len(lines)} frames; --all lists them")
+    if len(shown) < len(found):
+        show(f"{len(found) - len(shown)} more of {len(found)} frames; --all lists them")
 
 
 def print_response(replayed: Sequence[Period]) -> None:
@@ -146,30 +149,8 @@ def print_response(replayed: Sequence[Period]) -> None:
     show(table)
 
 
-class FrameLine(msgspec.Struct, frozen=True):
-    """A frame or a damaged run: first start bit, direction, network, sender's slot, what it says.
-
-    `slot` is -1 for the host's, and for what a robot sent that cannot be told from its bytes.
-    """
-
-    tick: int
-    direction: str
-    network: int
-    slot: int
-    text: str
-
-
-def frame_lines(sent: Iterable[Transmission], robots: Mapping[int, int]) -> Iterator[FrameLine]:
-    """The lines of everything in `sent`; `robots` is the layout (3 or 5) of each network.
-
-    What the host sent is listed as sent, before the radio.
-    """
-    for row in rows(sent, robots.__getitem__):
-        slot = row.message.slot if isinstance(row.message, TelemetryFrame) else -1
-        yield FrameLine(row.event.start_tick, row.direction, row.network, slot, _text(row))
-
-
-def _text(row: DecodedRow) -> str:
+def frame_text(row: DecodedRow) -> str:
+    """What a frame or a damaged run says."""
     event, message = row.event, row.message
     if isinstance(event, Damaged):
         reason = event.reason.name.lower().replace("_", " ")

@@ -111,18 +111,23 @@ class Processors(WorldPair):
 
 
 class InstructionLog(Watcher):
-    """Keeps what a processor does."""
+    """Keeps what a robot's processor does, until `detach`."""
 
-    def __init__(self, cpu: Cpu, image: Image) -> None:
-        self.live = LiveState(cpu, image)
-        self.found: list[ExecutedInstruction] = []
+    def __init__(self, robot: Robot, image: Image) -> None:
+        self.robot = robot
+        self.live = LiveState(robot.board.cpu, image)
+        self.steps: list[ExecutedInstruction] = []
+        attach(robot.board.cpu, self)
+
+    def detach(self) -> None:
+        detach(self.robot.board.cpu, self)
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         code = bytes(cpu.code_at(pc + offset) for offset in range(LENGTH[cpu.code_at(pc)]))
-        self.found.append(ExecutedInstruction(start, pc, code, self.live.save(), cpu.pc))
+        self.steps.append(ExecutedInstruction(start, pc, code, self.live.save(), cpu.pc))
 
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
-        self.found.append(ExecutedInstruction(start, pc, b"", self.live.save(), cpu.pc))
+        self.steps.append(ExecutedInstruction(start, pc, b"", self.live.save(), cpu.pc))
 
 
 class Stepper:
@@ -174,11 +179,13 @@ class Stepper:
             if found:
                 return min(found, key=lambda one: one.one.tick)
 
-    def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[Stepped, Stepped]]:
+    def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
         images = self.pair.one.image, self.pair.other.image
         robots = zip(self.pair.one.robots, self.pair.other.robots, strict=True)
-        pairs = [(Stepped(robot, images[0]), Stepped(twin, images[1])) for robot, twin in robots]
+        pairs = [
+            (InstructionLog(robot, images[0]), InstructionLog(twin, images[1])) for robot, twin in robots
+        ]
         try:
             while True:
                 self.pair.run_to(tick)
@@ -186,14 +193,16 @@ class Stepper:
                 if unlike or tick >= end_tick or self.pair.over:
                     yield from unlike or pairs
                     return
-                for stepped in (each for pair in pairs for each in pair):
-                    stepped.watcher.found.clear()
+                for log in (each for pair in pairs for each in pair):
+                    log.steps.clear()
                 tick = min(end_tick, tick + LOOK_TICKS)
         finally:
-            for stepped in (each for pair in pairs for each in pair):
-                stepped.detach()
+            for log in (each for pair in pairs for each in pair):
+                log.detach()
 
-    def _difference(self, here: Stepped, there: Stepped, index: int, parted: int) -> InstructionDifference:
+    def _difference(
+        self, here: InstructionLog, there: InstructionLog, index: int, parted: int
+    ) -> InstructionDifference:
         robot = here.robot
         values = _values(robot, self.pair.one.image, here.steps[index].state, there.steps[index].state)
         places = [
@@ -204,22 +213,6 @@ class Stepper:
         return InstructionDifference(
             robot.network, robot.slot, places[0], places[1], tuple(values), *places[2:3]
         )
-
-
-class Stepped:
-    """A robot whose steps are kept, until `detach`."""
-
-    def __init__(self, robot: Robot, image: Image) -> None:
-        self.robot = robot
-        self.watcher = InstructionLog(robot.board.cpu, image)
-        attach(robot.board.cpu, self.watcher)
-
-    @property
-    def steps(self) -> list[ExecutedInstruction]:
-        return self.watcher.found
-
-    def detach(self) -> None:
-        detach(self.robot.board.cpu, self.watcher)
 
 
 def _lasting(

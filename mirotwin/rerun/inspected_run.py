@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, TICKS_PER_SECOND
 from miro_robot.bare.machine import BareMachine, Ended
@@ -17,48 +16,45 @@ from mirotwin.verify.bare.run import BarePlayback
 PIECE_TICKS = CONTROL_PERIOD_TICKS
 
 
-class Run(Protocol):
-    """`board` is None on the bare CPU. `end_tick`: tick at which the run ends by itself, None if unknown. `tick_hz`:
-    the crystal, one tick a period.
+class Run:
+    """A CPU that runs `image`. `board`: around it, None on the bare CPU. `end_tick`: tick at which the run ends by
+    itself, None if unknown. `tick_hz`: the crystal, one tick a period.
     """
 
+    def __init__(
+        self, cpu: Cpu, image: Image, end_tick: int | None, tick_hz: int, board: Board | None = None
+    ) -> None:
+        self.cpu = cpu
+        self.image = image
+        self.end_tick = end_tick
+        self.tick_hz = tick_hz
+        self.board = board
+
     @property
-    def cpu(self) -> Cpu: ...
-    @property
-    def board(self) -> Board | None: ...
-    @property
-    def image(self) -> Image: ...
-    @property
-    def end_tick(self) -> int | None: ...
-    @property
-    def tick_hz(self) -> int: ...
-    @property
-    def over(self) -> bool: ...
+    def over(self) -> bool:
+        raise NotImplementedError
+
     def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
-        """`told(tick, port, levels)` gets what a file puts on the pins of the bare CPU."""
+        """`told(tick, port, levels)` gets what a file puts on the pins of the bare CPU; nothing else moves them."""
 
     def to(self, tick: int) -> None:
         """Moves on to `tick`, or to the end of the run."""
+        raise NotImplementedError
 
 
-class RobotRun:
+class RobotRun(Run):
     """The robot in place `index` of network `network` (slot order) of a world, which runs as a whole.
 
     `periods`: after so many control periods it is over (default: as many as the scenario has).
     """
 
     def __init__(self, world: World, network: int = 0, index: int = 0, periods: int | None = None) -> None:
+        board = world.networks[network].robots[index].board
+        end_tick = (periods or world.periods) * CONTROL_PERIOD_TICKS
+        super().__init__(board.cpu, world.image, end_tick, TICKS_PER_SECOND, board)
         self.world = world
         self.network = network
         self.index = index
-        self.board: Board | None = world.networks[network].robots[index].board
-        self.cpu = world.networks[network].robots[index].board.cpu
-        self.image = world.image
-        self.end_tick: int | None = (periods or world.periods) * CONTROL_PERIOD_TICKS
-        self.tick_hz = TICKS_PER_SECOND
-
-    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
-        """A board drives all its pins itself."""
 
     @property
     def over(self) -> bool:
@@ -71,19 +67,16 @@ class RobotRun:
             self.world.run_to(min(tick, self.end_tick))
 
 
-class BareRun:
+class BareRun(Run):
     """An image on the bare CPU; `ended` says how, once it is over."""
 
     def __init__(self, machine: BareMachine, until: int | None, max_cycles: int | None) -> None:
+        end_tick = None if max_cycles is None else max_cycles * CYCLE_TICKS
+        super().__init__(machine.cpu, machine.image, end_tick, machine.input.crystal_hz)
         self.machine = machine
         self.until = until
         self.max_cycles = max_cycles
-        self.board: Board | None = None
-        self.cpu = machine.cpu
-        self.image = machine.image
         self.ended = Ended.PAUSED
-        self.end_tick = None if max_cycles is None else max_cycles * CYCLE_TICKS
-        self.tick_hz = machine.input.crystal_hz
 
     def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
         self.machine.pins.told = told
@@ -106,20 +99,14 @@ class BareRun:
         return (*self.machine.ends, *(() if self.until is None else (self.until,)))
 
 
-class CaseRun:
+class CaseRun(Run):
     """A case of a bare processor: what it heard is played to it."""
 
     def __init__(self, playback: BarePlayback) -> None:
         self.playback = playback
         self.machine = playback.processor
-        self.board: Board | None = None
-        self.cpu = playback.processor.cpu
-        self.image = playback.processor.image
-        self.end_tick: int | None = playback.end_tick
-        self.tick_hz = playback.line.crystal_hz
-
-    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
-        """Nothing but the serial port hears something."""
+        cpu, image = self.machine.cpu, self.machine.image
+        super().__init__(cpu, image, playback.end_tick, playback.line.crystal_hz)
 
     @property
     def over(self) -> bool:

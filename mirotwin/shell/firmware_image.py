@@ -1,17 +1,25 @@
-"""Loads the firmware image that a command, a test, a campaign or a port is asked to run."""
+"""Loads the firmware image that a command, a test, a campaign or a port is asked to run, and says when it is up.
+
+It is up when its serial receiver is on (REN in SCON), which is all that a robot on a radio has to do.
+"""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path
 from miro_robot.image import FLASH_BYTES, Image, load_hex
 from miro_robot.image.symbol_files import STACK
+
+if TYPE_CHECKING:
+    from miro_robot.mcs51.cpu import Cpu
 
 _Stamp = tuple[tuple[int, int] | None, ...]
 """Time and size of the image and of the symbol files beside it, None for one that is not there."""
@@ -58,3 +66,19 @@ def _with_stack(image: Image, start: int) -> Image:
         what = f"the .map beside the image begins its stack at {known.address:#04x}"
         raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
     return msgspec.structs.replace(image, symbols=image.symbols.with_stack(start))
+
+
+BOOT_PERIODS = 8
+"""Control periods, of 33.4 ms, that firmware may take."""
+BOOT_MS = 1000 * BOOT_PERIODS * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND
+_SCON, _REN = 0x98, 0x10
+
+
+def is_up(cpu: Cpu) -> bool:
+    return bool(cpu.sfr(_SCON) & _REN)
+
+
+def not_up(image: Image, remedy: str, waited_ms: float = BOOT_MS) -> BadInput:
+    """What to raise for firmware that has not come up in time."""
+    what = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
+    return BadInput(image.path, "", what, remedy)

@@ -116,16 +116,16 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 def _check_options(config: pytest.Config) -> None:
     if config.getoption("--mirotwin-port") == "":
         raise pytest.UsageError("--mirotwin-port: is empty; name the port of the robots, or leave it out")
-    if _number(config, "repeat", 1) < 1:
+    if number_option(config, "repeat", 1) < 1:
         raise pytest.UsageError(
-            f"--mirotwin-repeat: {_number(config, 'repeat', 1)} is too few; give 1 or more"
+            f"--mirotwin-repeat: {number_option(config, 'repeat', 1)} is too few; give 1 or more"
         )
-    if _number(config, "seed", 0) < 0:
-        raise pytest.UsageError(f"--mirotwin-seed: {_number(config, 'seed', 0)}: give 0 or more")
-    artifacts = _path(config, "artifacts")
+    if number_option(config, "seed", 0) < 0:
+        raise pytest.UsageError(f"--mirotwin-seed: {number_option(config, 'seed', 0)}: give 0 or more")
+    artifacts = path_option(config, "artifacts")
     if artifacts is not None and artifacts.exists() and not artifacts.is_dir():
         raise pytest.UsageError(f"--mirotwin-artifacts: {artifacts} is no folder")
-    firmware = _path(config, "firmware")
+    firmware = path_option(config, "firmware")
     if firmware is not None:
         from mirotwin.shell.firmware_image import load_firmware
 
@@ -135,7 +135,7 @@ def _check_options(config: pytest.Config) -> None:
             raise pytest.UsageError(f"--mirotwin-firmware: {error}") from None
 
 
-def _number(config: pytest.Config, name: str, default: int) -> int:
+def number_option(config: pytest.Config, name: str, default: int) -> int:
     """An option, else what the ini file says."""
     given = config.getoption(f"--mirotwin-{name}")
     if given is not None:
@@ -147,7 +147,7 @@ def _number(config: pytest.Config, name: str, default: int) -> int:
         raise pytest.UsageError(f"mirotwin_{name}: {text!r} is no whole number") from None
 
 
-def _path(config: pytest.Config, name: str) -> Path | None:
+def path_option(config: pytest.Config, name: str) -> Path | None:
     """The same for paths: an option's goes from where pytest was called, an ini file's from where that lies."""
     given = config.getoption(f"--mirotwin-{name}")
     if given is not None:
@@ -161,7 +161,7 @@ def _path(config: pytest.Config, name: str) -> Path | None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    repeat = _number(metafunc.config, "repeat", 1)
+    repeat = number_option(metafunc.config, "repeat", 1)
     if repeat > 1 and _SEED in metafunc.fixturenames:
         first = _first_seed(metafunc.definition)
         seeds = range(first, first + repeat)
@@ -174,7 +174,7 @@ def _first_seed(item: pytest.Item) -> int:
         for mark in item.iter_markers("mirotwin"):
             if isinstance(mark.kwargs.get("seed"), int):
                 return int(mark.kwargs["seed"])
-    return _number(item.config, "seed", 0)
+    return number_option(item.config, "seed", 0)
 
 
 @pytest.fixture(name=_SEED)
@@ -190,7 +190,7 @@ def _rig_of_the_test(request: pytest.FixtureRequest, _mirotwin_seed: int) -> Rig
     """The world of the test and all that belongs to it."""
     from mirotwin.testing import items
 
-    return items.rig_for(request.node, _path(request.config, "firmware"), _mirotwin_seed)
+    return items.rig_for(request.node, path_option(request.config, "firmware"), _mirotwin_seed)
 
 
 @pytest.fixture
@@ -254,7 +254,7 @@ def pytest_runtest_makereport(
         from mirotwin.testing import items
 
         if call.when == "call":
-            paths = _path(item.config, "firmware"), _path(item.config, "artifacts")
+            paths = path_option(item.config, "firmware"), path_option(item.config, "artifacts")
             items.tell(item, report, call.excinfo, *paths, item.config.getoption("--mirotwin-pages"))
         else:
             items.let_go(item)

@@ -8,10 +8,10 @@ import msgspec
 
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
+from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.testing.link import Link
 from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
-from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
 from mirotwin.verify.cases.case import Trace
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks

@@ -18,8 +18,8 @@ from miro_sim.world.conditions import Reached, When
 from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
+from mirotwin.shell.firmware_image import is_up
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
-from mirotwin.verify.boot import is_up
 
 RESET_TICKS = ms(1)
 """An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""

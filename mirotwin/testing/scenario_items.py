@@ -12,6 +12,7 @@ import pytest
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.port_fixtures import desk_of
 from mirotwin.testing.port_test import run_port_test
+from mirotwin.testing.pytest_plugin import number_option, path_option
 from mirotwin.testing.test_command import TestOptions
 from mirotwin.verify.steps.running import Outcome, run_test, stem_of
 
@@ -24,8 +25,8 @@ class ScenarioFile(pytest.File):
     """A `*.scenario.toml`: one test, or with `--mirotwin-repeat N` one for each of N seeds."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        name, first = stem_of(str(self.path)), int(_given(self.config, "seed") or 0)
-        repeat = int(_given(self.config, "repeat") or 1)
+        name, first = stem_of(str(self.path)), number_option(self.config, "seed", 0)
+        repeat = number_option(self.config, "repeat", 1)
         for seed in range(first, first + repeat):
             item = ScenarioItem.from_parent(self, name=f"{name}[seed{seed}]" if repeat > 1 else name)
             item.seed = seed
@@ -38,7 +39,7 @@ class ScenarioItem(pytest.Item):
     seed = 0
 
     def runtest(self) -> None:
-        firmware = _path(self.config, "firmware")
+        firmware = path_option(self.config, "firmware")
         seed = self.seed
         file, desk = relative(self.path), desk_of(self.config)
         again = TestOptions(
@@ -48,7 +49,7 @@ class ScenarioItem(pytest.Item):
             image = load_firmware(firmware)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
-        artifacts = _path(self.config, "artifacts")
+        artifacts = path_option(self.config, "artifacts")
         if desk.port:
             outcome = run_port_test(file, image, desk, (), artifacts)
         else:
@@ -86,23 +87,3 @@ def relative(path: Path) -> str:
         return os.path.relpath(path)
     except ValueError:  # on another drive
         return str(path)
-
-
-def _given(config: pytest.Config, name: str) -> Any:
-    """An option of the plugin, else what the ini file says, else None."""
-    given = config.getoption(f"--mirotwin-{name}", default=None)
-    if given is not None:
-        return given
-    try:
-        return config.getini(f"mirotwin_{name}") or None
-    except (ValueError, KeyError):
-        return None
-
-
-def _path(config: pytest.Config, name: str) -> Path | None:
-    """The same for paths: an option's goes from where pytest was called, an ini file's from where that lies."""
-    given = _given(config, name)
-    if given is None:
-        return None
-    from_option = config.getoption(f"--mirotwin-{name}", default=None) is not None
-    return Path(config.invocation_params.dir if from_option else config.rootpath, given)

@@ -113,14 +113,18 @@ def write(target: Path, wanted: Iterable[tuple[str, Path]], remedy: str, force: 
     files = [(name, path.read_bytes()) for name, path in wanted]
     if target.exists() and not target.is_dir():
         raise BadInput(target, "", "is no folder", "name one that is new or empty")
-    present = [name for name, content in files if _is_in_the_way(target / name, content, force)]
-    if present:
-        some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
-        raise BadInput(target, "", f"holds {some} already", remedy)
-    for name, content in files:
-        path = target / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    try:
+        present = [name for name, content in files if _is_in_the_way(target / name, content, force)]
+        if present:
+            some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
+            raise BadInput(target, "", f"holds {some} already", remedy)
+        for name, content in files:
+            path = target / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    except OSError as error:
+        what = error.strerror or type(error).__name__
+        raise BadInput(error.filename or target, "", what, "choose another folder") from None
     return [name for name, _ in files]
 
 
@@ -156,13 +160,8 @@ def examples(options: ExamplesOptions) -> None:
             click.echo(f"{one:{width}}  {about}")
         click.echo("write one here: mirotwin examples NAME")
         return
-    try:
-        names = write(
-            folder, example_files(name), "name another folder, or replace with --force", options.force
-        )
-    except OSError as error:
-        what = error.strerror or type(error).__name__
-        raise BadInput(error.filename or folder, "", what, "choose another folder") from None
+    remedy = "name another folder, or replace with --force"
+    names = write(folder, example_files(name), remedy, options.force)
     for one in names:
         click.echo(folder / one)
     if folder == Path():
@@ -187,11 +186,7 @@ def init(options: InitOptions) -> None:
     a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
     """
     folder = options.folder
-    try:
-        names = begin(folder, not options.without_firmware)
-    except OSError as error:
-        what = error.strerror or type(error).__name__
-        raise BadInput(error.filename or folder, "", what, "choose another folder") from None
+    names = begin(folder, not options.without_firmware)
     for name in names:
         if not name.startswith("firmware/"):
             click.echo(folder / name)

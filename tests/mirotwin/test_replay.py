@@ -12,8 +12,9 @@ from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
+from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
-from mirotwin.replay.differences import frame_lines
+from mirotwin.replay.differences import frame_text
 from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
@@ -147,18 +148,18 @@ def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped():
         Transmission(900_000, "<", answer),
         Transmission(2_000_000, ">", b"\x00\x01\x02"),
     ]
-    lines = list(frame_lines(sent, {0: 3}))
-    texts = [line.text for line in lines]
+    found = list(rows(sent, {0: 3}.__getitem__))
+    texts = [frame_text(row) for row in found]
     assert texts[0] == "team seq=3  +0/+0 +10/-1 +20/-2"
     assert texts[1].startswith("telemetry seq=4 slot=1")
     assert texts[2] == "3 bytes, no sync: 00 01 02"
-    assert [line.tick for line in lines] == [1000, 900_000, 2_000_000]
-    assert [line.slot for line in lines] == [-1, 1, -1]
+    assert [row.event.start_tick for row in found] == [1000, 900_000, 2_000_000]
+    assert [getattr(row.message, "slot", None) for row in found] == [None, 1, None]
 
 
 @pytest.mark.parametrize("place", [5, 12, 18])
 def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place):
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
-    (line,) = frame_lines([Transmission(0, "<", answer, 0, (place,))], {0: 3})
-    assert (line.tick, line.slot) == (0, -1)
-    assert line.text.startswith("19 bytes, bad stop bit: 55 55")
+    (row,) = rows([Transmission(0, "<", answer, 0, (place,))], {0: 3}.__getitem__)
+    assert (row.event.start_tick, row.message) == (0, None)
+    assert frame_text(row).startswith("19 bytes, bad stop bit: 55 55")

@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 import msgspec
 
 from miro_robot.image import Image
-from miro_robot.inspect.activity import Activity
-from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.coverage import Counts, counts_of
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of

@@ -11,8 +11,8 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
+from mirotwin.shell.firmware_image import not_up
 from mirotwin.verify.bare.exchange import Character, Exchange, MemoryView
-from mirotwin.verify.boot import not_up
 
 BOOT_MS = 200
 _SLICE = 20_000  # cycles

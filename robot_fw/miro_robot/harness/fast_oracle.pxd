@@ -4,7 +4,7 @@ from miro_protocol.robot_rules cimport AnswerRule, DrivingRule, OriginRule, Sile
 from miro_protocol.scan cimport Scanner
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
-from miro_robot.harness.oracle cimport LiveOracle
+from miro_robot.harness.harness cimport LiveOracle
 from miro_robot.lm629.orders cimport WheelOrders
 
 cdef int _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS

@@ -39,7 +39,7 @@ from miro_protocol.table import (
 )
 from miro_robot import event_log
 from miro_robot.board import Board
-from miro_robot.harness.oracle import LiveOracle
+from miro_robot.harness.harness import LiveOracle
 from miro_robot.lm629.orders import OFF, WheelOrders
 from miro_robot.lm629.signals import COMMAND_ERROR
 

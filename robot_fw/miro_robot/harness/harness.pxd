@@ -2,7 +2,6 @@ cimport cython
 
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
-from miro_robot.harness.oracle cimport LiveOracle
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line
@@ -12,6 +11,16 @@ cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET
 
 
 cdef bytes _OPENING
+
+
+cdef class LiveOracle:
+    cdef public int code
+    cdef public long long tick
+
+    cpdef begin(self, long long tick)
+    cpdef restarted(self, long long tick)
+    cpdef look(self, long long tick)
+    cpdef bint waits(self) except -1
 
 
 cdef class Moment:

@@ -20,7 +20,6 @@ from miro_exact.state import Flat
 from miro_protocol.table import downlink
 from miro_robot.board import Board
 from miro_robot.event_log import EventLog
-from miro_robot.harness.oracle import LiveOracle
 from miro_robot.harness.program import RESET_TICKS, Program
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
@@ -44,6 +43,31 @@ _WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the oracle waits for ca
 _BURST = 64  # characters on RXD that are not heard yet
 _BAD_STOP, _RESET = 1, 2
 _OPENING = downlink(3).lead + downlink(3).sync  # of any number of robots
+
+
+class LiveOracle:
+    """`code`: 0, or the kind of what it found first, by the names that it has for them; `tick`: of that."""
+
+    NOT_STATE: tuple[str, ...] = ("code", "tick")
+
+    def __init__(self) -> None:
+        self.code = 0
+        self.tick = 0
+
+    def begin(self, tick: int) -> None:
+        """The machine was put back to where it was at `tick`."""
+        self.code = 0
+        self.tick = 0
+
+    def restarted(self, tick: int) -> None:
+        """The processor was reset."""
+
+    def look(self, tick: int) -> None:
+        """The machine has run to `tick`."""
+
+    def waits(self) -> bool:
+        """Whether something is still to come, so that the run must not end."""
+        return False
 
 
 class Moment:

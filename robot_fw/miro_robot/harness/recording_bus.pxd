@@ -1,6 +1,6 @@
 cimport cython
 
-from miro_robot.harness.oracle cimport LiveOracle
+from miro_robot.harness.harness cimport LiveOracle
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.xram cimport XramBus
 

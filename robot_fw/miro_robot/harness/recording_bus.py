@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 
 from miro_exact.clock import NEVER_TICK
-from miro_robot.harness.oracle import LiveOracle
+from miro_robot.harness.harness import LiveOracle
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.mcs51.xram import XramBus

@@ -17,3 +17,31 @@ cdef class Counters(Watcher):
     cpdef long long jumped_at(self, int address)
     @cython.locals(address=int)
     cpdef list addresses(self)
+
+cdef int _RETI, _CALL_CYCLES, _DEPTH
+
+cdef class Activity(Watcher):
+    cdef readonly long long cycles
+    cdef readonly long long asleep_cycles
+    cdef readonly int highest_sp
+    cdef readonly long long highest_sp_tick
+    cdef long long count[6]
+    cdef long long worst_latency[6]
+    cdef long long latency_tick[6]
+    cdef long long worst_duration[6]
+    cdef long long duration_tick[6]
+    cdef long long total_cycles[6]
+    cdef long long ended[6]
+    cdef long long began[8]
+    cdef int serving[8]
+    cdef int depth
+
+    cpdef attached(self, Cpu cpu)
+    cpdef executed(self, Cpu cpu, int pc, long long start)
+    @cython.locals(asked='long long', latency='long long')
+    cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
+    @cython.locals(source=int, duration='long long')
+    cdef int _leave(self, long long cycle) except -1
+    cpdef slept(self, Cpu cpu, long long start, long long end)
+    cpdef ran(self, Cpu cpu, long long start)
+    cpdef of_source(self, int source)

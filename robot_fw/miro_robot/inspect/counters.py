@@ -1,6 +1,11 @@
-"""How often each instruction ran, how long it took, and which way its branch went.
+"""What a CPU spent its time on: how often each instruction ran, how long it took and which way its branch went; besides
+that interrupts, sleep, and how deep its stack went.
 
 What functions, lines and percentages follow from it is in `profile.py` and `coverage.py`.
+
+The latency of an interrupt is counted as Atmel's 8051 Hardware Manual does (4316E, section 2.16, response time): full
+machine cycles between the one in which the flag is latched and the first one of the routine; 3 at least. A request that
+stays up through its own routine counts from that routine's end.
 """
 
 from __future__ import annotations
@@ -43,3 +48,88 @@ class Counters(Watcher):
     def addresses(self) -> list[int]:
         """Where instructions ran, ascending."""
         return [address for address in range(_SPACE) if self.executions[address]]
+
+
+_RETI = 0x32
+_CALL_CYCLES = 2  # of the hardware's LCALL
+_DEPTH = 8
+
+
+class Activity(Watcher):
+    """Cycles asleep, stack and the six interrupts of one CPU, from when it is attached.
+
+    `cycles`: how long it was watched, `asleep_cycles` of them in idle mode or power-down.
+    By source number: `count`, `worst_latency` and `worst_duration` in machine cycles with the tick at which each began,
+    `total_cycles` from the call of the routine to the end of its RETI, routines that came in between included.
+    """
+
+    def __init__(self) -> None:
+        self.cycles = 0
+        self.asleep_cycles = 0
+        self.highest_sp = 0
+        self.highest_sp_tick = 0
+        self.count = [0] * 6
+        self.worst_latency = [0] * 6
+        self.latency_tick = [0] * 6
+        self.worst_duration = [0] * 6
+        self.duration_tick = [0] * 6
+        self.total_cycles = [0] * 6
+        self.ended = [0] * 6  # cycle at which the source's routine was last over
+        self.began = [0] * 8  # of the routines in service, outermost first
+        self.serving = [0] * 8
+        self.depth = 0
+
+    def attached(self, cpu: Cpu) -> None:
+        self.highest_sp = cpu.sp
+        self.highest_sp_tick = 12 * cpu.cycles
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        if cpu.sp > self.highest_sp:
+            self.highest_sp = cpu.sp
+            self.highest_sp_tick = 12 * cpu.cycles
+        if self.depth and cpu.code_at(pc) == _RETI:
+            self._leave(cpu.cycles)
+
+    def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        if cpu.sp > self.highest_sp:
+            self.highest_sp = cpu.sp
+            self.highest_sp_tick = 12 * cpu.cycles
+        self.count[source] += 1
+        asked = cpu.peripherals.interrupts.since[source]
+        if asked < self.ended[source]:
+            asked = self.ended[source] - 1
+        latency = start + _CALL_CYCLES - asked - 1
+        if latency > self.worst_latency[source]:
+            self.worst_latency[source] = latency
+            self.latency_tick[source] = 12 * asked
+        if self.depth < _DEPTH:
+            self.began[self.depth] = start
+            self.serving[self.depth] = source
+            self.depth += 1
+
+    def _leave(self, cycle: int) -> None:
+        self.depth -= 1
+        source = self.serving[self.depth]
+        duration = cycle - self.began[self.depth]
+        self.ended[source] = cycle
+        self.total_cycles[source] += duration
+        if duration > self.worst_duration[source]:
+            self.worst_duration[source] = duration
+            self.duration_tick[source] = 12 * self.began[self.depth]
+
+    def slept(self, cpu: Cpu, start: int, end: int) -> None:
+        self.asleep_cycles += end - start
+
+    def ran(self, cpu: Cpu, start: int) -> None:
+        self.cycles += cpu.cycles - start
+
+    def of_source(self, source: int) -> tuple[int, int, int, int, int, int]:
+        """Count, worst latency and its tick, worst duration and its tick, total cycles."""
+        return (
+            self.count[source],
+            self.worst_latency[source],
+            self.latency_tick[source],
+            self.worst_duration[source],
+            self.duration_tick[source],
+            self.total_cycles[source],
+        )

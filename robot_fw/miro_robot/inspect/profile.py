@@ -5,8 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from miro_robot.image import Image
-from miro_robot.inspect.activity import Activity
-from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.stack_depth import StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.names import INTERRUPTS

@@ -144,8 +144,7 @@ def test_a_stream_file_is_looked_into_as_replay_runs_it(mirotwin, tmp_path):
 
 
 def test_looking_changes_no_bit_of_the_world(short):
-    from miro_robot.inspect.activity import Activity
-    from miro_robot.inspect.counters import Counters
+    from miro_robot.inspect.counters import Activity, Counters
 
     def world():
         return World(scenario_file.load(str(short)).scenario, 3, load_hex(image_path()))

@@ -10,8 +10,7 @@ from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import FastOracle
-from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
-from miro_robot.harness.oracle import LiveOracle
+from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness, LiveOracle
 from miro_robot.harness.program import BYTES, FRAMES, SESSION, Program
 from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.plant import Plant

@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.state import snapshot
-from miro_robot.inspect.activity import Activity
-from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
 from tests.naive import watching
