@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from mirotwin.camera.view import View
-from mirotwin.shell.outputs import FULL, OutputError, part_name
+from mirotwin.shell.outputs import FULL, OutputError, entries, not_empty, part_name, reason_of
 
 _OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
 
@@ -32,28 +32,13 @@ class FrameFolder:
     def __init__(self, path: Path, option: str, force: bool = False) -> None:
         self.path = path
         self.option = option
-        present = self._present()
+        present = entries(path, option)
         if present and not force:
-            some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
             remedy = f"choose another with {option}, or replace frame-*.png in it with --force"
-            raise OutputError(path, f"the folder is not empty ({some})", remedy)
+            raise not_empty(path, present, remedy)
 
     def __repr__(self) -> str:
         return f"FrameFolder({self.path})"
-
-    def _present(self) -> list[str]:
-        """What it holds. Raises OutputError for what cannot be used."""
-        remedy = f"choose another folder with {self.option}"
-        try:
-            present = sorted(os.listdir(self.path))
-        except FileNotFoundError:
-            return []
-        except OSError as error:
-            what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
-            raise OutputError(self.path, what, remedy) from None
-        if not os.access(self.path, os.W_OK | os.X_OK):
-            raise OutputError(self.path, "the folder cannot be written to", remedy)
-        return present
 
     def fill(self, views: Sequence[View], undisturbed: AbstractContextManager[object]) -> None:
         """Saves each frame of `views`; a file is written within `undisturbed`. Raises OutputError."""
@@ -70,12 +55,12 @@ class FrameFolder:
         """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            for name in self._present():
+            for name in entries(self.path, self.option):
                 if _OURS.fullmatch(name):
                     (self.path / name).unlink()
         except OSError as error:
             remedy = f"choose another folder with {self.option}"
-            raise OutputError(self.path, _reason(error), remedy) from None
+            raise OutputError(self.path, reason_of(error), remedy) from None
 
     def _add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
         """Writes a file; `undisturbed` puts off what an exception out of the blue would leave half-written."""
@@ -87,10 +72,6 @@ class FrameFolder:
             except OSError as error:
                 room = "make room, or " if error.errno in FULL else ""
                 remedy = f"{room}choose another folder with {self.option}"
-                raise OutputError(self.path, _reason(error), remedy) from None
+                raise OutputError(self.path, reason_of(error), remedy) from None
             finally:
                 part.unlink(missing_ok=True)
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or type(error).__name__

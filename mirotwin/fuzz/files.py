@@ -17,15 +17,14 @@ OUT/
 from __future__ import annotations
 
 import glob
-import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import files
-from mirotwin.shell.outputs import OutputError, told_when_full
+from mirotwin.shell.outputs import OutputError, entries, not_empty, some, told_when_full
 
 FOLDERS = ("crashes", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
@@ -43,19 +42,13 @@ class CampaignFolder:
 
     def __init__(self, path: Path, force: bool = False) -> None:
         self.path = path
-        try:
-            present = sorted(os.listdir(path)) if path.exists() else []
-        except OSError as error:
-            what = (
-                "exists and is not a folder" if isinstance(error, NotADirectoryError) else f"{error.strerror}"
-            )
-            raise OutputError(path, what, f"choose another folder with {OPTION}") from None
+        present = entries(path, OPTION)
         others = [name for name in present if name not in (*FOLDERS, *FILES)]
         if present and not force:
             remedy = f"choose another with {OPTION}, or replace an earlier campaign with --force"
-            raise OutputError(path, f"the folder is not empty ({_some(present)})", remedy)
+            raise not_empty(path, present, remedy)
         if others:
-            what = f"holds what no campaign leaves ({_some(others)})"
+            what = f"holds what no campaign leaves ({some(others)})"
             raise OutputError(path, what, f"choose another folder with {OPTION}")
         self._present = present
 
@@ -122,7 +115,3 @@ def check_outside(path: Path, corpus: Path | None) -> None:
     if corpus is not None and path.exists() and corpus.resolve().is_relative_to(path.resolve()):
         what = f"lies in {path}, which the campaign replaces"
         raise BadInput(corpus, "--corpus", what, f"choose another folder with {OPTION}")
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(names[:3]) + (", .." if len(names) > 3 else "")

@@ -112,14 +112,15 @@ def _print_json(given: Input, source: Source, found: Iterable[DecodedRow]) -> in
         sys.stdout.write(line.decode() + "\n")
 
     totals = render.Totals()
-    put(render.json_input(given.label, source.format, source.timed))
+    head = {"file": given.label, "format": source.format, "timed": source.timed}
+    put(render.json_event("input", **head, units=render.UNITS))
     try:
         for row in found:
             totals.add(row)
             put(render.json_line(row, source.timed))
     except READ_ERRORS as error:
-        put(render.json_error(str(error)))
+        put(render.json_event("error", text=str(error)))
         raise
     finally:
-        put(render.json_end(totals))
+        put(render.json_event("end", **totals.as_dict()))
     return DONE

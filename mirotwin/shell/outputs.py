@@ -87,7 +87,7 @@ class OutputFolder:
             self._remove_parts()
         except OSError as error:
             _release(self._lock)
-            raise OutputError(self.path, _reason(error), "choose another folder with --out") from None
+            raise OutputError(self.path, reason_of(error), "choose another folder with --out") from None
         except OutputError:
             _release(self._lock)
             raise
@@ -100,9 +100,9 @@ class OutputFolder:
             if kind is None:
                 self._publish()
             elif isinstance(error, OSError) and error.errno in FULL:
-                raise OutputError(self.path, _reason(error), _make_room("folder", "--out")) from None
+                raise OutputError(self.path, reason_of(error), _make_room("folder", "--out")) from None
         except OSError as failure:
-            raise OutputError(self.path, _reason(failure), "choose another folder with --out") from None
+            raise OutputError(self.path, reason_of(failure), "choose another folder with --out") from None
         finally:
             self._leave()
 
@@ -155,37 +155,44 @@ def _release(lock: int | None) -> None:
         os.close(lock)
 
 
-def _check(path: Path, force: bool, names: Sequence[str], ours: bool) -> None:
+def entries(path: Path, option: str) -> list[str]:
+    """What a folder to be written to holds; nothing where it is not there yet. Raises OutputError for any other."""
+    remedy = f"choose another folder with {option}"
     try:
         present = sorted(os.listdir(path))
     except FileNotFoundError:
         if path.is_symlink():
             what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
             raise OutputError(path, what, "make that folder, or remove the link") from None
-        return
+        return []
     except OSError as error:
-        what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
-        raise OutputError(path, what, "choose another folder with --out") from None
+        what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else reason_of(error)
+        raise OutputError(path, what, remedy) from None
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise OutputError(path, "the folder cannot be written to", remedy)
+    return present
+
+
+def not_empty(path: Path, present: Sequence[str], remedy: str) -> OutputError:
+    """For a folder in which there is something already."""
+    return OutputError(path, f"the folder is not empty ({some(present)})", remedy)
+
+
+def _check(path: Path, force: bool, names: Sequence[str], ours: bool) -> None:
+    present = entries(path, "--out")
     parts = {part_name(name) for name in names} & set(present)
     finished = ours and RECORDING in present and not parts
     if present and not force and not finished:
-        raise OutputError(path, _content(present, names), _ways_out(names))
-    if not os.access(path, os.W_OK | os.X_OK):
-        raise OutputError(path, "the folder cannot be written to", "choose another folder with --out")
+        if parts:
+            what = f"the folder holds parts of an interrupted command ({some(sorted(parts))})"
+            raise OutputError(path, what, _ways_out(names))
+        raise not_empty(path, present, _ways_out(names))
     for name in (*names, *map(part_name, names)):
         if (path / name).is_dir():
             raise OutputError(path / name, "is a folder where a file is to be written", "remove it")
 
 
-def _content(present: Sequence[str], names: Sequence[str]) -> str:
-    """What a folder with the entries `present` holds; what was broken off goes first."""
-    known = {part_name(name) for name in names}
-    if parts := [name for name in present if name in known]:
-        return f"the folder holds parts of an interrupted command ({_some(parts)})"
-    return f"the folder is not empty ({_some(present)})"
-
-
-def _some(names: Sequence[str]) -> str:
+def some(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + (", .." if len(names) > 3 else "")
 
 
@@ -243,7 +250,7 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)
     except OSError as error:
-        raise OutputError(path, _reason(error), f"choose another file with {option}") from None
+        raise OutputError(path, reason_of(error), f"choose another file with {option}") from None
     os.close(handle)
     staging = Path(name)
     try:
@@ -253,7 +260,7 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     except OSError as error:
         if error.errno not in FULL:
             raise
-        raise OutputError(path, _reason(error), _make_room("file", option)) from None
+        raise OutputError(path, reason_of(error), _make_room("file", option)) from None
     finally:
         staging.unlink(missing_ok=True)
 
@@ -268,7 +275,7 @@ def told_when_full(path: Path | None, option: str, kind: str = "folder") -> Iter
     except OSError as error:
         if path is None or error.errno not in FULL:
             raise
-        raise OutputError(path, _reason(error), _make_room(kind, option)) from None
+        raise OutputError(path, reason_of(error), _make_room(kind, option)) from None
 
 
 def _make_room(kind: str, option: str) -> str:
@@ -281,5 +288,5 @@ def _umask() -> int:
     return mask
 
 
-def _reason(error: OSError) -> str:
+def reason_of(error: OSError) -> str:
     return error.strerror or type(error).__name__

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from typing import IO
 
 
 def replace(path: str | os.PathLike[str], content: bytes) -> None:
     """Puts `content` in the place of whatever is at `path`; OSError when that cannot be done."""
-    with replacing(path) as file:
-        file.write(content)
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """A file to write to, which takes the place of whatever is at `path` unless an exception comes first."""
     import tempfile  # slow to load
 
     target = Path(path)
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            yield file
+            file.write(content)
         os.chmod(name, 0o644)  # mkstemp's 0600 is for secrets
         os.replace(name, target)
     except BaseException:

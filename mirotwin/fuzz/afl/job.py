@@ -10,7 +10,6 @@ import struct
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.settings import end_with_parent
@@ -139,9 +138,7 @@ class Counts:
     def __enter__(self) -> Counts:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         if self._memory is not None:
             self._memory.close()
 

@@ -6,7 +6,6 @@ import io
 import os
 import stat
 import sys
-from types import TracebackType
 from typing import BinaryIO
 
 from miro_exact.inputs import InputError, check_no_folder
@@ -90,8 +89,6 @@ class Input:
     def __enter__(self) -> Input:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         if self.path != STDIN:
             self._file.close()

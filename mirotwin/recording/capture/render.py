@@ -139,23 +139,12 @@ def _fields(message: Message) -> dict[str, Any]:
     return {"slot": message.slot, "flags": flags, **{name: getattr(message, name) for name in _NUMBERS}}
 
 
-def json_input(file: str, format: str, timed: bool) -> bytes:
-    return msgspec.json.encode(
-        {"event": "input", "file": _utf8(file), "format": format, "timed": timed, "units": UNITS}
-    )
-
-
-def json_error(text: str) -> bytes:
-    return msgspec.json.encode({"event": "error", "text": _utf8(text)})
-
-
-def _utf8(text: str) -> str:
-    """`text` with what is no UTF-8 (a file's name need not be) written out."""
-    return text.encode("utf-8", "backslashreplace").decode()
-
-
-def json_end(totals: Totals) -> bytes:
-    return msgspec.json.encode({"event": "end", **totals.as_dict()})
+def json_event(event: str, **values: Any) -> bytes:
+    """Another event. What is no UTF-8 in a text (a file's name need not be) is written out."""
+    for name, value in values.items():
+        if isinstance(value, str):
+            values[name] = value.encode("utf-8", "backslashreplace").decode()
+    return msgspec.json.encode({"event": event, **values})
 
 
 class Totals:
