@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import PurePath
 from typing import Any
 
+from miro_protocol.toml_text import TomlError, check_numbers
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.settings import Setting, in_text, make
 
@@ -44,6 +45,10 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     if SCENARIO in base:
         what = f"{name} is itself another scenario with keys changed"
         raise ScenarioError(origin, SCENARIO, what, f"name {base[SCENARIO]!r}, and repeat its keys")
+    try:
+        check_numbers(settings, SET)  # before they are written as text
+    except TomlError as error:
+        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
     complete = {**base, **own}
     return complete, make(complete, in_text(settings), origin, SET)
 
