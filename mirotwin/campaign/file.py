@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import msgspec
@@ -39,6 +39,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
+from miro_sim.scenario.base import beside
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
@@ -134,18 +135,12 @@ class _File:
         ]
         return CampaignFile(
             path=str(self.path),
-            scenario=self.beside(found.scenario),
+            scenario=beside(str(self.path), found.scenario),
             firmware=self.image(found.firmware),
             settings=tuple(settings),
             allowed_failed_share=found.allowed_failed_share,
             design=self._design(found),
         )
-
-    def beside(self, name: str) -> str:
-        """The path of a scenario that the file names; a name without separator or suffix is a built-in one."""
-        if not (name.endswith(".toml") or "/" in name or "\\" in name):
-            return name
-        return str(PurePath(self.path).parent / name)
 
     def image(self, name: str) -> str:
         return str((self.path.parent / name).resolve()) if name else ""
@@ -192,7 +187,7 @@ class _File:
         if not isinstance(value, str):
             self.refuse(place, f"expected a name or a path, got {value!r}")
         if key == SCENARIO:
-            return Level(value, scenario=self.beside(value), place=place)
+            return Level(value, scenario=beside(str(self.path), value), place=place)
         return Level(value, firmware=self.image(value) or "own", place=place)
 
     def _factors(self, table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:

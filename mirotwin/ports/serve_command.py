@@ -111,9 +111,8 @@ def serve(options: ServeOptions) -> int:
         for port in ports:
             show_line(f"{port.kind} {port.where}")
         show_line("serving")
-        session = Session(
-            world, Pace(options.pace), selector, ports, tell, _end_tick(options.duration), options.once
-        )
+        end_tick = ticks(LONGEST_S) if options.duration is None else options.duration.ticks()
+        session = Session(world, Pace(options.pace), selector, ports, tell, end_tick, options.once)
         run_files = RunFiles(folder, source, world, hold, checks, text.settings, session=session)
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
@@ -130,10 +129,6 @@ def serve(options: ServeOptions) -> int:
     tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
     failed = report_failures(checks)
     return report_faults(world) or failed
-
-
-def _end_tick(duration: Time | None) -> int:
-    return ticks(LONGEST_S) if duration is None else duration.ticks()
 
 
 def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks) -> None:

@@ -54,6 +54,11 @@ class TimeMessage(msgspec.Struct, frozen=True, gc=False):
     nsec: int
 
 
+def time_of(tick: int) -> TimeMessage:
+    """The time of a tick."""
+    return TimeMessage(*divmod(nanoseconds(tick), SECOND_NS))
+
+
 class ImageMessage(msgspec.Struct, frozen=True, gc=False):
     """`camera/image`: a plain frame as the PC gets it; `data` is a file of this `format`, in base64 as JSON."""
 
@@ -66,8 +71,7 @@ class ImageMessage(msgspec.Struct, frozen=True, gc=False):
 
 def image_message(network: int, tick: int, png: bytes) -> ImageMessage:
     """The frame of a network's camera that was exposed at `tick`."""
-    at = TimeMessage(*divmod(nanoseconds(tick), SECOND_NS))
-    return ImageMessage(at, f"net{network}/camera", png, "png", tick)
+    return ImageMessage(time_of(tick), f"net{network}/camera", png, "png", tick)
 
 
 class TheoryMessage(msgspec.Struct, frozen=True, gc=False):

@@ -7,25 +7,12 @@ from __future__ import annotations
 
 import msgspec
 
-from miro_exact.clock import nanoseconds
+from mirotwin.recording.channels import TimeMessage
+from mirotwin.recording.channels import time_of as time_of
 
-SECOND_NS = 1_000_000_000
-
-
-class Timestamp(msgspec.Struct, frozen=True):
-    """A moment of simulated time, or a length of it."""
-
-    sec: int
-    nsec: int
-
-
+Timestamp = TimeMessage
 ALWAYS = Timestamp(0, 0)
 """The lifetime of what stays until it is replaced."""
-
-
-def time_of(tick: int) -> Timestamp:
-    """Simulated time, rounded down to nanoseconds."""
-    return Timestamp(*divmod(nanoseconds(tick), SECOND_NS))
 
 
 class Vector3(msgspec.Struct, frozen=True):

@@ -38,7 +38,7 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
     _check_no_part_of_network(own.get(NETWORK), origin, name)
     try:
-        base = tables_of(_beside(origin, name))
+        base = tables_of(beside(origin, name))
     except ScenarioError as error:
         place = ": ".join(part for part in (f"{error.path}", f"{error.place}") if part)
         raise ScenarioError(origin, SCENARIO, f"{place}: {error.what}", error.remedy) from None
@@ -79,8 +79,11 @@ def _key_in(given: Any) -> str:
     return "network.robot.controller.q1_per_s = 0.3"
 
 
-def _beside(origin: str, name: str) -> str:
-    """The path of a file that a file names; a name without a separator or suffix is a built-in scenario."""
-    if not (name.endswith(".toml") or "/" in name or "\\" in name):
-        return name
-    return str(PurePath(origin).parent / name)
+def is_path(name: str) -> bool:
+    """Whether a scenario's name is that of a file: without a separator or suffix it is a built-in one."""
+    return name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def beside(origin: str, name: str) -> str:
+    """The scenario that a file names, as it is called from here."""
+    return str(PurePath(origin).parent / name) if is_path(name) else name

@@ -14,7 +14,7 @@ import msgspec
 from miro_exact.bad_input import did_you_mean, one_line
 from miro_exact.inputs import InputError, read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables, without_none
-from miro_sim.scenario.base import with_base
+from miro_sim.scenario.base import is_path, with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.places import check_places
@@ -84,7 +84,7 @@ def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = n
 
 def source_text(source: str) -> str:
     """The text of the scenario that `source` names, which may be wrong. Raises ScenarioError."""
-    if not (source.endswith(".toml") or "/" in source or "\\" in source):
+    if not is_path(source):
         return builtin_text(source)
     try:
         raw = read_input(source, TEXT_KIB << 10)
