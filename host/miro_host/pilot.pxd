@@ -8,7 +8,8 @@ cdef class Pilot:
     cdef readonly Integrator integrator
     cdef object _asked
     cdef double _asked_s
-    cdef public object command
+    cdef readonly object command
+    cdef public list numbers
     cdef readonly double reference_lead_s, dead_s, units_per_m_s
 
     @cython.locals(z=Integrator, units=double, v_m_s=double, w_rad_s=double, at_s=double)

@@ -60,7 +60,8 @@ class Pilot:
     `update`; 0 is the paper's loop. The shift is ours, not the paper's: a positive value (up to the time
     the command takes effect) or a negative one (back to the exposure of the image in hand) compensates a
     known delay without touching the law. `dead_s`, from a period's begin to the end of its frame, is told the
-    estimator.
+    estimator. `numbers` is `command` as it is saved: wheels, wheel factors, velocities, and the named values in the
+    order of both `INNER`.
     """
 
     STATE = {
@@ -96,10 +97,10 @@ class Pilot:
         self.reference_lead_s = reference_lead_s
         self.dead_s = dead_s
         self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
-        self.command = WheelCommand(
-            *(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0)),
-            estimate=dict.fromkeys(self.estimator.INNER, 0.0),
-        )
+        self.command = STANDSTILL
+        nothing = [0.0] * (len(law.INNER) + len(self.estimator.INNER))
+        self.numbers = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, *nothing]
+        self.after_load()
 
     def __repr__(self) -> str:
         return f"Pilot({self.reference!r}, {self.law!r}, command={self.command!r})"
@@ -132,6 +133,8 @@ class Pilot:
         left_factor, right_factor = estimate.left_factor, estimate.right_factor
         left, right = self.wheels.command(z.v_m_s, z.w_rad_s, left_factor, right_factor)
         named = _in_order(estimate.inner, self.estimator.INNER)
+        wheels = float(left), float(right), left_factor, right_factor
+        self.numbers = [*wheels, z.v_m_s, z.w_rad_s, *inner.values(), *named.values()]
         self.command = WheelCommand(left, right, z.v_m_s, z.w_rad_s, inner, left_factor, right_factor, named)
         return self.command
 
@@ -167,20 +170,11 @@ class Pilot:
             raise _failure("law", self.law, error) from error
         return answer
 
-    @property
-    def numbers(self) -> list[float]:
-        """The command: wheels, velocities, wheel factors, and the named values in the order of both `INNER`."""
-        command = self.command
-        wheels = float(command.left), float(command.right), command.left_factor, command.right_factor
-        inner = [command.inner[name] for name in self.law.INNER]
-        named = [command.estimate[name] for name in self.estimator.INNER]
-        return [*wheels, command.v_m_s, command.w_rad_s, *inner, *named]
-
-    @numbers.setter
-    def numbers(self, numbers: list[float]) -> None:
-        if len(numbers) < 6:
-            raise ValueError(f"a command has not enough values: {len(numbers)}")
-        left, right, left_factor, right_factor, v_m_s, w_rad_s, *inner = numbers
+    def after_load(self) -> None:
+        """Makes the command of its numbers. Raises ValueError for one that no step gives."""
+        if len(self.numbers) < 6:
+            raise ValueError(f"a command has not enough values: {len(self.numbers)}")
+        left, right, left_factor, right_factor, v_m_s, w_rad_s, *inner = self.numbers
         if not all(abs(wheel) <= _FASTEST and wheel == int(wheel) for wheel in (left, right)):
             raise ValueError(f"no frame carries the command ({left}, {right})")
         _check_factors(left_factor, right_factor)
