@@ -64,6 +64,8 @@ cdef class Board(Bus):
     cdef int hi_inverted[8]
     cdef int hi_side[8]
 
+    @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int, levels=cython.int)
+    cdef _resolve_outputs(self, wiring)
     @cython.locals(earliest_tick=cython.longlong, latest_tick=cython.longlong, next_tick=cython.longlong)
     cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1

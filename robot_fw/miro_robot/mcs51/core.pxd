@@ -47,6 +47,7 @@ cdef class Core:
     @cython.final
     cdef void leave_edges(self) noexcept
 
+    @cython.locals(line='unsigned int')
     cdef unsigned int line_at(self, int address) noexcept
     cdef int begin_run(self) except -1
     cdef int end_run(self) except -1
