@@ -4,11 +4,12 @@ import copy
 import math
 import re
 import tomllib
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 
 TEXT_KIB = 512
 """Most KiB of a document: a built-in scenario has 4."""
@@ -108,7 +109,8 @@ def struct_of(table: Any, kind: type[T]) -> T:
         message = f"{error}"
     found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
     assert found is not None
-    raise _misfit(found[1], _with_names(found[2] or "", table, kind, message))
+    keys = () if found[2] else getattr(kind, "__struct_encode_fields__", ())
+    raise _misfit(found[1], _with_names(found[2] or "", table, kind, message), keys)
 
 
 def _with_names(path: str, table: Any, kind: type, message: str) -> str:
@@ -138,14 +140,15 @@ def _fault(table: Any, kind: type) -> str:
     return ""
 
 
-def _misfit(what: str, path: str) -> TomlError:
-    """What msgspec found, in the words of the file."""
+def _misfit(what: str, path: str, keys: Sequence[str]) -> TomlError:
+    """What msgspec found, in the words of the file. `keys`: those of the table, if they are known."""
     field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", what)
     if field is not None:
         place = f"{path}.{field[2]}" if path else field[2]
         if field[1] == "missing required":
             return TomlError("this key is missing", "add it", place)
-        return TomlError("unknown key", "remove or correct it", place)
+        known = f"keys here: {', '.join(keys)}" if keys else "remove or correct it"
+        return TomlError("unknown key", did_you_mean(field[2], keys) or known, place)
     limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
     if limit is not None:
         return TomlError("is out of range", f"must be {limit[1]} {limit[2]}", path)

@@ -50,9 +50,7 @@ def of_table(table: dict[str, Any], kind: type[T], origin: str) -> T:
         check_numbers(table)
         return struct_of(table, kind)
     except TomlError as error:
-        top = error.what == "unknown key" and "." not in f"{error.place}"
-        keys = f"; the keys are {', '.join(kind.__struct_fields__)}" if top else ""
-        raise EyeError(origin, error.place, error.what, error.remedy + keys) from None
+        raise EyeError(origin, error.place, error.what, error.remedy) from None
 
 
 def text(struct: msgspec.Struct) -> str:

@@ -148,10 +148,8 @@ def test_a_calibration_reads_back_as_it_was(made, tmp_path):
     [
         ("x = ", "c.toml: line 1: not TOML: "),
         ("version = 1", "c.toml: camera: this key is missing; add it"),
-        (
-            "zoom = 2\n[camera]",
-            "c.toml: zoom: unknown key; remove or correct it; the keys are camera, version",
-        ),
+        ("zoom = 2\n[camera]", "c.toml: zoom: unknown key; keys here: camera, version"),
+        ("kamera = 2\n[camera]", "c.toml: kamera: unknown key; did you mean camera?"),
         ("[camera]\nfocal = 400.0", "c.toml: camera.focal: unknown key; remove or correct it"),
         ("[camera]\nk1 = 'much'", "c.toml: camera.k1: expected a number, got a string; mend the value"),
         ("[camera]\nk1 = 0.7", "c.toml: camera.k1: is out of range; must be <= 0.5"),
