@@ -11,10 +11,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
-import msgspec
-
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
+from miro_protocol.toml_text import TomlError, struct_of
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from miro_sim.world.conditions import CONDITIONS
@@ -155,8 +154,10 @@ class Console:
             given = {"network": robot.network, "slot": robot.slot}
         given |= {key: _plain(value) for key, _, value in (word.partition("=") for word in keys)}
         try:
-            event = self.timeline.until(msgspec.convert(given, CONDITIONS[name], strict=False))
-        except (msgspec.ValidationError, ValueError) as error:
+            event = self.timeline.until(struct_of(given, CONDITIONS[name], strict=False))
+        except TomlError as error:
+            raise BadInput(f"until {name}", error.place, error.what, error.remedy) from None
+        except ValueError as error:
             raise BadInput("", rest, str(error), f"its keys are {', '.join(fields)}") from None
         self.say("no such event before the end" if event is None else str(event))
 

@@ -19,7 +19,7 @@ from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.names import SFRS
 from miro_robot.mcs51.opcodes import LENGTH, is_call
-from mirotwin.debug.expression import NoValue, Term, Value, expression, number
+from mirotwin.debug.expression import NoValue, Term, Value, expression, names_in, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
 from mirotwin.rerun.inspected_run import RobotRun
@@ -104,6 +104,7 @@ class Debugger:
             raise BadInput("", "breakpoint", "is beyond the last code address", "use 0x0000 to 0xffff")
         self._numbers += 1
         term = expression(condition) if condition else None
+        self.symbols.check_names(names_in(condition))
         found = Breakpoint(
             self._numbers, text, frozenset(addresses), term, _counting(count) if count else None
         )

@@ -73,6 +73,13 @@ def expression(text: str) -> Term:
     return term
 
 
+def names_in(text: str) -> list[str]:
+    """What an expression looks up: its names but for members."""
+    tokens = _TOKEN.findall(text)
+    names = [token.rpartition(":")[2] for at, token in enumerate(tokens) if tokens[at - 1] not in (".", "->")]
+    return [name for name in names if name.isidentifier()]
+
+
 def content(value: Value, scope: Scope) -> Any:
     """What it holds: int, float, bool, list, dict."""
     if value.members is not None:

@@ -28,7 +28,7 @@ from mirotwin.firmware.code_place import address_of
 
 _BYTE, _BIT = CType("int", 1), CType("bit", 1)
 SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
-SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle")
+SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle", *(f"R{number}" for number in range(8)))
 _CHIP = {
     "": "desired_position desired_velocity real_position real_velocity status pwm_magnitude sign hi"
     " index_position breakpoint mode writes_while_busy pid trajectory",
@@ -114,7 +114,15 @@ class Symbols:
     def known_names(self) -> list[str]:
         """For completion and remedies."""
         symbols = (name.removeprefix("_") for name in self.image.symbols.names)
-        return [*symbols, *self.variables.by_name, *SPECIAL, *SFRS, *BITS, *SIZES]
+        in_registers = (one.name for one in self.blocks.variables)
+        return [*symbols, *self.variables.by_name, *in_registers, *SPECIAL, *SFRS, *BITS, *SIZES]
+
+    def check_names(self, names: Sequence[str]) -> None:
+        """Raises NoValue for one that means nothing anywhere: what it stands in would never be true."""
+        known = {*self.known_names(), *self.image.symbols.names}
+        for name in names:
+            if name not in known:
+                raise NoValue(f"there is no {name}", did_you_mean(name, known))
 
 
 class Moment:

@@ -101,10 +101,10 @@ def check_numbers(value: Any, path: str = "") -> None:
             check_numbers(inner, f"{path}[{index}]")
 
 
-def struct_of(table: Any, kind: type[T]) -> T:
-    """The struct that a table says. Raises TomlError with the key."""
+def struct_of(table: Any, kind: type[T], strict: bool = True) -> T:
+    """The struct that a table says. Raises TomlError with the key. `strict`: 1 is not true, and "1" not 1."""
     try:
-        return msgspec.convert(table, kind)
+        return msgspec.convert(table, kind, strict=strict)
     except msgspec.ValidationError as error:
         message = f"{error}"
     found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)

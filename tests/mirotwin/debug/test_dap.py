@@ -168,13 +168,14 @@ def test_breakpoints_that_cannot_be_set_say_why(adapter):
     source = {"path": "/elsewhere/failsafe.c"}
     lines = [
         {"line": 146, "condition": "age >"},
+        {"line": 146, "condition": "agee > 3"},
         {"line": 9999},
         {"line": 146, "hitCondition": "often"},
         {"line": 146},
     ]
     found = client.ask("setBreakpoints", source=source, breakpoints=lines)["body"]["breakpoints"]
-    assert [one["verified"] for one in found] == [False, False, False, True]
-    assert all(one["message"] for one in found[:3])
+    assert [one["verified"] for one in found] == [False, False, False, False, True]
+    assert all(one["message"] for one in found[:4])
     places = [{"instructionReference": one} for one in ("0xffffff", "zz", "0x40")]
     found = client.ask("setInstructionBreakpoints", breakpoints=places)["body"]["breakpoints"]
     assert [one["verified"] for one in found] == [False, False, True]

@@ -174,12 +174,17 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("break nothing.c:3", "no code is of this file"),
         ("break foo", "no symbol foo"),
         ("break main if age >", "lacks a name or a number"),
+        ("break main if agee > 3", "there is no agee; did you mean age?"),
+        ("break main if tick > 3 && wire:placee", "there is no placee; did you mean place?"),
+        ("watch age if lm629.left.status == nothing", "there is no nothing"),
         ("print nothing", "there is no nothing here"),
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
         ("until edge 'pin", "No closing quotation"),
-        ("until edge pins=txd", "unknown field `pins`; its keys are network, slot, pin, level"),
+        ("until edge pins=txd", "until edge: pins: unknown key; did you mean pin?"),
+        ("until answer slot=9", "until answer: slot: is out of range; must be <= 4"),
+        ("until answer seq=x", "until answer: seq: expected a whole number, got a string"),
         ("next 3", "is more than next takes"),
         ("watch lm629.left.status", "lies in no memory that can be watched"),
         ("finish", "nothing called this function"),
@@ -193,6 +198,12 @@ def test_a_command_that_cannot_be_done_is_one_line_and_exit_code_2(mirotwin, lin
     assert code == 2
     assert said in err
     assert err.count("\n") == 1
+
+
+def test_a_condition_may_name_what_is_known_elsewhere(mirotwin):
+    known = "place + _main + R3 + P1.0 + tick + lm629.left.status + iram[3]"
+    code, _, err = mirotwin("debug", "fig6", *commands(f"break main if {known}"))
+    assert (code, err) == (0, "")
 
 
 def test_goto_goes_back_from_the_end_of_the_run(mirotwin):
