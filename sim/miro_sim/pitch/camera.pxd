@@ -2,14 +2,10 @@ cimport cython
 from miro_exact.dmath cimport sincos
 from miro_sim.pitch cimport rays, scene, sensor
 
-cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _BAND
-cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _EDGES, _V, _LOW, _HIGH, _CROSSED_U, _CROSSED_V, _RAYS
+cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _FIELD, _BAND
+cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _NEAR, _LOW_U, _HIGH_U, _LOW_V, _HIGH_V, _LIFT, _FAST_UM
 cdef long long _HALF_UM, _TOP_UM
 
-@cython.locals(low=int, high=int)
-cdef inline bint _inside(int box, int every, int some) noexcept
-@cython.locals(low=int, high=int)
-cdef inline bint _outside(int box, int every, int some) noexcept
 @cython.locals(most='long long')
 cdef bint _enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
 @cython.locals(latest='long long')
@@ -23,43 +19,50 @@ cdef class Camera:
     cdef readonly rays.Rays rays
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
-    cdef object boxes
-    cdef int sets, field_sets, side, black, span_first, span_end, first, samples, upper, lower, above, below
-    cdef int fall_u, fall_v, covered_first, covered_end
+    cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, upper, lower, above, below
+    cdef int covered_first, covered_end
+    cdef int instants[6]
     cdef int team_paint[10]
     cdef int identity_paint[10]
     cdef long long drift_um[10]
-    cdef int x[60]
-    cdef int y[60]
-    cdef int cos[60]
-    cdef int sin[60]
-    cdef long long shift_u[60]
-    cdef long long shift_v[60]
-    cdef int edges[1220]
-    cdef int near_low[10]
-    cdef int near_high[10]
-    cdef int corner_u[4224]
-    cdef int corner_v[4224]
-    cdef int code[4224]
-    cdef int every[2112]
-    cdef int some[2112]
-    cdef int always[352]
-    cdef int ever[352]
+    cdef int x[80]
+    cdef int y[80]
+    cdef int cos[84]
+    cdef int sin[84]
+    cdef long long shift_u[80]
+    cdef long long shift_v[80]
+    cdef int edges[132]
+    cdef int corner_u[5632]
+    cdef int corner_v[5632]
+    cdef int line_least_u[704]
+    cdef int line_most_u[704]
+    cdef int line_least_v[704]
+    cdef int line_most_v[704]
+    cdef int least_u[352]
+    cdef int most_u[352]
+    cdef int least_v[352]
+    cdef int most_v[352]
+    cdef int fall_u[4]
+    cdef int fall_v[4]
+    cdef int low_u[4]
+    cdef int high_u[4]
+    cdef int low_v[4]
+    cdef int high_v[4]
     cdef unsigned char covered[4096]
     cdef long long total[4096]
     cdef int u[16]
     cdef int v[16]
-    cdef int seen[96]
-    cdef int height_um[96]
+    cdef int seen[128]
+    cdef int height_um[128]
 
-    @cython.locals(body=int, at=int, place=int, share=double, after_s=double, way_m=double, sine=double, cosine=double)
+    @cython.locals(body=int, number=int, field=int, place=int, share=double, after_s=double, way_m=double, sine=double,
+                   cosine=double, least_u=int, most_u=int, least_v=int, most_v=int)
     cpdef robot(self, int team, int identity, double x_m, double y_m, double theta_rad, double v_m_s=*, double w_rad_s=*)
-    @cython.locals(cosine='long long', sine='long long', at=int, box=int, low_u=int, high_u=int, low_v=int, high_v=int,
-                   drop='long long', x='long long', y='long long')
-    cdef _stand(self, int place)
+    @cython.locals(cosine='long long', sine='long long', drop='long long', x='long long', y='long long')
+    cdef void _stand(self, int place) noexcept
     @cython.locals(camera='long long', drop='long long', margin='long long')
-    cdef void _surround(self, int place, int at, int low, long long fall) noexcept
-    @cython.locals(first=int, middle=int, reach=int, length='long long', place=int, way='long long', turn='long long',
+    cdef void _surround(self, int at, long long least, long long most) noexcept
+    @cython.locals(middle=int, reach=int, length='long long', number=int, place=int, way='long long', turn='long long',
                    drift='long long')
     cdef void _bound(self, int body) noexcept
     @cython.locals(out=bytearray)
@@ -74,54 +77,69 @@ cdef class Camera:
     cdef void _cover_with(self, int body, int top, int bottom, int first, int end) noexcept
     @cython.locals(step=int, left=int, right=int, beside='long long')
     cdef void _find_span(self, int body, int row, int first, int end) noexcept
-    @cython.locals(place=int, edges=int, x='long long', y='long long', u='long long', v='long long',
+    @cython.locals(place=int, reach=int, x='long long', y='long long', u='long long', v='long long',
                    beside_u='long long', beside_v='long long')
     cdef inline long long _beside(self, int body, int pixel) noexcept
-    @cython.locals(rays=rays.Rays, at=int, place=int, cosine='long long', sine='long long', shift_u='long long',
-                   shift_v='long long', line=int, corner=int, column=int, x='long long', y='long long')
+    @cython.locals(bounds=int, column=int, number=int, at=int)
     cdef void _find_corners(self, int body, int row, int left, int right) noexcept
-    @cython.locals(edges='int *', a=int, b=int, c=int, d=int, e=int, f=int, g=int, h=int, i=int, j=int,
-                   corner='long long', lane='long long', u=int, v=int, high=int)
-    cdef void _encode(self, int at, int first, int end) noexcept
-    @cython.locals(at=int, above='long long', below='long long', joined='long long', column='long long',
-                   lane='long long', a=int, b=int, c=int, d=int)
-    cdef void _join(self, int row, int left, int right) noexcept
+    @cython.locals(rays=rays.Rays, x='double[4]', y='double[4]', u='int[4]', v='int[4]',
+                   cosine=double, sine=double, shift_u=double, shift_v=double, column='long long', lane='long long',
+                   at='long long')
+    cdef void _turn_corners(self, int place, long long corner, long long line, long long bounds, long long left,
+                            long long right) noexcept
+    @cython.locals(column='long long', lane='long long', at='long long', one=int, other=int)
+    cdef void _bound_pixels(self, long long left, long long right) noexcept
+    @cython.locals(inside_u=bint)
+    cdef inline bint _inside(self, int column, int at) noexcept
+    @cython.locals(beside=bint)
+    cdef inline bint _outside(self, int column, int at) noexcept
     @cython.locals(total='long long')
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
     @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, team=int, identity=int,
                    total='long long')
     cdef long long _alone(self, int body, int row, int column) noexcept
-    cdef inline int _within(self, int body, int row, int column, int box) noexcept
-    @cython.locals(low=int, high=int, within=int, at=int, every=int, some=int, crossed=int, edges=int)
-    cdef int _count_within(self, int body, int row, int column, int box) noexcept
+    @cython.locals(at=int)
+    cdef inline int _within(self, int row, int column, int box) noexcept
+    @cython.locals(across_u=bint, across_v=bint, within=int, first=int, lane='long long')
+    cdef int _count_within(self, int row, int column, int at) noexcept
+    cdef inline int _count(self, bint across_u, bint across_v) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept
-    @cython.locals(u=int, v=int, low_u=int, high_u=int, low_v=int, high_v=int, inside_u=int, within=int, sample=int)
-    cdef inline int _count(self, int at, int crossed) noexcept
-    @cython.locals(within=int)
-    cdef inline int _count_along(self, int* corners, int at, int crossed) noexcept
-    @cython.locals(a=int, b=int, c=int, d=int, upper=int, lower=int, beyond=int, column=int, p=int, by=int, at=int,
-                   above=int, below=int)
-    cdef int _count_beyond(self, int* corners, int edge) noexcept
-    @cython.locals(every=int, some=int, near=int, entered=int, at=int, inside=bint)
+    @cython.locals(lane='long long', above='long long', below='long long', a=int, b=int, c=int, d=int)
+    cdef inline void _lay(self, int* corners, int* at, int* by, int* right, int* bend) noexcept
+    @cython.locals(at='int[4]', by='int[4]', right='int[4]', bend='int[4]', within='int[4]', upper=int, lower=int,
+                   lane='long long', least=int, most=int, a=int, b=int, c=int, d=int, down=int, above=int, below=int,
+                   _=int)
+    cdef int _count_along(self, int* corners, int* low, int* high) noexcept
+    cdef inline int _add(self, int* within) noexcept
+    @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
+                   right_v='int[4]', bend_v='int[4]', within='int[4]', upper=int, lower=int, lane='long long', low_u=int,
+                   high_u=int, low_v=int, high_v=int, u=int, v=int, down_u=int, down_v=int, above=int, below=int,
+                   _=int)
+    cdef int _count_both(self) noexcept
+    @cython.locals(entered=int, first=int)
     cdef int _entered(self, int body, int row, int column, int on_top) noexcept
-    @cython.locals(a=int, b=int, c=int, d=int, least_u=int, most_u=int, least_v=int, most_v=int, low_u=int, high_u=int,
-                   low_v=int, high_v=int, crossed=int, within=int, u=int, v=int)
+    @cython.locals(least_u='int[4]', most_u='int[4]', least_v='int[4]', most_v='int[4]', outside='int[4]',
+                   across_u='int[4]', across_v='int[4]', off='double[4]', over='double[4]', gone=int, crossed_u=int, crossed_v=int, crossed=int, lane='long long', fall_u=int, fall_v=int, low_u=int, high_u=int,
+                   low_v=int, high_v=int, u=int, v=int, along_u=double, along_v=double, middle=double,
+                   around=double)
     cdef int _enter(self, int place, int pixel) noexcept
-    @cython.locals(x='long long', y='long long')
+    @cython.locals(above='long long', below='long long', lane='long long', a=int, b=int, c=int, d=int)
+    cdef inline void _bound_corners(self, int* corners, int* least, int* most) noexcept
+    @cython.locals(x=double, y=double, lane='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
-    @cython.locals(fall_u='long long', fall_v='long long', most='long long', middle='long long', around='long long')
-    cdef int _across(self, int within, long long u, long long v, long long around_u, long long around_v) noexcept
-    @cython.locals(fall_u='long long', fall_v='long long', u='long long', v='long long', low_u='long long',
-                   high_u='long long', low_v='long long', high_v='long long', most='long long', low='long long',
-                   high='long long', entered=int, sample=int)
+    @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
+                   right_v='int[4]', bend_v='int[4]', within='int[4]', fall_u='double[4]', fall_v='double[4]',
+                   most='double[4]', u='int[4]', v='int[4]', row=int, shown=int, lane='long long', one=int, other=int,
+                   across=double, inside=int, _=int)
     cdef int _count_entering(self) noexcept
     @cython.locals(a=int, b=int, c=int, d=int, column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int* corners) noexcept
-    @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, at=int, body=int, sample=int, paint=int,
+    @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, number=int, at=int, body=int, sample=int, paint=int,
                    height=int, ball=int, total='long long')
     cdef long long _samples(self, int row, int column) noexcept
-    @cython.locals(place=int, sample=int, u='long long', v='long long', index=int, height='long long')
+    @cython.locals(fall_u='long long', fall_v='long long', sample=int, u='long long', v='long long', index=int,
+                   height='long long')
     cdef void _see(self, int body, int at, int pixel) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
     @cython.locals(at=int, inside_u=bint)
-    cdef inline bint _lies_in(self, int place, int box, long long u, long long v) noexcept
+    cdef inline bint _lies_in(self, int box, long long u, long long v) noexcept

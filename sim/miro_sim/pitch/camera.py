@@ -10,9 +10,9 @@ the floor; in a robot's axes that is a straight line from `top` on by `fall`:
 Of several sides the highest is seen; where robots stand in each other, the first one is. All in um and integers.
 `fall` is taken at the middle of the pixel.
 
-Each corner of a pixel has a code, which tells beyond which edges it lies: of the top, of its patches, of all that is
-seen of the robot (outcodes, after Cohen and Sutherland). The samples lie between the corners: where these are on one
-side of an edge, no sample is compared with it. So any pixel gives the same bits in any window.
+The samples of a pixel lie between its corners. Where the corners of all instants are on one side of an edge (of the
+top, of its patches, of all that is seen of the robot), no sample is compared with it. So any pixel gives the same bits
+in any window. Samples are counted for the instants of a field at once, four in a vector.
 """
 
 from __future__ import annotations
@@ -31,16 +31,18 @@ from miro_sim.pitch.sensor import Sensor
 
 MOST_ROBOTS = 10
 FIELD_S = 1001.0 / 60000.0
-_SETS = 6  # at most: two fields of three instants
+_SETS = 8  # places for instants: two fields of up to three, each in a vector of four
 _HALF_UM = 37_500
 _TOP_UM = 75_000
 _ROUNDED_UM = 8  # what rounding adds
-_TOP, _TEAM, _IDENTITY, _REACH, _BASE = 0, 1, 2, 3, 4  # rectangles in a robot's axes
-_EDGES = 20  # of a robot at an instant: for each rectangle the last u before it and the last u in it, then v
-_V = 10
-_LOW, _HIGH = 0x401, 0x802  # bits of a code for the edges of the first rectangle
-_CROSSED_U, _CROSSED_V = 0x3, 0xC00  # both edges along an axis
-_RAYS = 1200  # after the edges of all robots: where those rays begin that may meet one
+_TOP, _TEAM, _IDENTITY = 0, 1, 2  # rectangles in the axes of any robot
+_REACH, _BASE, _NEAR = 3, 4, 5  # and those of one robot, three for each
+_LOW_U, _HIGH_U, _LOW_V, _HIGH_V = (
+    0,
+    1,
+    2,
+    3,
+)  # edges: the last u before a rectangle, the last u in it, then v
 _OUT = -1
 _FAR_UM = 1 << 29
 _MIXED = 255
@@ -48,6 +50,9 @@ _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321
 _LINE = 352  # places of a line of corners or pixels
+_FIELD = 704  # two lines: the corners above and below a line of pixels
+_LIFT = 1 << 30  # makes lengths positive, so that what is cut off is rounded down
+_FAST_UM = 1 << 23  # who drifts further is drawn sample by sample
 _BAND = 4096  # pixels that are worked on at once
 _SURE, _UNSURE = 1, 2  # whether the samples of a pixel in which robots may be seen are known
 
@@ -61,11 +66,23 @@ class Camera:
 
     NOT_STATE = (
         *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
-        *("field_sets", "side", "black", "boxes", "robots", "team_paint", "identity_paint", "x", "y"),
-        *("cos", "sin", "shift_u", "shift_v", "edges", "near_low", "near_high", "drift_um"),
-        *("span_first", "span_end", "corner_u", "corner_v", "code", "every", "some", "always", "ever"),
+        *(
+            "field_sets",
+            "fields",
+            "instants",
+            "side",
+            "black",
+            "robots",
+            "team_paint",
+            "identity_paint",
+            "x",
+            "y",
+        ),
+        *("cos", "sin", "shift_u", "shift_v", "edges", "drift_um", "span_first", "span_end"),
+        *("corner_u", "corner_v", "line_least_u", "line_most_u", "line_least_v", "line_most_v"),
+        *("least_u", "most_u", "least_v", "most_v"),
         *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
-        *("above", "below", "fall_u", "fall_v"),
+        *("above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
         *("u", "v", "seen", "height_um"),
     )
 
@@ -81,33 +98,41 @@ class Camera:
         self.scene: Scene = scene_of(parameters, settings, None)
         self.sensor = Sensor(settings, stream)
         self.field_sets = settings.sub_exposures
+        self.fields = settings.fields
         self.sets = settings.sub_exposures * settings.fields
+        self.instants = [0] * 6
+        for at in range(self.sets):
+            self.instants[at] = 4 * (at // self.field_sets) + at % self.field_sets
         self.side = NUMBERS["side"]
         self.black = NUMBERS["top"]
-        boxes = [(0, 0, _HALF_UM), *((1000 * u, 1000 * v, 500 * PATCH_MM) for u, v in pattern)]
-        self.boxes = [(u - half, u + half, v - half, v + half) for u, v, half in boxes]
+        self.edges = [0] * 132  # of each rectangle
+        for box, (u, v, half) in enumerate(
+            [(0, 0, _HALF_UM), *((1000 * u, 1000 * v, 500 * PATCH_MM) for u, v in pattern)]
+        ):
+            self.edges[4 * box + _LOW_U], self.edges[4 * box + _HIGH_U] = u - half - 1, u + half
+            self.edges[4 * box + _LOW_V], self.edges[4 * box + _HIGH_V] = v - half - 1, v + half
         self.robots = 0
         self.team_paint = [0] * 10
         self.identity_paint = [0] * 10
-        self.x = [0] * 60
-        self.y = [0] * 60
-        self.cos = [0] * 60
-        self.sin = [0] * 60
-        self.shift_u = [0] * 60
-        self.shift_v = [0] * 60
-        self.edges = [0] * 1220
-        self.near_low = [0] * 10
-        self.near_high = [0] * 10
+        self.x = [0] * 80
+        self.y = [0] * 80
+        self.cos = [0] * 84
+        self.sin = [0] * 84
+        self.shift_u = [0] * 80
+        self.shift_v = [0] * 80
         self.drift_um = [0] * 10
         self.span_first = 0
         self.span_end = 0
-        self.corner_u = [0] * 4224
-        self.corner_v = [0] * 4224
-        self.code = [0] * 4224
-        self.every = [0] * 2112
-        self.some = [0] * 2112
-        self.always = [0] * 352
-        self.ever = [0] * 352
+        self.corner_u = [0] * 5632
+        self.corner_v = [0] * 5632
+        self.line_least_u = [0] * 704  # of corners above and below a line of pixels, over all instants
+        self.line_most_u = [0] * 704
+        self.line_least_v = [0] * 704
+        self.line_most_v = [0] * 704
+        self.least_u = [0] * 352  # of pixels: between their corners
+        self.most_u = [0] * 352
+        self.least_v = [0] * 352
+        self.most_v = [0] * 352
         self.covered = [0] * 4096
         self.covered_first = 0
         self.covered_end = 0
@@ -118,12 +143,16 @@ class Camera:
         self.lower = -1
         self.above = 0
         self.below = 0
-        self.fall_u = 0
-        self.fall_v = 0
+        self.fall_u = [0] * 4
+        self.fall_v = [0] * 4
+        self.low_u = [0] * 4
+        self.high_u = [0] * 4
+        self.low_v = [0] * 4
+        self.high_v = [0] * 4
         self.u = [0] * 16
         self.v = [0] * 16
-        self.seen = [0] * 96
-        self.height_um = [0] * 96
+        self.seen = [0] * 128
+        self.height_um = [0] * 128
 
     def __repr__(self) -> str:
         return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
@@ -162,66 +191,64 @@ class Camera:
             raise ValueError(f"no robot {identity} of team {team} has colours")
         self.team_paint[body] = NUMBERS[TEAMS[team]]
         self.identity_paint[body] = NUMBERS[IDENTITIES[identity]]
-        self.near_low[body] = self.near_high[body] = 0
-        for at in range(self.sets):
-            field = at // self.field_sets
-            share = (at % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
+        least_u, most_u, least_v, most_v = _FAR_UM, -_FAR_UM, _FAR_UM, -_FAR_UM
+        for number in range(self.sets):
+            field = number // self.field_sets
+            share = (number % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
             after_s = (field - 0.5 * (self.settings.fields - 1)) * FIELD_S + share * self.settings.exposure_s
             way_m = v_m_s * after_s
             sine, cosine = sincos(theta_rad + 0.5 * w_rad_s * after_s)
-            place = body * _SETS + at
-            self.x[place] = _um(x_m + way_m * cosine)
-            self.y[place] = _um(y_m + way_m * sine)
+            place = body * _SETS + self.instants[number]
+            self.x[place] = _within_sight(_um(x_m + way_m * cosine))
+            self.y[place] = _within_sight(_um(y_m + way_m * sine))
             sine, cosine = sincos(theta_rad + w_rad_s * after_s)
             self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
             self.sin[place] = math.floor(sine * 32768.0 + 0.5)
             self._stand(place)
+            least_u, most_u = min(least_u, self.fall_u[0]), max(most_u, self.fall_u[0])
+            least_v, most_v = min(least_v, self.fall_v[0]), max(most_v, self.fall_v[0])
+        self._surround(12 * body + _LOW_U, least_u, most_u)
+        self._surround(12 * body + _LOW_V, least_v, most_v)
         self._bound(body)
         self.robots = body + 1
 
     def _stand(self, place: int) -> None:
-        """What follows from where a robot is: what moves places into its axes, and the edges there.
-
-        The ray through the middle of its top falls by `fall`, that from a place u beside it by `fall` + u top / drop:
-        it ends at `fall` + u camera / drop. What may be seen of the robot begins in `_REACH`; what begins in `_BASE`
-        ends under the robot. An edge of the top is near if rays from beyond it may fall towards the robot.
-        """
+        """What moves places into the axes of a robot, and how the ray through the middle of its top falls there."""
         cosine, sine = self.cos[place], self.sin[place]
         self.shift_u[place] = self.x[place] * cosine + self.y[place] * sine
         self.shift_v[place] = self.y[place] * cosine - self.x[place] * sine
-        at = _EDGES * place
-        for box, (low_u, high_u, low_v, high_v) in enumerate(self.boxes):
-            self.edges[at + 2 * box], self.edges[at + 2 * box + 1] = low_u - 1, high_u
-            self.edges[at + 2 * box + _V], self.edges[at + 2 * box + _V + 1] = low_v - 1, high_v
         drop = self.rays.height_um - _TOP_UM
         x = _TOP_UM * (self.x[place] - self.rays.x_um) // drop
         y = _TOP_UM * (self.y[place] - self.rays.y_um) // drop
-        self._surround(place, at, _LOW & _CROSSED_U, (x * cosine + y * sine) >> 15)
-        self._surround(place, at + _V, _LOW & _CROSSED_V, (y * cosine - x * sine) >> 15)
+        self.fall_u[0] = (x * cosine + y * sine) >> 15
+        self.fall_v[0] = (y * cosine - x * sine) >> 15
 
-    def _surround(self, place: int, at: int, low: int, fall: int) -> None:
-        """The edges that depend on the fall, along u or along v; `low`: the bit of the top's lower one."""
+    def _surround(self, at: int, least: int, most: int) -> None:
+        """Edges along u or v of a robot's rectangles, at all instants; rays through its middle fall `least` to `most`.
+
+        The ray from a place u beside the middle falls by u top / drop more: it ends at `fall` + u camera / drop. What
+        may be seen of the robot begins in `_REACH`; what begins in `_BASE` ends under the robot. `_NEAR` is the top,
+        without an end where no ray from beyond it falls towards the robot.
+        """
         camera = self.rays.height_um
         drop = camera - _TOP_UM
         margin = self.rays.spread_um // 4 + 2 * _ROUNDED_UM  # all rays of a pixel are taken to fall alike
-        self.edges[at + 2 * _REACH] = min(-_HALF_UM, (-_HALF_UM - fall - margin) * drop // camera) - 1
-        self.edges[at + 2 * _REACH + 1] = max(_HALF_UM, (_HALF_UM - fall + margin) * drop // camera + 1)
-        self.edges[at + 2 * _BASE] = (-_HALF_UM - fall + margin) * drop // camera + 1
-        self.edges[at + 2 * _BASE + 1] = (_HALF_UM - fall - margin) * drop // camera
-        if fall > -margin:
-            self.near_low[place // _SETS] |= low
-        if fall < margin:
-            self.near_high[place // _SETS] |= low << 1
+        self.edges[at + 4 * _REACH] = min(-_HALF_UM, (-_HALF_UM - most - margin) * drop // camera) - 1
+        self.edges[at + 4 * _REACH + 1] = max(_HALF_UM, (_HALF_UM - least + margin) * drop // camera + 1)
+        self.edges[at + 4 * _BASE] = (-_HALF_UM - least + margin) * drop // camera + 1
+        self.edges[at + 4 * _BASE + 1] = (_HALF_UM - most - margin) * drop // camera
+        self.edges[at + 4 * _NEAR] = -_HALF_UM - 1 if most > -margin else -_FAR_UM
+        self.edges[at + 4 * _NEAR + 1] = _HALF_UM if least < margin else _FAR_UM
 
     def _bound(self, body: int) -> None:
         """How far, at most, a place of the robot is at any instant from where it is at the middle one."""
-        first = body * _SETS
-        middle = first + self.sets // 2
-        reach = _EDGES * middle + 2 * _REACH
-        length = self.edges[reach + 1] - self.edges[reach]
-        length += self.edges[reach + _V + 1] - self.edges[reach + _V]
+        middle = body * _SETS + self.instants[self.sets // 2]
+        reach = 12 * body + 4 * _REACH
+        length = self.edges[reach + _HIGH_U] - self.edges[reach + _LOW_U]
+        length += self.edges[reach + _HIGH_V] - self.edges[reach + _LOW_V]
         drift = 0
-        for place in range(first, first + self.sets):
+        for number in range(self.sets):
+            place = body * _SETS + self.instants[number]
             way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
             turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
             drift = max(drift, way + way // 4 + (length * turn >> 15))
@@ -286,7 +313,7 @@ class Camera:
             self.covered_end = max(self.covered_end, right)
             self._find_span(body, row + 1, first, end if row + 1 < bottom else first)
             self._find_corners(body, row + 1, min(left, self.span_first), max(right, self.span_end))
-            self._join(row, left, right)
+            self._bound_pixels(left, right)
             for column in range(left, right):
                 self._cover_pixel(body, row, column, at + column)
             at += end - first
@@ -313,78 +340,101 @@ class Camera:
 
     def _beside(self, body: int, pixel: int) -> int:
         """How far the samples of a pixel stay beside all that is seen of a robot; 0 or less where they may meet it."""
-        place = body * _SETS + self.sets // 2
-        edges = _EDGES * place + 2 * _REACH
+        place = body * _SETS + self.instants[self.sets // 2]
+        reach = 12 * body + 4 * _REACH
         x, y = self.rays.middle_x[pixel], self.rays.middle_y[pixel]
         u = (x * self.cos[place] + y * self.sin[place] - self.shift_u[place]) >> 15
         v = (y * self.cos[place] - x * self.sin[place] - self.shift_v[place]) >> 15
-        beside_u = max(self.edges[edges] - u, u - self.edges[edges + 1])
-        beside_v = max(self.edges[edges + _V] - v, v - self.edges[edges + _V + 1])
+        beside_u = max(self.edges[reach + _LOW_U] - u, u - self.edges[reach + _HIGH_U])
+        beside_v = max(self.edges[reach + _LOW_V] - v, v - self.edges[reach + _HIGH_V])
         return max(beside_u, beside_v) - self.drift_um[body] - self.rays.spread_um - _ROUNDED_UM
 
     def _find_corners(self, body: int, row: int, left: int, right: int) -> None:
-        """The corners above a line, from `left` to `right`, in the axes of a robot at each instant, and their codes."""
+        """The corners above a line, from `left` to `right`, in the axes of a robot; their bounds over all instants."""
+        bounds = (row & 1) * _LINE
+        for column in range(bounds + left, bounds + right + 1):
+            self.line_least_u[column] = self.line_least_v[column] = _FAR_UM
+            self.line_most_u[column] = self.line_most_v[column] = -_FAR_UM
+        for number in range(self.sets):
+            at = self.instants[number]
+            line = 4 * (at // 4 * _FIELD + bounds) + at % 4
+            self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
+
+    def _turn_corners(self, place: int, corner: int, line: int, bounds: int, left: int, right: int) -> None:
+        """The same at one instant. In doubles, which hold these products exactly."""
         rays = self.rays
-        for at in range(self.sets):
-            place = body * _SETS + at
-            cosine, sine = self.cos[place], self.sin[place]
-            shift_u, shift_v = self.shift_u[place], self.shift_v[place]
-            line = (2 * at + (row & 1)) * _LINE
-            corner = row * _CORNERS
-            for column in range(left, right + 1):
-                x, y = rays.top_x[corner + column], rays.top_y[corner + column]
-                self.corner_u[line + column] = (x * cosine + y * sine - shift_u) >> 15
-                self.corner_v[line + column] = (y * cosine - x * sine - shift_v) >> 15
-            self._encode(_EDGES * place, line + left, line + right + 1)
-
-    def _encode(self, at: int, first: int, end: int) -> None:
-        """The codes of corners: bit k tells whether u is beyond edge k, bit 10 + k the same of v."""
-        edges = self.edges
-        a, b, c, d, e = edges[at + 9], edges[at + 8], edges[at + 7], edges[at + 6], edges[at + 5]
-        f, g, h, i, j = edges[at + 4], edges[at + 3], edges[at + 2], edges[at + 1], edges[at]
-        for corner in range(first, end, 4):  # as many together
+        x, y, u, v = [0.0] * 4, [0.0] * 4, [0] * 4, [0] * 4
+        cosine, sine = self.cos[place] / 32768.0, self.sin[place] / 32768.0
+        shift_u, shift_v = self.shift_u[place] / 32768.0 - _LIFT, self.shift_v[place] / 32768.0 - _LIFT
+        for column in range(left, right + 1, 4):  # as many together
             for lane in range(4):
-                u = self.corner_u[corner + lane]
-                high = 2 * (2 * (2 * (2 * (u > a) + (u > b)) + (u > c)) + (u > d)) + (u > e)
-                high = 2 * (2 * (2 * (2 * high + (u > f)) + (u > g)) + (u > h)) + (u > i)
-                self.code[corner + lane] = 2 * high + (u > j)
-        at += _V
-        a, b, c, d, e = edges[at + 9], edges[at + 8], edges[at + 7], edges[at + 6], edges[at + 5]
-        f, g, h, i, j = edges[at + 4], edges[at + 3], edges[at + 2], edges[at + 1], edges[at]
-        for corner in range(first, end, 4):
+                x[lane] = rays.top_x[corner + column + lane]
             for lane in range(4):
-                v = self.corner_v[corner + lane]
-                high = 2 * (2 * (2 * (2 * (v > a) + (v > b)) + (v > c)) + (v > d)) + (v > e)
-                high = 2 * (2 * (2 * (2 * high + (v > f)) + (v > g)) + (v > h)) + (v > i)
-                self.code[corner + lane] |= (2 * high + (v > j)) << _V
+                y[lane] = rays.top_y[corner + column + lane]
+            for lane in range(4):
+                u[lane] = int(x[lane] * cosine + y[lane] * sine - shift_u)
+            for lane in range(4):
+                v[lane] = int(y[lane] * cosine - x[lane] * sine - shift_v)
+            for lane in range(4):
+                u[lane] -= _LIFT
+                self.corner_u[line + 4 * (column + lane)] = u[lane]
+            for lane in range(4):
+                at = bounds + column + lane
+                self.line_least_u[at] = min(self.line_least_u[at], u[lane])
+                self.line_most_u[at] = max(self.line_most_u[at], u[lane])
+            for lane in range(4):
+                v[lane] -= _LIFT
+                self.corner_v[line + 4 * (column + lane)] = v[lane]
+            for lane in range(4):
+                at = bounds + column + lane
+                self.line_least_v[at] = min(self.line_least_v[at], v[lane])
+                self.line_most_v[at] = max(self.line_most_v[at], v[lane])
 
-    def _join(self, row: int, left: int, right: int) -> None:
-        """What the codes of a pixel's corners have all (`every`) and what one of them has (`some`), at each instant.
-
-        `always` and `ever`: the same over all instants.
-        """
+    def _bound_pixels(self, left: int, right: int) -> None:
+        """Between which bounds the corners of pixels lie at all instants; as many are bounded together."""
         for column in range(left, right, 4):
             for lane in range(4):
-                self.always[column + lane] = -1
-                self.ever[column + lane] = 0
-        for at in range(self.sets):
-            above = (2 * at + (row & 1)) * _LINE
-            below = (2 * at + (~row & 1)) * _LINE
-            joined = at * _LINE
-            for column in range(left, right, 4):
-                for lane in range(4):
-                    a, b = self.code[above + column + lane], self.code[above + column + lane + 1]
-                    c, d = self.code[below + column + lane], self.code[below + column + lane + 1]
-                    self.every[joined + column + lane] = a & b & c & d
-                    self.some[joined + column + lane] = a | b | c | d
-                    self.always[column + lane] &= a & b & c & d
-                    self.ever[column + lane] |= a | b | c | d
+                at = column + lane
+                one = min(self.line_least_u[at], self.line_least_u[at + 1])
+                other = min(self.line_least_u[at + _LINE], self.line_least_u[at + _LINE + 1])
+                self.least_u[at] = min(one, other)
+            for lane in range(4):
+                at = column + lane
+                one = max(self.line_most_u[at], self.line_most_u[at + 1])
+                other = max(self.line_most_u[at + _LINE], self.line_most_u[at + _LINE + 1])
+                self.most_u[at] = max(one, other)
+            for lane in range(4):
+                at = column + lane
+                one = min(self.line_least_v[at], self.line_least_v[at + 1])
+                other = min(self.line_least_v[at + _LINE], self.line_least_v[at + _LINE + 1])
+                self.least_v[at] = min(one, other)
+            for lane in range(4):
+                at = column + lane
+                one = max(self.line_most_v[at], self.line_most_v[at + 1])
+                other = max(self.line_most_v[at + _LINE], self.line_most_v[at + _LINE + 1])
+                self.most_v[at] = max(one, other)
+
+    def _inside(self, column: int, at: int) -> bool:
+        """Whether all samples of a pixel lie in a rectangle at all instants; `at`: where its edges are."""
+        inside_u = self.least_u[column] > self.edges[at] and self.most_u[column] <= self.edges[at + 1]
+        return (
+            inside_u
+            and self.least_v[column] > self.edges[at + 2]
+            and self.most_v[column] <= self.edges[at + 3]
+        )
+
+    def _outside(self, column: int, at: int) -> bool:
+        """Whether all lie beyond the same side of it."""
+        beside = self.most_u[column] <= self.edges[at] or self.least_u[column] > self.edges[at + 1]
+        return (
+            beside or self.most_v[column] <= self.edges[at + 2] or self.least_v[column] > self.edges[at + 3]
+        )
 
     def _cover_pixel(self, body: int, row: int, column: int, index: int) -> None:
         """A pixel in which a robot may be seen: its paints, added over all samples and instants."""
-        if _outside(_REACH, self.always[column], self.ever[column]):
+        if self._outside(column, 12 * body + 4 * _REACH):
             return
-        if self.covered[index]:
+        if self.covered[index] or self.drift_um[body] > _FAST_UM:
             self.covered[index] = _UNSURE
             return
         total = self._alone(body, row, column)
@@ -400,7 +450,7 @@ class Camera:
         scene = self.scene
         whole = 16 * self.field_sets
         total = 0
-        on_top = self._within(body, row, column, _TOP)
+        on_top = self._within(row, column, _TOP)
         if on_top < whole:
             pixel = row * _WIDTH + column
             behind = scene.behind(pixel)
@@ -413,159 +463,225 @@ class Camera:
                 total = (whole - entered) * scene.packed[behind]
             total += (entered - on_top) * scene.packed[self.side]
         if on_top:
-            team = self._within(body, row, column, _TEAM)
-            identity = self._within(body, row, column, _IDENTITY) if team < on_top else 0
+            team = self._within(row, column, _TEAM)
+            identity = self._within(row, column, _IDENTITY) if team < on_top else 0
             total += team * scene.packed[self.team_paint[body]]
             total += identity * scene.packed[self.identity_paint[body]]
             total += (on_top - team - identity) * scene.packed[self.black]
         return total
 
-    def _within(self, body: int, row: int, column: int, box: int) -> int:
+    def _within(self, row: int, column: int, box: int) -> int:
         """How many samples of all instants lie in a rectangle."""
-        if _outside(box, self.always[column], self.ever[column]):
+        at = 4 * box
+        if self._outside(column, at):
             return 0
-        if _inside(box, self.always[column], self.ever[column]):
+        if self._inside(column, at):
             return 16 * self.field_sets
-        return self._count_within(body, row, column, box)
+        return self._count_within(row, column, at)
 
-    def _count_within(self, body: int, row: int, column: int, box: int) -> int:
-        """The same, instant by instant."""
-        low, high = _LOW << 2 * box, _HIGH << 2 * box
+    def _count_within(self, row: int, column: int, at: int) -> int:
+        """The same, sample by sample, along the axes where edges are crossed."""
+        across_u = self.least_u[column] <= self.edges[at] or self.most_u[column] > self.edges[at + 1]
+        across_v = self.least_v[column] <= self.edges[at + 2] or self.most_v[column] > self.edges[at + 3]
+        for lane in range(4):
+            self.low_u[lane], self.high_u[lane] = self.edges[at], self.edges[at + 1]
+            self.low_v[lane], self.high_v[lane] = self.edges[at + 2], self.edges[at + 3]
         within = 0
-        for at in range(self.sets):
-            every, some = self.every[at * _LINE + column], self.some[at * _LINE + column]
-            if not _outside(box, every, some):
-                crossed = ((every & low) | (some & high)) ^ low
-                self._turn(row, column, at)
-                edges = _EDGES * (body * _SETS + at) + 2 * box
-                within += self._count(edges, crossed >> 2 * box) if crossed else self.samples
+        for first in range(0, 4 * self.fields, 4):
+            self._turn(row, column, first)
+            within += self._count(across_u, across_v)
         return within
 
     def _turn(self, row: int, column: int, at: int) -> None:
         """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
-        self.above = (2 * at + (row & 1)) * _LINE + column
-        self.below = (2 * at + (~row & 1)) * _LINE + column
-        if self.sets != self.field_sets:
-            self.first, self.samples = 8 * (at // self.field_sets), 8
-            self.upper, self.lower = self.first // 8 - 1, 0 - self.first // 8
+        self.above = 4 * (at // 4 * _FIELD + (row & 1) * _LINE + column) + at % 4
+        self.below = 4 * (at // 4 * _FIELD + (~row & 1) * _LINE + column) + at % 4
+        if self.fields == 2:
+            self.first, self.samples = 8 * (at // 4), 8
+            self.upper, self.lower = at // 4 - 1, 0 - at // 4
 
-    def _count(self, at: int, crossed: int) -> int:
-        """How many samples lie in a rectangle; `crossed`: its edges on both sides of which they lie."""
-        if not crossed & _CROSSED_V:
-            return self._count_along(self.corner_u, at, crossed)
-        if not crossed & _CROSSED_U:
-            return self._count_along(self.corner_v, at + _V, crossed >> _V)
-        self._spread(self.u, self.corner_u)
-        self._spread(self.v, self.corner_v)
-        u, v = self.corner_u[self.above], self.corner_v[self.above]
-        low_u, high_u = self.edges[at] - u, self.edges[at + 1] - u
-        low_v, high_v = self.edges[at + _V] - v, self.edges[at + _V + 1] - v
-        within = 0
-        for sample in range(16):
-            inside_u = (self.u[sample] > low_u) & (self.u[sample] <= high_u)
-            within += inside_u & (self.v[sample] > low_v) & (self.v[sample] <= high_v)
-        return within
+    def _lay(
+        self, corners: list[int], at: list[int], by: list[int], right: list[int], bend: list[int]
+    ) -> None:
+        """How the samples of a pixel lie along one axis at each instant of a field, times 64.
 
-    def _count_along(self, corners: list[int], at: int, crossed: int) -> int:
-        """The same where edges are crossed along one axis only."""
-        within = self._count_beyond(corners, self.edges[at]) if crossed & 1 else self.samples
-        return within - self._count_beyond(corners, self.edges[at + 1]) if crossed & 2 else within
+        The one of the first row and column lies at `at` + `by`, each further row 2 `by` on. In the next column `at` is
+        `right` more, `by` is `bend` more.
+        """
+        above, below = self.above, self.below
+        for lane in range(4):
+            a, b = corners[above + lane], corners[above + lane + 4] - corners[above + lane]
+            c, d = corners[below + lane] - a, corners[below + lane + 4] - corners[below + lane] - b
+            at[lane] = 64 * a + 8 * b
+            by[lane] = 8 * c + d
+            right[lane] = 16 * b
+            bend[lane] = 2 * d
 
-    def _count_beyond(self, corners: list[int], edge: int) -> int:
-        """How many samples lie beyond an edge: those that `_spread` would find there."""
-        a = corners[self.above]
-        b, c, d = corners[self.above + 1] - a, corners[self.below] - a, corners[self.below + 1] - a
-        edge = 64 * (edge - a) + 63
+    def _count(self, across_u: int, across_v: int) -> int:
+        """How many samples at the instants of a field lie in its rectangles; along which axes edges are crossed."""
+        if not across_v:
+            return self._count_along(self.corner_u, self.low_u, self.high_u)
+        if not across_u:
+            return self._count_along(self.corner_v, self.low_v, self.high_v)
+        return self._count_both()
+
+    def _count_along(self, corners: list[int], low: list[int], high: list[int]) -> int:
+        """The same along one axis."""
+        at, by, right, bend, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._lay(corners, at, by, right, bend)
         upper, lower = self.upper, self.lower
-        beyond = 0
-        for column in range(4):
-            p = 2 * column + 1
-            by = 8 * c + p * (d - b - c)
-            at = 8 * p * b + by
-            above = (at > edge) + (at + 2 * by > edge)
-            below = (at + 4 * by > edge) + (at + 6 * by > edge)
-            beyond += (above & upper) + (below & lower)
-        return beyond
+        for _ in range(4):
+            for lane in range(4):
+                least, most = 64 * low[lane] + 63, 64 * high[lane] + 63
+                down = by[lane] + by[lane]
+                a = at[lane] + by[lane]
+                b = a + down
+                c = b + down
+                d = c + down
+                above = (a > least) - (a > most) + (b > least) - (b > most)
+                below = (c > least) - (c > most) + (d > least) - (d > most)
+                within[lane] += (above & upper) + (below & lower)
+                at[lane] += right[lane]
+                by[lane] += bend[lane]
+        return self._add(within)
+
+    def _add(self, within: list[int]) -> int:
+        """What is counted at the instants of a field."""
+        return within[0] + within[1] + within[2] if self.field_sets == 3 else within[0]
+
+    def _count_both(self) -> int:
+        """The same along both axes."""
+        at_u, by_u, right_u, bend_u = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        at_v, by_v, right_v, bend_v, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._lay(self.corner_u, at_u, by_u, right_u, bend_u)
+        self._lay(self.corner_v, at_v, by_v, right_v, bend_v)
+        upper, lower = self.upper, self.lower
+        for _ in range(4):
+            for lane in range(4):
+                low_u, high_u = 64 * self.low_u[lane] + 63, 64 * self.high_u[lane] + 63
+                low_v, high_v = 64 * self.low_v[lane] + 63, 64 * self.high_v[lane] + 63
+                u, v = at_u[lane] + by_u[lane], at_v[lane] + by_v[lane]
+                down_u, down_v = by_u[lane] + by_u[lane], by_v[lane] + by_v[lane]
+                above = ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                above += ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                below = ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                below += ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                within[lane] += (above & upper) + (below & lower)
+            for lane in range(4):
+                at_u[lane] += right_u[lane]
+                by_u[lane] += bend_u[lane]
+                at_v[lane] += right_v[lane]
+                by_v[lane] += bend_v[lane]
+        return self._add(within)
 
     def _entered(self, body: int, row: int, column: int, on_top: int) -> int:
         """How many samples of all instants see any of a robot, `on_top` of them its top."""
-        every, some = self.always[column], self.ever[column]
-        near = self.near_low[body]
-        if ((every & near) | (some & self.near_high[body])) == near:
+        if self._inside(column, 12 * body + 4 * _NEAR):
             return on_top
-        if _inside(_BASE, every, some):
+        if self._inside(column, 12 * body + 4 * _BASE):
             return 16 * self.field_sets
         entered = 0
-        for at in range(self.sets):
-            every, some = self.every[at * _LINE + column], self.some[at * _LINE + column]
-            if not _outside(_REACH, every, some):
-                self._turn(row, column, at)
-                inside = _inside(_BASE, every, some)
-                entered += self.samples if inside else self._enter(body * _SETS + at, row * _WIDTH + column)
+        for first in range(0, 4 * self.fields, 4):
+            self._turn(row, column, first)
+            entered += self._enter(body * _SETS + first, row * _WIDTH + column)
         return entered
 
     def _enter(self, place: int, pixel: int) -> int:
-        """How many samples of an instant see any of a robot: as `_enters`."""
+        """How many samples at the instants of a field see any of a robot: as `_enters`."""
+        least_u, most_u, least_v, most_v = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._bound_corners(self.corner_u, least_u, most_u)
+        self._bound_corners(self.corner_v, least_v, most_v)
         self._fall(place, pixel)
-        a, b = self.corner_u[self.above], self.corner_u[self.above + 1]
-        c, d = self.corner_u[self.below], self.corner_u[self.below + 1]
-        least_u, most_u = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-        a, b = self.corner_v[self.above], self.corner_v[self.above + 1]
-        c, d = self.corner_v[self.below], self.corner_v[self.below + 1]
-        least_v, most_v = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-        low_u, high_u = self.edges[_RAYS], self.edges[_RAYS + 1]
-        low_v, high_v = self.edges[_RAYS + _V], self.edges[_RAYS + _V + 1]
-        if most_u <= low_u or least_u > high_u or most_v <= low_v or least_v > high_v:
+        outside, across_u, across_v, off, over = [0] * 4, [0] * 4, [0] * 4, [0.0] * 4, [0.0] * 4
+        for lane in range(4):
+            fall_u, fall_v = self.fall_u[lane], self.fall_v[lane]
+            low_u, high_u = -_HALF_UM - 1 - max(fall_u, 0), _HALF_UM - min(fall_u, 0)
+            low_v, high_v = -_HALF_UM - 1 - max(fall_v, 0), _HALF_UM - min(fall_v, 0)
+            self.low_u[lane], self.high_u[lane] = low_u, high_u
+            self.low_v[lane], self.high_v[lane] = low_v, high_v
+            outside[lane] = (most_u[lane] <= low_u) | (least_u[lane] > high_u)
+            outside[lane] |= (most_v[lane] <= low_v) | (least_v[lane] > high_v)
+            across_u[lane] = (least_u[lane] <= low_u) | (most_u[lane] > high_u)
+            across_v[lane] = (least_v[lane] <= low_v) | (most_v[lane] > high_v)
+        for lane in range(4):
+            u, v = (least_u[lane] + most_u[lane]) >> 1, (least_v[lane] + most_v[lane]) >> 1
+            along_u, along_v = self.fall_u[lane], self.fall_v[lane]
+            middle = abs(u * along_v - v * along_u) - _HALF_UM * (abs(along_u) + abs(along_v))
+            around = (most_u[lane] - u) * abs(along_v) + (most_v[lane] - v) * abs(along_u)
+            off[lane], over[lane] = middle - around, middle + around
+        gone = crossed_u = crossed_v = crossed = 0
+        for lane in range(self.field_sets):
+            gone += outside[lane] | (off[lane] > 0.0)
+            crossed |= over[lane] > 0.0
+            crossed_u |= across_u[lane]
+            crossed_v |= across_v[lane]
+        if gone == self.field_sets:
             return 0
-        crossed = (least_u <= low_u) + 2 * (most_u > high_u)
-        crossed |= (least_v <= low_v) + 2 * (most_v > high_v) << _V
-        within = self._count(_RAYS, crossed) if crossed else self.samples
-        u, v = (least_u + most_u) >> 1, (least_v + most_v) >> 1
-        return self._across(within, u, v, most_u - u, most_v - v) if within else 0
+        if crossed:
+            return self._count_entering()
+        return self._count(crossed_u, crossed_v) if crossed_u | crossed_v else self.samples * self.field_sets
+
+    def _bound_corners(self, corners: list[int], least: list[int], most: list[int]) -> None:
+        """Between which bounds a pixel's corners lie along one axis, at each instant of a field."""
+        above, below = self.above, self.below
+        for lane in range(4):
+            a, b = corners[above + lane], corners[above + lane + 4]
+            c, d = corners[below + lane], corners[below + lane + 4]
+            least[lane] = min(min(a, b), min(c, d))
+            most[lane] = max(max(a, b), max(c, d))
 
     def _fall(self, place: int, pixel: int) -> None:
-        """How far rays fall in a robot's axes, and between which edges they begin that may meet it."""
-        x, y = self.rays.fall_x[pixel], self.rays.fall_y[pixel]
-        self.fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
-        self.fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
-        self.edges[_RAYS] = -_HALF_UM - 1 - max(self.fall_u, 0)
-        self.edges[_RAYS + 1] = _HALF_UM - min(self.fall_u, 0)
-        self.edges[_RAYS + _V] = -_HALF_UM - 1 - max(self.fall_v, 0)
-        self.edges[_RAYS + _V + 1] = _HALF_UM - min(self.fall_v, 0)
-
-    def _across(self, within: int, u: int, v: int, around_u: int, around_v: int) -> int:
-        """How many of the samples between the right edges see any of a robot; all lie around (u, v)."""
-        fall_u, fall_v = self.fall_u, self.fall_v
-        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
-        middle = u * fall_v - v * fall_u
-        around = around_u * abs(fall_v) + around_v * abs(fall_u)
-        if abs(middle) - around > most:
-            return 0
-        if abs(middle) + around <= most:
-            return within
-        return self._count_entering()
+        """How far rays fall in a robot's axes, at an instant and the next ones of its field."""
+        x, y = self.rays.fall_x[pixel] / 32768.0, self.rays.fall_y[pixel] / 32768.0
+        for lane in range(4):
+            self.fall_u[lane] = int(x * self.cos[place + lane] + y * self.sin[place + lane] + _LIFT)
+            self.fall_v[lane] = int(y * self.cos[place + lane] - x * self.sin[place + lane] + _LIFT)
+        for lane in range(4):
+            self.fall_u[lane] -= _LIFT
+            self.fall_v[lane] -= _LIFT
 
     def _count_entering(self) -> int:
-        """How many samples see any of a robot, one by one: as `_enters`."""
-        self._spread(self.u, self.corner_u)
-        self._spread(self.v, self.corner_v)
-        fall_u, fall_v = self.fall_u, self.fall_v
-        u, v = self.corner_u[self.above], self.corner_v[self.above]
-        low_u, high_u = self.edges[_RAYS] - u, self.edges[_RAYS + 1] - u
-        low_v, high_v = self.edges[_RAYS + _V] - v, self.edges[_RAYS + _V + 1] - v
-        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
-        low, high = -most - u * fall_v + v * fall_u, most - u * fall_v + v * fall_u
-        entered = 0
-        for sample in range(16):
-            u, v = self.u[sample], self.v[sample]
-            if low_u < u <= high_u and low_v < v <= high_v and low <= u * fall_v - v * fall_u <= high:
-                entered += 1
-        return entered
+        """How many samples see any of a robot, one by one."""
+        at_u, by_u, right_u, bend_u = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        at_v, by_v, right_v, bend_v, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._lay(self.corner_u, at_u, by_u, right_u, bend_u)
+        self._lay(self.corner_v, at_v, by_v, right_v, bend_v)
+        fall_u, fall_v, most = [0.0] * 4, [0.0] * 4, [0.0] * 4
+        for lane in range(4):
+            fall_u[lane], fall_v[lane] = self.fall_u[lane], self.fall_v[lane]
+            most[lane] = _HALF_UM * (abs(fall_u[lane]) + abs(fall_v[lane]))
+        u, v = [0] * 4, [0] * 4
+        for _ in range(4):
+            for lane in range(4):
+                u[lane], v[lane] = at_u[lane] + by_u[lane], at_v[lane] + by_v[lane]
+            for row in range(4):
+                shown = self.upper if row < 2 else self.lower
+                for lane in range(4):
+                    one, other = u[lane] >> 6, v[lane] >> 6
+                    inside = (one > self.low_u[lane]) & (one <= self.high_u[lane])
+                    inside &= (other > self.low_v[lane]) & (other <= self.high_v[lane])
+                    across = one * fall_v[lane] - other * fall_u[lane]
+                    within[lane] += inside & (-most[lane] <= across) & (across <= most[lane]) & shown
+                for lane in range(4):
+                    u[lane] += 2 * by_u[lane]
+                    v[lane] += 2 * by_v[lane]
+            for lane in range(4):
+                at_u[lane] += right_u[lane]
+                by_u[lane] += bend_u[lane]
+                at_v[lane] += right_v[lane]
+                by_v[lane] += bend_v[lane]
+        return self._add(within)
 
     def _spread(self, samples: list[int], corners: list[int]) -> None:
         """How far samples lie from a pixel's first corner: as `rays.between`; those of the other field lie far away."""
         a = corners[self.above]
-        b, c, d = corners[self.above + 1] - a, corners[self.below] - a, corners[self.below + 1] - a
+        b, c, d = corners[self.above + 4] - a, corners[self.below] - a, corners[self.below + 4] - a
         for column in range(4):
             p = 2 * column + 1
             at = 8 * p * b
@@ -574,9 +690,6 @@ class Camera:
             samples[4 + column] = (at + 3 * by) >> 6
             samples[8 + column] = (at + 5 * by) >> 6
             samples[12 + column] = (at + 7 * by) >> 6
-        if self.samples < 16:
-            for column in range(8):
-                samples[8 - self.first + column] = _FAR_UM
 
     # ---- several robots, or much in the background
 
@@ -586,18 +699,19 @@ class Camera:
         scene = self.scene
         behind = scene.behind(pixel)
         ball_seen = scene.shows_ball(pixel)
-        for at in range(16 * self.sets):
+        for at in range(128):
             self.seen[at] = _OUT
             self.height_um[at] = -1
         for body in range(self.robots):
             if self._beside(body, pixel) <= 0:
                 self._find_corners(body, row, column, column + 1)
                 self._find_corners(body, row + 1, column, column + 1)
-                for at in range(self.sets):
-                    self._turn(row, column, at)
-                    self._see(body, at, pixel)
+                for number in range(self.sets):
+                    self._turn(row, column, self.instants[number])
+                    self._see(body, self.instants[number], pixel)
         total = 0
-        for at in range(self.sets):
+        for number in range(self.sets):
+            at = self.instants[number]
             self._turn(row, column, at)
             for sample in range(self.first, self.first + self.samples):
                 paint, height = self.seen[16 * at + sample], self.height_um[16 * at + sample]
@@ -611,8 +725,8 @@ class Camera:
 
     def _see(self, body: int, at: int, pixel: int) -> None:
         """What the samples of an instant see of one robot, where it is higher than what they have seen."""
-        place = body * _SETS + at
-        self._fall(place, pixel)
+        self._fall(body * _SETS + at, pixel)
+        fall_u, fall_v = self.fall_u[0], self.fall_v[0]
         self._spread(self.u, self.corner_u)
         self._spread(self.v, self.corner_v)
         for sample in range(self.first, self.first + self.samples):
@@ -620,42 +734,35 @@ class Camera:
             index = 16 * at + sample
             if self.height_um[index] == _TOP_UM:
                 continue
-            if self._lies_in(place, _TOP, u, v):
+            if self._lies_in(_TOP, u, v):
                 self.seen[index] = self._top(body, u, v)
                 self.height_um[index] = _TOP_UM
-            elif _enters(u, v, self.fall_u, self.fall_v):
-                height = _entry(u, v, self.fall_u, self.fall_v)
+            elif _enters(u, v, fall_u, fall_v):
+                height = _entry(u, v, fall_u, fall_v)
                 if height > self.height_um[index]:
                     self.seen[index] = self.side
                     self.height_um[index] = height
 
     def _top(self, body: int, u: int, v: int) -> int:
         """The paint of a place on the top."""
-        if self._lies_in(body * _SETS, _TEAM, u, v):
+        if self._lies_in(_TEAM, u, v):
             return self.team_paint[body]
-        return self.identity_paint[body] if self._lies_in(body * _SETS, _IDENTITY, u, v) else self.black
+        return self.identity_paint[body] if self._lies_in(_IDENTITY, u, v) else self.black
 
-    def _lies_in(self, place: int, box: int, u: int, v: int) -> bool:
+    def _lies_in(self, box: int, u: int, v: int) -> bool:
         """Whether a place lies in a rectangle."""
-        at = _EDGES * place + 2 * box
+        at = 4 * box
         inside_u = self.edges[at] < u <= self.edges[at + 1]
-        return inside_u and self.edges[at + _V] < v <= self.edges[at + _V + 1]
-
-
-def _inside(box: int, every: int, some: int) -> bool:
-    """Whether all corners with such codes, and so all samples between them, lie in a rectangle."""
-    low, high = _LOW << 2 * box, _HIGH << 2 * box
-    return ((every & low) | (some & high)) == low
-
-
-def _outside(box: int, every: int, some: int) -> bool:
-    """Whether all lie beyond the same side of it."""
-    low, high = _LOW << 2 * box, _HIGH << 2 * box
-    return ((some & low) | (every & high)) != low
+        return inside_u and self.edges[at + 2] < v <= self.edges[at + 3]
 
 
 def _um(metres: float) -> int:
     return math.floor(metres * 1e6 + 0.5)
+
+
+def _within_sight(place: int) -> int:
+    """A place in um, no further away than what is further than anything that may be seen."""
+    return max(-_FAR_UM, min(place, _FAR_UM))
 
 
 def _enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
