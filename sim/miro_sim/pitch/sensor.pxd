@@ -3,7 +3,7 @@ from miro_exact cimport rng
 from miro_exact.dmath cimport sincos
 
 cdef long long _MASK, _FRAME_BLOCKS, _LINE_BLOCKS, _FULL, _TICKS
-cdef int _BITS, _WIDTH, _GREY, _PAD
+cdef int _BITS, _WIDTH, _GREY, _PAD, _ABOVE
 
 
 @cython.final
@@ -13,7 +13,7 @@ cdef class Sensor:
     cdef long long frame, offset, jitter
     cdef int scale
     cdef readonly int reach, side
-    cdef short kept, half
+    cdef bytes levels
     cdef short taps[72]
     cdef short gamma[4096]
     cdef short luma_noise[4096]
@@ -23,9 +23,6 @@ cdef class Sensor:
     cdef short cr[352]
     cdef short soft_cb[352]
     cdef short soft_cr[352]
-    cdef short noise_y[352]
-    cdef short noise_cb[352]
-    cdef short noise_cr[352]
     cdef unsigned int words[448]
 
     @cython.locals(light=double)
@@ -37,14 +34,14 @@ cdef class Sensor:
     cdef void put(self, int column, long long total, long long light) noexcept
     @cython.locals(value='long long')
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(first='long long')
+    @cython.locals(first='long long', blocks=int)
     cdef void write(self, int row, int left, int width, bytearray out, int at) except *
-    @cython.locals(block='long long', part='long long', at='long long', word='unsigned int', last='unsigned int')
-    cdef void _draw_noise(self, unsigned long long first, long long column, int blocks) noexcept
-    @cython.locals(kept=short, half=short, found='short[16]', first='long long', column='long long', lane='long long',
-                   value=short)
-    cdef void _quantise(self, short* values, short* noise, long long left, long long width, unsigned char* out,
+    @cython.locals(block='long long', column='long long', last='unsigned int', part=int)
+    cdef void _quantise(self, long long first, long long end, long long blocks, unsigned char* out,
                         long long at) noexcept
+    @cython.locals(levels='const unsigned char *')
+    cdef inline void _write_pixel(self, long long column, unsigned int word, unsigned int last, unsigned char* out,
+                                  long long at) noexcept
     @cython.locals(first='long long', lane='long long', step='long long', sums='int[8]', bend=short)
     cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)

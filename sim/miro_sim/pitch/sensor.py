@@ -32,6 +32,7 @@ _DRAWS = 4096
 _WIDTH = 320
 _PAD = 8  # places of a line's array before its first pixel, for what the low-pass sees beyond the border
 _GREY = 2048  # no colour, with four fraction bits
+_ABOVE = 4096  # is added to noise, so that no sum with a value is negative
 
 
 def _normals() -> list[int]:
@@ -75,13 +76,20 @@ def _tables(gamma: float, luma_noise: float, chroma_noise: float) -> tuple[list[
     return shown, luma, [math.floor(normal * chroma_noise / 4096.0 + 0.5) for normal in normals]
 
 
+@lru_cache(maxsize=8)
+def _levels(bits: int) -> bytes:
+    """Bytes by value with four fraction bits, from -`_ABOVE` on: rounded, limited, then the bits there are."""
+    kept = 256 - (1 << (8 - bits))
+    half = (1 << (8 - bits)) >> 1
+    return bytes((min(max(value + 8 >> 4, 0), 255) & kept) + half for value in range(-_ABOVE, 2 * _ABOVE))
+
+
 class Sensor:
     """Sensor, cable and grabber of one camera. `stream` is the source of its noise. Holds one line; no state."""
 
     NOT_STATE = (
-        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "kept", "half"),
-        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr"),
-        *("noise_y", "noise_cb", "noise_cr", "words"),
+        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "levels"),
+        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr", "words"),
     )
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
@@ -97,25 +105,20 @@ class Sensor:
             self.taps[place] = taps[place // 8]
         self.jitter = math.floor(settings.line_jitter_px * 256.0 + 0.5)
         self.side = self.reach + (1 if self.jitter else 0)
-        lost = 8 - settings.bits
-        self.kept = 256 - (1 << lost)
-        self.half = (1 << lost) >> 1
+        self.levels = _levels(settings.bits)
         self.gamma = [0] * 4096
         self.luma_noise = [0] * 4096
         self.chroma_noise = [0] * 4096
         shown, luma, chroma = _tables(settings.gamma, settings.luma_noise, settings.chroma_noise)
         for value in range(4096):
             self.gamma[value] = shown[value]
-            self.luma_noise[value] = luma[value]
-            self.chroma_noise[value] = chroma[value]
+            self.luma_noise[value] = luma[value] + _ABOVE
+            self.chroma_noise[value] = chroma[value] + _ABOVE
         self.y = [0] * 352
         self.cb = [0] * 352
         self.cr = [0] * 352
         self.soft_cb = [0] * 352
         self.soft_cr = [0] * 352
-        self.noise_y = [0] * 352
-        self.noise_cb = [0] * 352
-        self.noise_cr = [0] * 352
         self.words = [0] * 448
 
     def __repr__(self) -> str:
@@ -157,41 +160,34 @@ class Sensor:
         self._soften(self.cb, self.soft_cb, left, width)
         self._soften(self.cr, self.soft_cr, left, width)
         first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS + left // 3
-        self._draw_noise(first, left - left % 3, (left % 3 + width + 2) // 3)
-        self._quantise(self.y, self.noise_y, left, width, out, at)
-        self._quantise(self.soft_cb, self.noise_cb, left, width, out, at + 1)
-        self._quantise(self.soft_cr, self.noise_cr, left, width, out, at + 2)
-
-    def _draw_noise(self, first: int, column: int, blocks: int) -> None:
-        """The noise of pixels from `column` on, three a block: 12 bits of a word for each of Y, Cb, Cr."""
+        blocks = (left % 3 + width + 2) // 3
         self.stream.blocks(first, blocks, self.words)
-        for block in range(blocks):
-            last = self.words[336 + block]
-            for part in range(3):
-                word = self.words[112 * part + block]
-                at = column + _PAD + 3 * block + part
-                self.noise_y[at] = self.luma_noise[word & 4095]
-                self.noise_cb[at] = self.chroma_noise[word >> 12 & 4095]
-                self.noise_cr[at] = self.chroma_noise[word >> 24 | (last >> 4 * part & 15) << 8]
+        self._quantise(left, left + width, blocks, out, at - 3 * left)
 
-    def _quantise(
-        self, values: list[int], noise: list[int], left: int, width: int, out: bytearray, at: int
-    ) -> None:
-        """Values with four fraction bits as each third byte from `at` on: rounded, limited, then the bits there are."""
-        kept, half = self.kept, self.half
-        found = [0] * 16
-        for first in range(0, width, 16):  # as many pixels together
-            column = left + _PAD + first
-            for lane in range(16):
-                found[lane] = values[column + lane] + noise[column + lane] + 8
-            for lane in range(16):
-                value = found[lane] >> 4
-                value = 0 if value < 0 else value
-                value = 255 if value > 255 else value
-                found[lane] = (value & kept) + half
-            for lane in range(min(16, width - first)):
-                out[at] = found[lane]
-                at += 3
+    def _quantise(self, first: int, end: int, blocks: int, out: bytearray, at: int) -> None:
+        """The bytes of pixels into `out`, where column 0 would be `at`; there is a block of noise for three of them."""
+        for block in range(blocks):
+            column = first - first % 3 + 3 * block
+            last = self.words[336 + block]
+            if first <= column and column + 3 <= end:
+                self._write_pixel(column, self.words[block], last, out, at)
+                self._write_pixel(column + 1, self.words[112 + block], last >> 4, out, at)
+                self._write_pixel(column + 2, self.words[224 + block], last >> 8, out, at)
+            else:
+                for part in range(3):
+                    if first <= column + part < end:
+                        self._write_pixel(
+                            column + part, self.words[112 * part + block], last >> 4 * part, out, at
+                        )
+
+    def _write_pixel(self, column: int, word: int, last: int, out: bytearray, at: int) -> None:
+        """Y, Cb, Cr of a pixel with their noise: 12 random bits each, the highest four in `last`."""
+        levels = self.levels
+        at += 3 * column
+        column += _PAD
+        out[at] = levels[self.y[column] + self.luma_noise[word & 4095]]
+        out[at + 1] = levels[self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095]]
+        out[at + 2] = levels[self.soft_cr[column] + self.chroma_noise[word >> 24 | (last & 15) << 8]]
 
     def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
         """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border.
