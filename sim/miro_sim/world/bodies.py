@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from operator import itemgetter
 
 from miro_exact.clock import NEVER_TICK
 from miro_sim.pitch.contact import GRID_TICKS, Pose, next_look, touch
@@ -23,7 +24,7 @@ class Bodies:
     NOT_STATE = ("robots", "pairs", "next_ticks", "next_tick", "looks", "touching")
 
     def __init__(self, robots: Sequence[Robot]) -> None:
-        self.robots = robots
+        self.robots = list(robots)
         self.pairs: list[tuple[Robot, Robot, float]] = [
             (one, other, one.drive.params.top_speed_m_s() + other.drive.params.top_speed_m_s())
             for one, other in combinations(robots, 2)
@@ -72,21 +73,22 @@ class Bodies:
         for index, tick in self.looks:
             one, other, closing_m_s = self.pairs[index]
             while tick < min(one.grid_tick, other.grid_tick):  # both have noted it
-                postures = _noted(one, tick), _noted(other, tick)
+                at, beside = _noted(one, tick), _noted(other, tick)
                 known = (one, other) in self.touching
-                if touch(*postures) != known:
+                if touch(at, beside) != known:
                     if known:
                         self.touching = [pair for pair in self.touching if pair != (one, other)]
                     else:
                         self.touching = [*self.touching, (one, other)]
                         found.append((tick, one, other))
-                tick = next_look(tick, *postures, closing_m_s)
+                tick = next_look(tick, at, beside, closing_m_s)
             self.next_ticks[index] = tick
         if self.looks:
             self.next_tick = min(self.next_ticks)
-        return sorted(found, key=lambda touch: touch[0])
+        found.sort(key=itemgetter(0))
+        return found
 
 
 def _noted(robot: Robot, tick: int) -> Pose:
     """Where the robot was at a tick of the grid; its last note is of the one before `grid_tick`."""
-    return robot.noted[(tick - robot.grid_tick) // GRID_TICKS]
+    return robot.noted[len(robot.noted) - (robot.grid_tick - tick) // GRID_TICKS]

@@ -1,0 +1,26 @@
+# C layout of miro_sim.world.bodies.
+cimport cython
+from miro_sim.pitch.contact cimport next_look, touch
+from miro_sim.world.robot cimport Robot
+
+cdef long long GRID_TICKS, NEVER_TICK
+
+
+cdef class Bodies:
+    cdef readonly list robots, pairs, looks
+    cdef public list touching
+    cdef list next_ticks
+    cdef long long next_tick
+
+    cpdef start_again(self, list touching)
+    @cython.locals(one=Robot, other=Robot)
+    cpdef start_at(self, long long tick)
+    @cython.locals(robot=Robot, one=Robot, other=Robot, at=dict, index=Py_ssize_t, closing_m_s=double,
+                   look_tick='long long')
+    cpdef begin(self, long long tick, long long until_tick)
+    @cython.locals(one=Robot, other=Robot, index=Py_ssize_t, tick='long long', closing_m_s=double, at=tuple,
+                   beside=tuple, known=bint, found=list)
+    cpdef list look(self)
+
+
+cdef tuple _noted(Robot robot, long long tick)
