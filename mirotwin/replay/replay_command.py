@@ -64,12 +64,11 @@ def replay_case(job: Job, quiet: bool) -> int:
 
 def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:
     """The same for a case of a bare processor. `check`: FILE.py:FUNCTION, for a case whose check is in a file."""
-    from mirotwin.verify.bare.case import load_case_firmware, replay_bare  # loads the bare processor
+    from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case  # loads the bare processor
 
     image = load_case_firmware(path, firmware)
-    verdict = replay_bare(path, image, check)
-    again = debug_line(path, firmware, check=check)
-    return _told(verdict, again, quiet)
+    _, verdict = rerun_bare_case(path, image, check)
+    return _told(verdict, debug_line(path, firmware, check=check), quiet)
 
 
 def _told(verdict: CaseVerdict, again: str, quiet: bool) -> int:

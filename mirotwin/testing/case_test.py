@@ -59,11 +59,11 @@ class CaseTests:
         )
 
     def _run_bare(self, path: str) -> Outcome:
-        from mirotwin.verify.bare.case import load_case_firmware, replay_bare
+        from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 
         image, check = load_case_firmware(path, self.firmware), self.check_of(path)
         self.unused.discard(check or "")
-        failure = replay_bare(path, image, check).failure
+        failure = rerun_bare_case(path, image, check)[1].failure
         return Outcome(
             path=path,
             verdict="passed" if failure is None else "fault" if failure.fault else "failed",

@@ -99,13 +99,13 @@ def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images
 @needs_sdcc
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
-    from mirotwin.verify.bare.case import replay_bare
+    from mirotwin.verify.bare.case import rerun_bare_case
 
-    again = replay_bare(path, images["dimmer"], CHECK)
+    _, again = rerun_bare_case(path, images["dimmer"], CHECK)
     assert again.failure is not None
     assert again.lines[0].startswith("fails as recorded: ")
     assert again.code == (3 if "no_fault" in path.stem else 1)
-    cured = replay_bare(path, images["mended"], CHECK)
+    _, cured = rerun_bare_case(path, images["mended"], CHECK)
     assert (cured.code, cured.lines[0].partition(":")[0]) == (0, "cured")
 
 

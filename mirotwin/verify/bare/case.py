@@ -133,18 +133,13 @@ def check_of_case(path: str | Path) -> str:
     return _name(stream.read(path))
 
 
-def replay_bare(path: str | Path, image: Image, check: str | None = None) -> CaseVerdict:
+def rerun_bare_case(
+    path: str | Path, image: Image, check: str | None = None
+) -> tuple[BareRerun, CaseVerdict]:
     """Plays a case on `image`, from power-on. `check`: FILE.py:FUNCTION, where the case names one that is in a file.
 
     Raises BadInput for what is no such case.
     """
-    return rerun_bare_case(path, image, check)[1]
-
-
-def rerun_bare_case(
-    path: str | Path, image: Image, check: str | None = None
-) -> tuple[BareRerun, CaseVerdict]:
-    """The same, with what it did."""
     case = stream.read(path)
     name, line, header = _name(case), _line(case), case.header
     judge = None if name in (NO_FAULT, NEVER_SLEEPS) else _check(case, name, check)

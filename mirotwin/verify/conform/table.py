@@ -19,18 +19,9 @@ from mirotwin.verify.conform.rules import (
 )
 
 CHAPTERS: tuple[Chapter, ...] = (
-    boot.CHAPTER,
-    reception.CHAPTER,
-    fresh.CHAPTER,
-    driving.CHAPTER,
-    failsafe.CHAPTER,
-    service.CHAPTER,
-    answers.CHAPTER,
-    sound.CHAPTER,
-    chips.CHAPTER,
-    boot.STRAPS,
-    sound.LONG,
-)
+    boot.CHAPTER, reception.CHAPTER, fresh.CHAPTER, driving.CHAPTER, failsafe.CHAPTER, service.CHAPTER,
+    answers.CHAPTER, sound.CHAPTER, chips.CHAPTER, boot.STRAPS, sound.LONG,
+)  # fmt: skip
 ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
 LONG: tuple[Rule, ...] = tuple(sound.LONG.rules)
 RULES: tuple[Rule, ...] = tuple(rule for rule in ALL if rule not in LONG)

@@ -72,44 +72,11 @@ class Program:
     """
 
     NOT_STATE = (
-        *(
-            "how",
-            "slot",
-            "robots",
-            "repair",
-            "character_ticks",
-            "characters",
-            "flaws",
-            "pauses",
-            "count",
-            "length",
-        ),
-        *(
-            "frames",
-            "_sync",
-            "_lead",
-            "_payload",
-            "_layout",
-            "_white",
-            "_table",
-            "_place",
-            "_end",
-            "_data",
-            "_seq",
-        ),
-        *(
-            "_first",
-            "_size",
-            "_damage_at",
-            "_damage",
-            "_cut",
-            "_stop_at",
-            "_wait",
-            "_flags",
-            "_resets",
-            "_body",
-        ),
-    )
+        "how", "slot", "robots", "repair", "character_ticks", "characters", "flaws", "pauses", "count",
+        "length", "frames", "_sync", "_lead", "_payload", "_layout", "_white", "_table", "_place",
+        "_end", "_data", "_seq", "_first", "_size", "_damage_at", "_damage", "_cut", "_stop_at", "_wait",
+        "_flags", "_resets", "_body",
+    )  # fmt: skip
 
     def __init__(
         self,

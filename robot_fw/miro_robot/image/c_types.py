@@ -66,18 +66,8 @@ _POINTERS = ("DG", "DC", "DX", "DD", "DI", "DP", "DA")
 _PLAIN: dict[str, Kind] = {"": "bool", "SF": "float", "SX": "bit", "SV": "void", "DF": "function"}
 _NUMBERS = ("SC", "SS", "SI", "SL")
 _POINTED_BYTES = {
-    "SC": 1,
-    "SS": 2,
-    "SI": 2,
-    "SL": 4,
-    "SF": 4,
-    "DG": 3,
-    "DC": 2,
-    "DX": 2,
-    "DD": 1,
-    "DI": 1,
-    "DP": 1,
-}
+    "SC": 1, "SS": 2, "SI": 2, "SL": 4, "SF": 4, "DG": 3, "DC": 2, "DX": 2, "DD": 1, "DI": 1, "DP": 1,
+}  # fmt: skip
 
 
 def type_of(chain: str, size: int, signed: bool) -> CType | None:

@@ -47,27 +47,18 @@ class Image(msgspec.Struct, frozen=True):
         if both:
             what = f"has a byte at {min(both):#06x}, as {self.path.name} has"
             raise ImageError(other.path, 0, what, "link one of them elsewhere")
-        code = bytearray(self.code)
+        code, loaded = bytearray(self.code), bytearray(SPACE_BYTES)
         for first, end in other.used:
             code[first:end] = other.code[first:end]
-        used = _joined(sorted((*self.used, *other.used)))
+        for address in mine | theirs:
+            loaded[address] = 1
+        used = _ranges(loaded)
         names = Symbols(lambda: {**other.symbols.names, **self.symbols.names}, used)
         sha256 = hashlib.sha256(f"{self.sha256} {other.sha256}".encode()).hexdigest()
         return Image(self.path, bytes(code), used, self.size + other.size, sha256, names)
 
     def __repr__(self) -> str:
         return f"Image({self.path.name!r}, {self.size} bytes, sha256={self.sha256[:12]})"
-
-
-def _joined(ranges: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
-    """Ascending (first, end), with those that follow one another made one."""
-    found: list[tuple[int, int]] = []
-    for first, end in ranges:
-        if found and found[-1][1] == first:
-            found[-1] = found[-1][0], end
-        else:
-            found.append((first, end))
-    return tuple(found)
 
 
 def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:

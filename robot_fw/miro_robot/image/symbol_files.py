@@ -160,15 +160,8 @@ def _extents(areas: re.Pattern[str], text: str) -> list[tuple[int, int]]:
 
 
 CDB_SPACES = {
-    "C": "code",
-    "D": "code",
-    "E": "iram",
-    "G": "iram",
-    "F": "xram",
-    "H": "bit",
-    "I": "sfr",
-    "J": "bit",
-}
+    "C": "code", "D": "code", "E": "iram", "G": "iram", "F": "xram", "H": "bit", "I": "sfr", "J": "bit",
+}  # fmt: skip
 # Numbers have at most as many digits as SDCC writes, with some to spare: a longer one is damage, and no record.
 _CDB_SYMBOL = re.compile(r"^S:((?:G|F\w+)\$(\w+)\$\w+\$\w+)\(.*\),([A-Z]),")
 _CDB_INSTRUCTION = re.compile(r"^L:A\$[^:]*:([0-9A-F]{1,8})\b")

@@ -116,16 +116,12 @@ def _shown(file: str, sources: Sources, here: Path) -> str:
 
 def line_share(tracefile: Tracefile) -> Share:
     records = tracefile.values()
-    return Share(
-        _total(record.lines_hit for record in records), _total(len(record.lines) for record in records)
-    )
+    return Share(sum(one.lines_hit for one in records), sum(len(one.lines) for one in records))
 
 
 def branch_share(tracefile: Tracefile) -> Share:
     records = tracefile.values()
-    return Share(
-        _total(record.branches_hit for record in records), _total(len(record.branches) for record in records)
-    )
+    return Share(sum(one.branches_hit for one in records), sum(len(one.branches) for one in records))
 
 
 def missed(record: FileRecord) -> str:
@@ -139,10 +135,3 @@ def missed(record: FileRecord) -> str:
             ranges[-1][1] = line
         after_a_hit = bool(count)
     return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
-
-
-def _total(numbers: Iterable[int]) -> int:
-    total = 0
-    for number in numbers:
-        total += number
-    return total

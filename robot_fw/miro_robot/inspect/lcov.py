@@ -26,20 +26,10 @@ _RECORDS = {
     "DA": re.compile(rf"({_NUMBER}),({_NUMBER})(?:,.*)?"),
 }
 _LIKE_A_LINE = re.compile(rf"{_NUMBER},")
-_OTHER_BRANCH = re.compile(
-    rf"{_NUMBER},[efU]*{_NUMBER},.+,(?:{_NUMBER}|-)"
-)  # lcov 2: marked, or named by a text
-_DERIVED = (
-    "FNF",
-    "FNH",
-    "BRF",
-    "BRH",
-    "LF",
-    "LH",
-    "MCF",
-    "MCH",
-)  # totals are counted again when it is written
-_DROPPED = (*_DERIVED, "TN", "VER")
+# lcov 2: marked, or named by a text
+_OTHER_BRANCH = re.compile(rf"{_NUMBER},[efU]*{_NUMBER},.+,(?:{_NUMBER}|-)")
+_TOTALS = ("FNF", "FNH", "BRF", "BRH", "LF", "LH", "MCF", "MCH")  # counted again when it is written
+_DROPPED = (*_TOTALS, "TN", "VER")
 _LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # where str.splitlines cuts
 _NAME_ANOTHER = "give a file that was written as lcov tracefile"
 _USE_LCOV = "add the files up with `lcov --add-tracefile`"

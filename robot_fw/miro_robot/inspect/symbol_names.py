@@ -58,9 +58,8 @@ def functions(image: Image) -> list[tuple[int, str]]:
     for name, symbol in sorted(image.symbols.names.items(), reverse=True):
         if symbol.space == "code":
             named[symbol.address] = name
-    for function in DebugInfo.of(
-        image
-    ).functions:  # static ones may share a name, of which the symbols have one
+    # static functions may share a name, of which the symbols have one
+    for function in DebugInfo.of(image).functions:
         named.setdefault(function.first, function.name)
     instructions = _sweep(image)
     if not named:

@@ -40,10 +40,7 @@ class InstructionTrace(Watcher):
         self.code = bytearray()
         self.before: tuple[int, ...] = ()
         self.last = 0  # address of the last instruction: which went to sleep
-        self.sleep = (
-            0,
-            0,
-        )  # first cycle of the stretch of sleep that is still to be written, and the one after it
+        self.sleep = (0, 0)  # first cycle of the stretch of sleep to be written yet, and the one after it
         self.static: dict[bytes, str | None] = {}  # by address and code: the part that is always the same
 
     def attached(self, cpu: Cpu) -> None:

@@ -243,11 +243,6 @@ def nanoseconds(tick: int, tick_hz: int = TICK_HZ) -> int:
     return tick * NS_PER_SECOND // tick_hz
 
 
-def tick_of(nanoseconds: int, tick_hz: int = TICK_HZ) -> int:
-    """The tick that a time stamp stands for."""
-    return -(-nanoseconds * tick_hz // NS_PER_SECOND)
-
-
 def _ticks_in_words(tick_hz: int) -> str:
     if tick_hz == TICK_HZ:
         return "ticks of 24 MHz as ns = tick * 125 // 3"

@@ -16,13 +16,13 @@ from miro_robot import inspect
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform, nanoseconds, tick_of
+from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform, nanoseconds
 from miro_robot.lm629.chip import PWM_TICKS
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.wiring import Latch, load_wiring
 from tests.naive.waveform import Sampler, Treadmill
-from tests.robot.inspect.reading import read
+from tests.robot.inspect.reading import read, tick_of
 from tests.robot.mcs51.asm import assemble
 
 MS = 24_000

@@ -159,7 +159,7 @@ def full_duplex(script: TrialScript) -> None:
 )
 def flags(script: TrialScript) -> None:
     both = Flags.STOPPED | Flags.MOTORS_OFF
-    _says(script, f"flags {int(Flags.MOTORS_OFF):02X}h of power-on", partial(_flagged, Flags.MOTORS_OFF))
+    _says_flags(script, Flags.MOTORS_OFF, " of power-on")
     for silence_ms, frames, wanted in (
         *((0.0, 0, 0), (0.0, 2, 0), (140.0, 0, Flags.STOPPED), (0.0, 0, 0), (520.0, 0, both), (0.0, 0, 0)),
         *((200.0, 3, Flags.STOPPED), (0.0, 3, 0), (600.0, 2, both), (0.0, 0, 0)),
@@ -167,25 +167,21 @@ def flags(script: TrialScript) -> None:
         script.wait(silence_ms)
         for _ in range(frames):
             script.team()
-        _says(script, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+        _says_flags(script, wanted)
     script.wait(140.0)
     script.ask_nobody()
-    _says(
-        script,
-        f"flags {int(Flags.STOPPED):02X}h, which no answer has told,",
-        partial(_flagged, Flags.STOPPED),
-    )
+    _says_flags(script, Flags.STOPPED, ", which no answer has told,")
     script.wait(140.0)
     question = script.ask(script.topology.slots[0], gap_ms=0.0)
     first = f"flags {int(Flags.STOPPED):02X}h in the answer to {question.what}, the first of two in a row"
     script.answered(question, script.topology.slots[0], first, partial(_flagged, Flags.STOPPED))
     script.ask(script.topology.slots[0], lead=b"", gap_ms=40.0)
-    _says(script, "flags 00h", partial(_flagged, 0))
+    _says_flags(script, 0)
     for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
         for _ in range(2):  # what happened twice is told once
             script.team()
             script.wait(silence_ms)
-        _says(script, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+        _says_flags(script, wanted)
 
 
 def _says(
@@ -194,6 +190,10 @@ def _says(
     question = script.ask(script.topology.slots[0], gap_ms=gap_ms)
     script.answered(question, script.topology.slots[0], f"{wanted} in the answer to {question.what}", says)
     return question
+
+
+def _says_flags(script: TrialScript, wanted: int, since: str = "") -> None:
+    _says(script, f"flags {int(wanted):02X}h{since}", partial(_flagged, wanted))
 
 
 def _flagged(wanted: int, answer: Answer, observed: Observed) -> str:

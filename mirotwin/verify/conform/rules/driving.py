@@ -72,15 +72,9 @@ def both_types(script: TrialScript) -> None:
 )
 def words(script: TrialScript) -> None:
     pairs = [
-        (1, -1),
-        (-1, 1),
-        (2, 255),
-        (-255, -256),
-        (256, 257),
-        (-257, 127),
-        (128, -128),
+        (1, -1), (-1, 1), (2, 255), (-255, -256), (256, 257), (-257, 127), (128, -128),
         (0x1234, -0x1234),
-    ]
+    ]  # fmt: skip
     pairs += [(0x55AA >> 2, -0x2AD5), (0, 300), (-300, 0), (4097, 16), (-16633, 16632)]
     for left, right in pairs:
         script.obeyed(_only(script, left, right))

@@ -9,7 +9,7 @@ from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
-from mirotwin.verify.bare.case import case_text, replay_bare
+from mirotwin.verify.bare.case import case_text, rerun_bare_case
 from mirotwin.verify.bare.exchange import NamedCheck
 from mirotwin.verify.bare.run import BarePlayback
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
@@ -44,20 +44,20 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
     ],
 )
 def test_a_case_fails_again_as_recorded(tmp_path, data, firmware, code, said):
-    again = replay_bare(case(tmp_path, data, firmware), image(firmware))
+    _, again = rerun_bare_case(case(tmp_path, data, firmware), image(firmware))
     assert (again.code, again.failure is not None) == (code, True)
     assert again.lines[0].startswith(said)
 
 
 @pytest.mark.parametrize("data", [b"ab!", b"ab?"])
 def test_other_firmware_cures_it(tmp_path, data):
-    again = replay_bare(case(tmp_path, data), image(MENDED))
+    _, again = rerun_bare_case(case(tmp_path, data), image(MENDED))
     assert (again.code, again.failure) == (0, None)
     assert again.lines[0].startswith("cured: ")
 
 
 def test_other_firmware_may_fail_otherwise(tmp_path):
-    again = replay_bare(case(tmp_path, b"ab!"), image("NOP\n" + SLEEPS.replace("ORG 23h", "ORG 23h")))
+    _, again = rerun_bare_case(case(tmp_path, b"ab!"), image("NOP\n" + SLEEPS.replace("ORG 23h", "ORG 23h")))
     assert (again.code, again.failure.fault) == (3, True)
     assert again.lines[0].startswith("still fails, but not as recorded: ")
 
@@ -65,7 +65,7 @@ def test_other_firmware_may_fail_otherwise(tmp_path):
 def test_a_case_that_does_not_fail_again_differs(tmp_path):
     path = case(tmp_path, b"ab!")
     path.write_text(path.read_text().replace(" > 61 62 21", " > 61 62 20"))
-    again = replay_bare(path, image(SLEEPS))
+    _, again = rerun_bare_case(path, image(SLEEPS))
     assert (again.code, again.failure) == (4, None)
     assert again.lines[0].startswith("not reproduced: no_fault passes")
 
@@ -74,16 +74,16 @@ def test_a_case_of_a_check_needs_that_check(tmp_path):
     path = case(tmp_path, b"abc", check=CHECK)
     file = tmp_path / "mycheck.py"
     file.write_text(WRONG.replace("short", "too_long"))
-    again = replay_bare(path, image(SLEEPS), f"{file}:too_long")
+    _, again = rerun_bare_case(path, image(SLEEPS), f"{file}:too_long")
     assert (again.code, again.lines[0].partition(":")[0]) == (1, "fails as recorded")
     assert again.lines[0].endswith("3 are too many")
     with pytest.raises(
         BadInput, match="names the check 'too_long', which is not installed; give it: --check "
     ):
-        replay_bare(path, image(SLEEPS))
+        rerun_bare_case(path, image(SLEEPS))
     file.write_text(WRONG)
     with pytest.raises(BadInput, match="is a case of the check 'too_long', and --check gives 'short'"):
-        replay_bare(path, image(SLEEPS), f"{file}:short")
+        rerun_bare_case(path, image(SLEEPS), f"{file}:short")
 
 
 def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
@@ -94,9 +94,9 @@ def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
     for name in ("evil.py:f", f"{tmp_path}/evil.py:f", "./evil.py:f", "evil:f", "evil"):
         path.write_text(honest.replace("too_long = true", f'"{name}" = true'))
         with pytest.raises(BadInput, match="which is not installed"):
-            replay_bare(path, image(SLEEPS))
+            rerun_bare_case(path, image(SLEEPS))
         with pytest.raises(BadInput, match="and --check gives 'f'"):
-            replay_bare(path, image(SLEEPS), f"{tmp_path}/evil.py:f")
+            rerun_bare_case(path, image(SLEEPS), f"{tmp_path}/evil.py:f")
         assert not (tmp_path / "was_run").exists()
 
 
@@ -122,7 +122,7 @@ def test_a_header_that_says_nothing_useful_is_refused(tmp_path, old, new, said):
     assert old in text
     path.write_text(text.replace(old, new))
     with pytest.raises(BadInput) as caught:
-        replay_bare(path, image(SLEEPS))
+        rerun_bare_case(path, image(SLEEPS))
     assert said in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
@@ -136,7 +136,7 @@ def test_characters_that_overlap_are_refused(tmp_path):
         )
     )
     with pytest.raises(BadInput, match="the characters at tick 5100 begin before those before them end"):
-        replay_bare(path, image(SLEEPS))
+        rerun_bare_case(path, image(SLEEPS))
 
 
 def test_a_stream_that_expects_nothing_is_judged_by_faults(tmp_path):
@@ -144,7 +144,7 @@ def test_a_stream_that_expects_nothing_is_judged_by_faults(tmp_path):
     path = tmp_path / "x.stream"
     for data, code in ((b"ab", 0), (b"a!", 3)):
         path.write_text(case_text(image(SLEEPS), line, [Transmission(5000, DOWN, data)], 200_000))
-        assert replay_bare(path, image(SLEEPS)).code == code
+        assert rerun_bare_case(path, image(SLEEPS))[1].code == code
 
 
 def test_a_reset_starts_the_firmware_anew(tmp_path):
