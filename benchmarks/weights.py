@@ -12,7 +12,6 @@ from math import comb
 import numpy as np
 
 from miro_protocol.crc import crc16
-from miro_protocol.frames import layout_crc
 from miro_protocol.table import Format
 
 CRC_BITS = 16
@@ -26,11 +25,9 @@ def covered_bits(form: Format) -> int:
 def syndromes(form: Format) -> list[int]:
     """What each single wrong bit of HDR..CRC, in the order sent, does to the CRC; those of several XOR."""
     size = form.body_size + 2
-    good = crc16(bytes(size), layout_crc(form))
-    return [
-        crc16((1 << bit).to_bytes(size, "little"), layout_crc(form)) ^ good
-        for bit in range(covered_bits(form))
-    ]
+    start = crc16(bytes([form.layout]))
+    good = crc16(bytes(size), start)
+    return [crc16((1 << bit).to_bytes(size, "little"), start) ^ good for bit in range(covered_bits(form))]
 
 
 def code_words(form: Format) -> list[int]:

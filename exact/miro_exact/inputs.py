@@ -74,7 +74,7 @@ def _check_ends(path: str | os.PathLike[str]) -> None:
         mode = os.stat(path).st_mode
     except OSError:
         return  # `open` says what is wrong
-    if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not _is_null(path):
+    if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not os.path.samefile(path, os.devnull):
         raise InputError(str(path), "is a device", "name a file or a pipe")
     if stat.S_ISFIFO(mode) and not os.fspath(path).startswith(_OF_PROCESSES):
         raise InputError(str(path), "is a named pipe, which may never end", "give a file, or <(COMMAND)")
@@ -83,7 +83,3 @@ def _check_ends(path: str | os.PathLike[str]) -> None:
 def _too_long(path: str | os.PathLike[str], limit: int) -> InputError:
     size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
     return InputError(str(path), f"holds more than {size}", "is this the right file?")
-
-
-def _is_null(path: str | os.PathLike[str]) -> bool:
-    return os.path.samefile(path, os.devnull)

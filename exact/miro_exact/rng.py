@@ -23,8 +23,6 @@ from array import array
 
 from miro_exact.domain import MAX_SEED
 
-INDICES = 1 << 56
-
 _INDICES = 1 << 56  # C constants when compiled
 _WORD = 0xFFFFFFFF
 _M0 = 0xD2511F53

@@ -136,7 +136,10 @@ def calibrate(options: CalibrateOptions) -> None:
     if points is not None and (samples is None) != (options.colours_out is None):
         raise click.UsageError("With --points, give both --samples and --colours-out or neither.")
     _check_outputs(options)
-    first = None if options.initial is None else _initial(options.initial)
+    first = None
+    if options.initial is not None:
+        check_regular(options.initial)
+        first = calibrations.read(options.initial).camera
     if scenario is not None:
         found = _of_scenario(scenario, first, options)
     else:
@@ -170,11 +173,6 @@ def _check_outputs(options: CalibrateOptions) -> None:
 def _classes(samples: Path) -> str:
     check_regular(samples)
     return classes_of(read_samples(samples), f"{samples}").text()
-
-
-def _initial(path: Path) -> CameraParameters:
-    check_regular(path)
-    return calibrations.read(path).camera
 
 
 def _of_scenario(name: str, initial: CameraParameters | None, options: CalibrateOptions) -> _Found:

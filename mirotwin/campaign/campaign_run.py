@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
+from msgspec.structs import replace
 
 from miro_exact.bad_input import amount
 from mirotwin.campaign import running
@@ -73,7 +73,9 @@ def run(options: CampaignOptions) -> int:
     plan = load_plan(options.file, (*options.settings, *as_settings(options.expected)))
     tell_notes(plan.notes)
     if options.seeds is not None:
-        plan = _with_seeds(plan, options.seeds)
+        first, count = options.seeds[0], len(options.seeds)
+        design = replace(plan.design, first_seed=first, seed_count=count)
+        plan = replace(plan, file=replace(plan.file, design=design))
     results = options.out or Path("runs") / f"{options.file.stem}.parquet"
     running.refuse_many(plan, options.yes)
     if not options.force and running.complete(results, running.head_of(plan)):
@@ -87,12 +89,6 @@ def run(options: CampaignOptions) -> int:
             f"{amount(tally.runs, 'run')} ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}"
         )
     return _judge(plan, results)
-
-
-def _with_seeds(plan: Plan, seeds: range) -> Plan:
-    replace = msgspec.structs.replace
-    design = replace(plan.design, first_seed=seeds[0], seed_count=len(seeds))
-    return replace(plan, file=replace(plan.file, design=design))
 
 
 def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) -> tuple[Tally, float]:

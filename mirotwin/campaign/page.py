@@ -42,12 +42,6 @@ def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
     ).command_line()
 
 
-def drawn_words(about: ResultsInfo, row: Mapping[str, Any]) -> str:
-    """What was drawn for a row, as words of that command."""
-    words = [word for name in about.drawn for word in ("--set", f"{name}={inline(row[name])}")]
-    return shlex.join(words)
-
-
 METRICS = ("rms_position_cm", "rms_theta_deg", "settling_s")
 MOST_ARMS = 24
 """More would be no picture: then the runs are grouped by fewer factors."""
@@ -80,13 +74,13 @@ def campaign_page(path: Path) -> bytes:
     arms = _arms(rows, by, metrics, made)
     comparisons = _comparisons(rows, made)
     failed = _failed(rows)
-    verdicts = rows.column("verdict")
+    verdicts, seeds = rows.column("verdict"), rows.column("seed")
     counts = {name: verdicts.count(name) for name in ("passed", *VERDICTS)}
     values = {
         "file": path.name,
         "about": rows.about,
         "count": rows.count,
-        "seeds": _seeds(rows),
+        "seeds": " to ".join(f"{seed}" for seed in sorted({min(seeds), max(seeds)})),
         "counts": counts,
         "badge": _badge(counts),
         "by": by,
@@ -159,12 +153,6 @@ def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
     ]
 
 
-def _seeds(rows: ResultRows) -> str:
-    seeds = rows.column("seed")
-    first, last = min(seeds), max(seeds)
-    return f"{first}" if first == last else f"{first} to {last}"
-
-
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
     """A word, and the numbers after it."""
     wrong = [
@@ -191,15 +179,17 @@ def _data(rows: ResultRows) -> bytes:
             "arms": [arm_line(about, dict(zip(factors, levels, strict=True))) for levels in arms],
             "runs": numbers,
             "rows": [
-                [arm_of[row], seeds[row], *([words] if (words := _drawn(rows, drawn, row)) else [])]
+                [arm_of[row], seeds[row], *([words] if (words := _drawn_words(drawn, row)) else [])]
                 for row in range(rows.count)
             ],
         }
     )
 
 
-def _drawn(rows: ResultRows, drawn: dict[str, list[Any]], row: int) -> str:
-    return drawn_words(rows.about, {name: column[row] for name, column in drawn.items()})
+def _drawn_words(drawn: dict[str, list[Any]], row: int) -> str:
+    """What was drawn for a row, as words of that command."""
+    settings = [f"{name}={inline(column[row])}" for name, column in drawn.items()]
+    return shlex.join(word for setting in settings for word in ("--set", setting))
 
 
 FEWER = "give the results of a campaign with fewer runs"

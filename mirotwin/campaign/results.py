@@ -8,7 +8,7 @@ pyarrow is loaded when a file is written or read; it comes with the extra `campa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
@@ -107,7 +107,8 @@ def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
         count = 0
-        for group in _groups(in_order(one for one, _ in outcomes(journal))):
+        found = in_order(one for one, _ in outcomes(journal))
+        while group := list(islice(found, ROWS)):
             count += len(group)
             rows.write_table(_table([_row(plan, one) for one in group], schema))
             walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
@@ -259,8 +260,3 @@ def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
             what = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
             raise BadInput("", field.name, what, "start again with --force") from None
     return pa.Table.from_arrays(columns, schema=schema)
-
-
-def _groups(outcomes: Iterator[RunOutcome]) -> Iterator[list[RunOutcome]]:
-    while group := list(islice(outcomes, ROWS)):
-        yield group

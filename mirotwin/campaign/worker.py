@@ -62,7 +62,7 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
 
 def work(job: Work) -> RunOutcome:
     """Runs a job to its end. Nothing but an outcome comes back, whatever happens to the run."""
-    refused = _refusal(job)
+    refused = job.versions.difference(versions()) or _engine(job.engine) or _firmware(job.firmware)
     if refused:
         return RunOutcome(job.run, refused=refused, where=place())
     from mirotwin.campaign.single import run_single  # loads hot modules
@@ -73,11 +73,6 @@ def work(job: Work) -> RunOutcome:
 def place() -> str:
     """How a worker is called."""
     return f"{socket.gethostname()} process {os.getpid()}"
-
-
-def _refusal(job: Work) -> str:
-    difference = job.versions.difference(versions())
-    return difference or _engine(job.engine) or _firmware(job.firmware)
 
 
 @cache

@@ -14,7 +14,6 @@ from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import Session
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.runner import report_faults
-from mirotwin.report.summary import LiveFigures
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
 from mirotwin.shell.command import Option, Options, command_of
@@ -125,7 +124,9 @@ def serve(options: ServeOptions) -> int:
                     _leave_case(folder, world, trace, checks)
             raise
         finally:
-            tell(_paced(session.live()))
+            live = session.live()
+            behind = f"; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else ""
+            tell(f"at most {live.late_max_ms:.1f} ms behind the wall clock{behind}")
     tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
     failed = report_failures(checks)
     return report_faults(world) or failed
@@ -135,9 +136,3 @@ def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks
     """What was sent as one text file, with the check that failed if one did; `mirotwin replay` runs it again."""
     text = case_of_checks(world, trace, checks) if checks.failures else case_text(world, trace, {}, "")
     folder.part(CASE).write_text(text, encoding="utf-8")
-
-
-def _paced(live: LiveFigures) -> str:
-    """How far the world was behind."""
-    most = f"at most {live.late_max_ms:.1f} ms behind the wall clock"
-    return f"{most}; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else most

@@ -61,7 +61,8 @@ class PtyEndpoint(Endpoint):
     def _make_link(self, link: Path, force: bool) -> None:
         try:
             self._lock = _locked(_lock_of(link))
-            if link.is_symlink() and (not link.exists() or (force and _is_terminal(link))):
+            ours = force and link.is_symlink() and os.path.dirname(os.readlink(link)) == "/dev/pts"
+            if link.is_symlink() and (ours or not link.exists()):
                 link.unlink()
             link.symlink_to(self.path)
         except BlockingIOError:
@@ -133,10 +134,6 @@ class PtyEndpoint(Endpoint):
         """Lets the selector wake for the terminal while somebody has it open: a closed one would never let it sleep."""
         looks = bool(self.client) and not leave
         self.watch(self._master, looks and self.port.room > 0, looks and len(self.out) > 0)
-
-
-def _is_terminal(link: Path) -> bool:
-    return os.path.dirname(os.readlink(link)) == "/dev/pts"
 
 
 def _lock_of(link: Path) -> Path:

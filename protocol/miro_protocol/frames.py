@@ -206,11 +206,6 @@ def crc(form: Format, body: bytes) -> int:
     return crc16(bytes([form.layout]) + body)
 
 
-def layout_crc(form: Format) -> int:
-    """Where the CRC of a frame of this format starts: after the layout byte, which is never sent."""
-    return crc16(bytes([form.layout]))
-
-
 def decode_fields(body: bytes, n: int) -> Message:
     """The message in `body`: HDR and payload in clear, CRC already checked and taken off.
 

@@ -77,19 +77,18 @@ class Derived:
         yield Said(TRANSFORMS, tick, self._transforms(period, at))
         if still:
             yield from self._standing(period, at)
-        trails = [entity for robot in period.robots for entity in self._trail(robot, period.index, at)]
+        trails: list[SceneEntity] = []
+        for robot in period.robots:
+            trail = self._trails.setdefault((robot.network, robot.slot), robots.Trail())
+            trails += trail.add(robot, period.index, at)
         yield Said(TRAILS, tick, SceneUpdate((), tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
-            yield Said(error_topic(*place), tick, _error(robot, tick))
+            yield Said(f"{PREFIX}net{place[0]}/robot{place[1]}/error", tick, _error(robot, tick))
             for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
                 yield Said(LOG, tick, line)
         for action in period.actions:
             yield Said(LOG, action.tick, notes.of_action(action))
-
-    def _trail(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
-        place = robot.network, robot.slot
-        return self._trails.setdefault(place, robots.Trail()).add(robot, index, at)
 
     def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
         found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
@@ -102,7 +101,7 @@ class Derived:
         if self._lens is not None:
             for network in _networks(period):
                 message = frames.calibration(network, self._lens.lens, at)
-                yield Said(calibration_topic(network), period.tick, message)
+                yield Said(f"{PREFIX}net{network}/calibration", period.tick, message)
 
     def _scene(self, period: Period, at: Timestamp) -> Iterator[SceneEntity]:
         yield pitch.pitch(at)
@@ -119,7 +118,7 @@ class Derived:
 def image(network: int, tick: int, png: bytes) -> Said:
     """The frame of a network's camera that was exposed at `tick`."""
     message = CompressedImage(time_of(tick), frames.camera_frame(network), png, "png")
-    return Said(image_topic(network), tick, message)
+    return Said(f"{PREFIX}net{network}/image", tick, message)
 
 
 def _networks(period: Period) -> list[int]:
@@ -136,15 +135,3 @@ TRANSFORMS = PREFIX + "transforms"
 SCENE = PREFIX + "scene"
 TRAILS = PREFIX + "trails"
 LOG = PREFIX + "log"
-
-
-def image_topic(network: int) -> str:
-    return f"{PREFIX}net{network}/image"
-
-
-def calibration_topic(network: int) -> str:
-    return f"{PREFIX}net{network}/calibration"
-
-
-def error_topic(network: int, slot: int) -> str:
-    return f"{PREFIX}net{network}/robot{slot}/error"

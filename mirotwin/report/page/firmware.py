@@ -86,13 +86,13 @@ def coverage_rows(image: Image, counts: Counts, sources: Sources) -> CoverageRow
         found: Tracefile = {"listing": record}
     else:
         found = by_line(image, debug, counts)
-        files = [_of_source(name, found[name], sources) for name in sorted(found, key=_base)]
+        files = []
+        for name in sorted(found, key=_base):
+            path = sources.path(name)
+            files.append(
+                _file(_base(name), [] if path is None else read_text(path).splitlines(), found[name])
+            )
     return CoverageRows(files, line_share(found), branch_share(found), instructions, not debug.lines)
-
-
-def _of_source(name: str, record: FileRecord, sources: Sources) -> SourceFile:
-    path = sources.path(name)
-    return _file(_base(name), [] if path is None else read_text(path).splitlines(), record)
 
 
 def _file(name: str, lines: list[str], record: FileRecord) -> SourceFile:

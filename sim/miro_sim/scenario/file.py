@@ -137,14 +137,10 @@ def _parsed(
     """The tables with the settings made, the scenario, and whether the text alone says all of it."""
     try:
         raw = _tables(text, origin)
-        whole, own = with_base(raw, origin, _base_tables)
+        whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
         return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
     except RecursionError:
         raise _too_deep(origin) from None
-
-
-def _base_tables(source: str) -> dict[str, Any]:
-    return _tables(source_text(source), source)
 
 
 def _tables(text: str, origin: str) -> dict[str, Any]:

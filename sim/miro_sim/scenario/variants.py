@@ -85,11 +85,8 @@ def _network(network: Any, variant: Mapping[str, Any]) -> Any:
 
 
 def _camera(given: Any, default: Table) -> Any:
-    return _filled(given, default) if not given or _kind(given) == default.get("kind") else given
-
-
-def _kind(camera: Any) -> object:
-    return camera.get("kind") if isinstance(camera, dict) else None
+    same = not given or (isinstance(given, dict) and given.get("kind") == default.get("kind"))
+    return _filled(given, default) if same else given
 
 
 def _filled(given: Any, default: Table) -> Any:
