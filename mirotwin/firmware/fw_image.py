@@ -17,7 +17,7 @@ from miro_robot.mcs51.vector_draw import draw_vectors
 from miro_robot.mcs51.vectors import encode
 from mirotwin.firmware.code_place import SPACE_BYTES, SYMBOL, functions_at
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.debug_files import SourceFolders, sources_of
+from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import FORCE, NAME, OUT, SEED, Engine, Whole
@@ -47,7 +47,7 @@ def disasm(options: DisasmOptions) -> None:
     wanted = functions_at(options.symbols, loaded, names, path)
     shown = not wanted
     headings = {f"{name}:" for _, name in wanted}
-    for line in text_lines(loaded, DebugInfo.of(loaded), names, sources_of(loaded, options.sources)):
+    for line in text_lines(loaded, DebugInfo.of(loaded), names, source_folders(loaded, options.sources)):
         if wanted and line.endswith(":") and not line.startswith(";"):
             shown = line in headings
         if shown:

@@ -26,7 +26,7 @@ from mirotwin.firmware.coverage_files import (
 from mirotwin.firmware.subject import WindowOptions, look, open_window
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import plain_table, show
-from mirotwin.shell.debug_files import SourceFolders, sources_of, with_debug_files
+from mirotwin.shell.debug_files import SourceFolders, source_folders, with_debug_files
 from mirotwin.shell.options import FORCE, JSON, OUT
 from mirotwin.shell.outputs import check_new, check_not_input
 
@@ -142,7 +142,7 @@ def coverage(options: CoverageOptions) -> int:
     if out is not None and has_listing(image):
         _check(listing_path(out), options, append or options.force)
     counters = Counters()
-    folders = sources_of(image, options.sources)
+    folders = source_folders(image, options.sources)
     code = look(run, options, counters)
     report = collect(image, counts_of(counters), folders, out)
     if append and out is not None and is_of_another_image(report, out):

@@ -29,7 +29,7 @@ from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
 from mirotwin.recording.decode_command import ROBOTS
 from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.debug_files import SourceFolders, sources_of
+from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     FORCE,
@@ -233,7 +233,7 @@ def _campaign(
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
-    triage = Triage(reached, oracle, folder, sources_of(image, options.sources), options.minimise_s)
+    triage = Triage(reached, oracle, folder, source_folders(image, options.sources), options.minimise_s)
     with folder.filled():
         failing, passing, silent = _sorted_out(target, inputs)
         engine = _engine(spec, passing, folder, options)

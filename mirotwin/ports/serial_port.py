@@ -254,14 +254,10 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._there()
         return False
 
-    def _update_break_state(self) -> None:
-        """A break does not get through the radio module."""
+    def _update_line(self) -> None:
+        """RTS and DTR are not connected, and a break does not get through the radio module."""
 
-    def _update_rts_state(self) -> None:
-        """Not connected."""
-
-    def _update_dtr_state(self) -> None:
-        """Not connected."""
+    _update_break_state = _update_rts_state = _update_dtr_state = _update_line
 
     # ---- within ------------------------------------------------------------------------------------------
 

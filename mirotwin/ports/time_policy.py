@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
-from typing import Protocol
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_sim.world.conditions import Heard
@@ -19,11 +18,16 @@ CATCH_UP_S = 0.25
 _log = logging.getLogger("mirotwin.ports")
 
 
-class TimePolicy(Protocol):
+class TimePolicy:
     """How time passes. `inbox` gets what the PC receives."""
+
+    def __init__(self, port: RadioPort, inbox: ByteFifo) -> None:
+        self.port = port
+        self.inbox = inbox
 
     def catch_up(self) -> None:
         """Before a call looks at anything: to where the world should be now."""
+        raise NotImplementedError
 
     def advance(self, tick: int, for_byte: bool) -> None:
         """Towards `tick`; with `for_byte` not beyond the next byte heard. The caller asks again until it is content."""
@@ -32,12 +36,8 @@ class TimePolicy(Protocol):
         """Between two of these, without the world: other threads may have it."""
 
 
-class VirtualTime:
+class VirtualTime(TimePolicy):
     """Virtual time: nothing passes between calls, and a call takes no longer than computing takes."""
-
-    def __init__(self, port: RadioPort, inbox: ByteFifo) -> None:
-        self.port = port
-        self.inbox = inbox
 
     def catch_up(self) -> None:
         self.inbox.add(self.port.received())
@@ -52,16 +52,12 @@ class VirtualTime:
             world.run_to(tick)
         self.catch_up()
 
-    def rest(self, tick: int) -> None:
-        """No time to pass."""
 
-
-class RealTime:
+class RealTime(TimePolicy):
     """Real time: the world stands where the wall clock says, as often as a call comes, and a wait is one."""
 
     def __init__(self, port: RadioPort, inbox: ByteFifo, pace: Pace) -> None:
-        self.port = port
-        self.inbox = inbox
+        super().__init__(port, inbox)
         self.pace = pace
 
     def catch_up(self) -> None:
@@ -73,9 +69,6 @@ class RealTime:
             self.inbox.add(self.port.received())
         if behind := self.pace.note(world.tick, world.tick, self.pace.tick()):
             _log.warning("tick %d: %s", world.tick, behind)
-
-    def advance(self, tick: int, for_byte: bool) -> None:
-        """Only the wall clock does that."""
 
     def rest(self, tick: int) -> None:
         self.pace.sleep_until(min(tick, self.port.world.tick + HOST_CHARACTER_TICKS))

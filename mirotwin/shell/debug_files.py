@@ -43,13 +43,11 @@ def with_debug_files(image: Image) -> Image:
 
 
 def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
-    """The folders to look for C files in: those given, the image's own, and for the robot's firmware that one's."""
-    return Sources([*map(Path, given), image.path.parent, *_own_sources(image)])
+    """Where C files are looked for: the folders of --sources, the image's own, and for the robot's firmware that one's.
 
-
-def sources_of(image: Image, given: Sequence[str]) -> Sources:
-    """`source_folders` of the folders of --sources. Raises BadInput for one that is not there."""
-    return source_folders(image, checked_sources(given))
+    Raises BadInput for a folder that is not there.
+    """
+    return Sources([*map(Path, checked_sources(given)), image.path.parent, *_own_sources(image)])
 
 
 def checked_sources(given: Sequence[str]) -> Sequence[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
@@ -49,26 +49,13 @@ def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
     return {count: decoder.valid for count, decoder in decoders.items()}
 
 
-def telemetry_count(sent: Iterable[Transmission]) -> int:
-    """Valid frames from robots, whatever direction they are said to have."""
-    from miro_protocol.decoder import TelemetryDecoder
-
-    decoder = TelemetryDecoder()
-    for one in sent:
-        decoder.hear(one)
-    return decoder.valid
-
-
 def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
     """(3 or 5, what to tell the user or nothing) for a network whose first transmissions are in `head`."""
     sent = [one for one in head if one.network == network and one.direction == DOWN]
-    return chosen(frame_counts(sent), bool(sent), network)
-
-
-def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int, str]:
+    counts = frame_counts(sent)
     best = max(ROBOT_COUNTS, key=lambda count: (counts[count], -count))
     others = [count for count in ROBOT_COUNTS if count != best and counts[count]]
-    if any_data and not counts[best]:
+    if sent and not counts[best]:
         what = f"no frame of 3 or 5 robots at the beginning; {best} robots assumed"
     elif others:
         found = " and ".join(f"{amount(counts[count], 'frame')} of {count} robots" for count in ROBOT_COUNTS)
@@ -80,7 +67,12 @@ def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int
 
 def is_telemetry(head: Sequence[Transmission]) -> bool:
     """Whether raw bytes read as robots' answers rather than as a host's frames."""
-    return telemetry_count(head) > max(frame_counts(head).values())
+    from miro_protocol.decoder import TelemetryDecoder
+
+    decoder = TelemetryDecoder()
+    for one in head:
+        decoder.hear(one)
+    return decoder.valid > max(frame_counts(head).values())
 
 
 class Layouts:
