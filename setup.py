@@ -50,6 +50,8 @@ NO_DEBUG = [] if "-g" in os.environ.get("CFLAGS", "") else ["-g0"]
 # No contraction to FMA, no reassociation: the same doubles on every machine.
 # 32-bit x86 would compute in x87 registers, which round twice.
 SSE = ["-msse2", "-mfpmath=sse"] if sys.maxsize < 1 << 32 and platform.machine() in X86 else []
+# No packing of scalars: two doubles that were stored apart and are read as one vector wait for the cache.
+SCALAR = ["-fno-tree-slp-vectorize", *SSE]
 HOTTEST = re.compile(
     r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.regions"
     r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|bus_timing|encoder|pid))"
@@ -61,7 +63,7 @@ QUICKLY = ["-Og", "-finline-small-functions"]  # among them those that count ref
 # Cython's name for what runs once, at import: it is compiled without optimizing.
 ONCE = '-DCYTHON_SMALL_CODE=__attribute__((cold,optimize("O0")))'
 FLAGS = {
-    "unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w", ONCE, *SSE, *NO_DEBUG],
+    "unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w", ONCE, *SCALAR, *NO_DEBUG],
     "msvc": ["/O2", "/fp:strict"],
 }
 
