@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# No divisor below is ever zero: lengths and masses are positive.
 """The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
 
 Wheels roll without slipping (keep below 7.8 m/s2).

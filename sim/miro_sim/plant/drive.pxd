@@ -30,7 +30,7 @@ cdef class Winding:
     cdef inline void _ask(self, int wanted) noexcept
     cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(wait=int, first=int, charge=double)
+    @cython.locals(wait=int, charge=double)
     cdef inline double _pass(self, int ticks, double emf_v) noexcept
     @cython.locals(start=double, kind=cython.longlong, final=double, end=double, goes_on=cython.bint)
     cdef inline double _flow(self, int ticks, double emf_v) noexcept

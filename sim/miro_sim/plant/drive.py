@@ -139,16 +139,13 @@ class Winding:
     def _pass(self, ticks: int, emf_v: float) -> float:
         """The same unchecked; NaN where a result is not finite: the body's next angle raises DomainError."""
         wait = self.wait_ticks
-        first = ticks if wait == 0 or wait > ticks else wait
-        charge = self._flow(first, emf_v)
-        if wait == 0:
-            return charge
-        self.wait_ticks = wait - first
-        if wait == first:
-            self.drive = self.wanted
-            if first < ticks:
-                charge = charge + self._flow(ticks - first, emf_v)
-        return charge
+        if wait == 0 or wait > ticks:
+            self.wait_ticks = wait - ticks if wait else 0
+            return self._flow(ticks, emf_v)
+        charge = self._flow(wait, emf_v)
+        self.wait_ticks = 0
+        self.drive = self.wanted
+        return charge + self._flow(ticks - wait, emf_v) if wait < ticks else charge
 
     def _flow(self, ticks: int, emf_v: float) -> float:
         """The charge of an interval in which the bridge does not switch."""
