@@ -134,7 +134,7 @@ class Encoder:
     ) -> int:
         """`set_place` for edges one way (`step`) to the place of `count`, each `spacing` or more ticks after another.
 
-        The first, the last but one and the last come at these ticks. Where that does not suffice nothing is done: 0.
+        The first comes after `first_tick`, the last two at these ticks. Where that does not suffice nothing is done: 0.
         """
         quadrature = self.quadrature
         clock = first_tick & -4

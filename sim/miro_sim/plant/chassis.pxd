@@ -9,17 +9,18 @@ cdef class Body:
     cdef readonly double left_m_rad, right_m_rad, track_m, friction_nm
     cdef readonly double mass_ll, mass_lr, mass_rr, inverse_ll, inverse_lr, inverse_rr
     cdef public double left_rad_s, right_rad_s, x_m, y_m, theta_rad
-    cdef readonly double turned_left_rad, turned_right_rad
+    cdef readonly double turned_left_rad[16]
+    cdef readonly double turned_right_rad[16]
 
     @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
                    left_rub=double, right_rub=double, new_left=double, new_right=double)
-    cdef int _push(self, double left_nms, double right_nms, int ticks) except -1
+    cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
     @cython.final
     @cython.locals(left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double left, double right, double most) noexcept
-    @cython.final
-    @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
-    cdef inline int _roll(self) except -1
+    @cython.locals(x_m=double, y_m=double, theta_rad=double, step=int, left_rad=double, right_rad=double, left_m=double,
+                   right_m=double, half=double, chord_m=double, angle=double, sine=double, cosine=double)
+    cdef int _roll(self, int steps) except -1
     @cython.locals(v=double, w=double, time_s=double, half=double, chord_m=double, sine=double, cosine=double)
     cpdef tuple pose_after(self, long long ticks)
     @cython.locals(left_m_s=double, right_m_s=double)

@@ -1,5 +1,5 @@
 # cython: cdivision=True
-# No divisor below is ever zero: lengths and masses are positive.
+# No divisor below is ever zero: track and masses are positive.
 """The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
 
 Wheels roll without slipping (keep below 7.8 m/s2).
@@ -69,18 +69,20 @@ class Body:
         self.x_m = x_m
         self.y_m = y_m
         self.theta_rad = theta_rad
-        self.turned_left_rad = 0.0  # by the last push
-        self.turned_right_rad = 0.0
+        self.turned_left_rad = [0.0] * 16  # by each of the last pushes
+        self.turned_right_rad = [0.0] * 16
 
     def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
         """Applies motor impulses and friction over `ticks`; moves on at the mean of old and new speed."""
-        self._push(left_nms, right_nms, ticks)
+        self._push(left_nms, right_nms, ticks, 0)
+        self._roll(1)
 
-    def _push(self, left_nms: float, right_nms: float, ticks: int) -> None:
+    def _push(self, left_nms: float, right_nms: float, ticks: int, step: int) -> None:
+        """The same without moving on: what the shafts turn is kept as `step` of those that `_roll` looks at."""
         old_left = self.left_rad_s
         old_right = self.right_rad_s
-        self.turned_left_rad = 0.0
-        self.turned_right_rad = 0.0
+        self.turned_left_rad[step] = 0.0
+        self.turned_right_rad[step] = 0.0
         if old_left != 0.0 or old_right != 0.0 or left_nms != 0.0 or right_nms != 0.0:
             half_s = 0.5 * TICK_S * ticks
             left = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
@@ -95,10 +97,8 @@ class Body:
                 self.right_rad_s = new_right
             else:
                 self._rub(left, right, most)
-            self.turned_left_rad = half_s * (old_left + self.left_rad_s)
-            self.turned_right_rad = half_s * (old_right + self.right_rad_s)
-            if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
-                self._roll()
+            self.turned_left_rad[step] = half_s * (old_left + self.left_rad_s)
+            self.turned_right_rad[step] = half_s * (old_right + self.right_rad_s)
 
     def _rub(self, left: float, right: float, most: float) -> None:
         """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
@@ -126,19 +126,33 @@ class Body:
         self.left_rad_s = 0.0 if -most < left_rub < most else new_left
         self.right_rad_s = 0.0 if -most < right_rub < most else new_right
 
-    def _roll(self) -> None:
-        """Moves the posture along the arc that both wheels have rolled (chord, exact to the 4th power)."""
-        left_m = self.left_m_rad * self.turned_left_rad
-        right_m = self.right_m_rad * self.turned_right_rad
-        half = 0.5 * (right_m - left_m) / self.track_m
-        chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
-        angle = self.theta_rad + half
-        if not -_ANGLES < angle < _ANGLES:
-            dmath.sincos(angle)  # raises DomainError
-        sine, cosine = dmath.sincos_within(angle)
-        self.x_m = self.x_m + chord_m * cosine
-        self.y_m = self.y_m + chord_m * sine
-        self.theta_rad = self.theta_rad + 2.0 * half
+    def _roll(self, steps: int) -> None:
+        """Moves the posture along the arcs that both wheels have rolled (chords, exact to the 4th power).
+
+        A step needs the speeds of the one before, not the posture: apart, the processor does several at a time.
+        """
+        x_m = self.x_m
+        y_m = self.y_m
+        theta_rad = self.theta_rad
+        for step in range(steps):
+            left_rad = self.turned_left_rad[step]
+            right_rad = self.turned_right_rad[step]
+            if left_rad == 0.0 and right_rad == 0.0:
+                continue
+            left_m = self.left_m_rad * left_rad
+            right_m = self.right_m_rad * right_rad
+            half = 0.5 * (right_m - left_m) / self.track_m
+            chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
+            angle = theta_rad + half
+            if not -_ANGLES < angle < _ANGLES:
+                dmath.sincos(angle)  # raises DomainError
+            sine, cosine = dmath.sincos_within(angle)
+            x_m = x_m + chord_m * cosine
+            y_m = y_m + chord_m * sine
+            theta_rad = theta_rad + 2.0 * half
+        self.x_m = x_m
+        self.y_m = y_m
+        self.theta_rad = theta_rad
 
     def pose_after(self, ticks: int) -> tuple[float, float, float]:
         """Posture (m, m, rad) `ticks` after the last push at the speeds of now; changes nothing."""

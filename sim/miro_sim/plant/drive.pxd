@@ -8,7 +8,7 @@ from miro_sim.plant.rough cimport RoughBody
 
 cdef long long LONGEST_STEP, _NEVER
 cdef double TICK_S, _LARGEST
-cdef int _MOST_CROSSINGS
+cdef int _MOST_STEPS
 
 @cython.final
 cdef class Decay:
@@ -47,26 +47,22 @@ cdef class Quadrature:
     cdef readonly long long count
 
     cdef public Lm629 chip
-    cdef long long told
-    cdef int crossings
-    cdef long long cross_tick[16]
-    cdef int cross_ticks[16]
-    cdef double cross_start[16]
-    cdef double cross_moved[16]
-    cdef long long cross_count[16]
+    cdef double positions[17]
+    cdef long long counts[17]
 
-    @cython.locals(moved=double, start=double, position=double, last=cython.longlong, crossing=cython.int)
-    cpdef inline void turn(self, double radians, long long start_tick, int ticks) noexcept
-    @cython.locals(chip=Lm629)
-    cpdef void tell(self) noexcept
-    @cython.locals(least=double, step=cython.longlong, crossing=cython.int, last=cython.int, ticks=cython.int, needed=double,
-                   start=double, end=double, start_tick=cython.longlong, end_tick=cython.longlong, edges=cython.longlong, first_tick=cython.longlong,
-                   before_tick=cython.longlong, last_tick=cython.longlong, before=cython.longlong)
-    cdef int _tell_run(self, Lm629 chip) noexcept
-    @cython.locals(crossing=cython.int, tick=cython.longlong)
-    cdef void _tell_each(self, Lm629 chip) noexcept
-    @cython.locals(ticks=cython.int, moved=double, forward=cython.bint, exact=double, after=cython.longlong)
-    cdef long long _edge_tick(self, int crossing, long long count) noexcept
+    @cython.locals(c_radians='double[16]', c_ticks='long long[17]')
+    cpdef int turn(self, list radians, list ticks) except -1
+    @cython.locals(chip=Lm629, least=double, slow=cython.bint, edges=cython.longlong, position=double, count=cython.longlong,
+                   step=cython.int, moved=double, before=cython.longlong, one_way=cython.bint)
+    cdef void _turn(self, double *radians, long long *ticks, int steps) noexcept
+    @cython.locals(first=cython.int, way=cython.longlong, before=cython.longlong, step=cython.int, last_tick=cython.longlong,
+                   before_tick=cython.longlong)
+    cdef int _tell_run(self, Lm629 chip, double *radians, long long *ticks, int steps, long long edges) noexcept
+    cdef inline int _step_to(self, long long count, int step) noexcept
+    @cython.locals(step=cython.int, tick=cython.longlong)
+    cdef void _tell_each(self, Lm629 chip, double *radians, long long *ticks, int steps) noexcept
+    @cython.locals(length=cython.longlong, moved=double, forward=cython.bint, exact=double, after=cython.longlong)
+    cdef long long _edge_tick(self, double *radians, long long *ticks, int step, long long count) noexcept
     cpdef void attach(self, long long tick, Lm629 chip) noexcept
     cdef void _show(self, long long tick, Lm629 chip) noexcept
     cpdef int after_load(self) except -1
@@ -85,6 +81,7 @@ cdef class DifferentialDrive(Plant):
     cdef readonly Quadrature left_encoder, right_encoder
     cdef readonly Body body
     cdef readonly RoughBody rough
+    cdef long long ticks[17]
 
     cpdef attach(self, Lm629 left, Lm629 right)
     cpdef tuple pose_at(self, long long tick)
@@ -95,6 +92,9 @@ cdef class DifferentialDrive(Plant):
     @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, other=cython.longlong)
     cpdef int run_pulses(self, long long tick) except -1
     @cython.final
-    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int, constant=double,
+    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int, steps=cython.int, constant=double,
                    impulse=double, left_charge=double, right_charge=double)
     cdef int _run(self, long long until, long long last, long long left_tick, long long right_tick) except -1
+    @cython.final
+    @cython.locals(body=Body)
+    cdef int _move(self, int steps) except -1

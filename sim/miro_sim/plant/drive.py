@@ -32,7 +32,7 @@ LONGEST_STEP = 2048  # one PWM period
 TICK_S = 1.0 / 24e6
 _NEVER = NEVER_TICK
 _LARGEST = 1.7976931348623157e308
-_MOST_CROSSINGS = 16
+_MOST_STEPS = 16
 _KEPT = 8  # tables of decay: of 32 kB
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
@@ -211,10 +211,7 @@ class Quadrature:
         "position": ("d", -_MOST_COUNTS, _MOST_COUNTS),
         "count": ("q", -_MOST_COUNTS, _MOST_COUNTS),
     }
-    NOT_STATE = (
-        "counts_per_radian", "counts_per_turn", "chip", "told",
-        "crossings", "cross_tick", "cross_ticks", "cross_start", "cross_moved", "cross_count",
-    )  # fmt: skip
+    NOT_STATE = ("counts_per_radian", "counts_per_turn", "chip", "positions", "counts")
 
     def __init__(self, counts_per_radian: float, counts_per_turn: int = 0) -> None:
         self.counts_per_radian = counts_per_radian
@@ -222,94 +219,89 @@ class Quadrature:
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
         self.chip: Lm629 | None = None
-        self.told = 0  # the count that the chip has seen
-        # Steps since then with edges in them: their number, and of each begin, length, position, way, count at its end.
-        self.crossings = 0
-        self.cross_tick = [0] * 16
-        self.cross_ticks = [0] * 16
-        self.cross_start = [0.0] * 16
-        self.cross_moved = [0.0] * 16
-        self.cross_count = [0] * 16
+        # At the start of the last turn and at the ends of its steps.
+        self.positions = [0.0] * 17
+        self.counts = [0] * 17
 
-    def turn(self, radians: float, start_tick: int, ticks: int) -> None:
-        """Turns the shaft evenly from `start_tick` on for `ticks`; `tell` tells the LM629 of the edges."""
-        moved = radians * self.counts_per_radian
-        start = self.position
-        position = start + moved
-        self.position = position
-        last = int(position)
-        if last > position:
-            last -= 1
-        if last != self.count:
-            if self.crossings == _MOST_CROSSINGS:
-                self.tell()
-            crossing = self.crossings
-            self.cross_tick[crossing] = start_tick
-            self.cross_ticks[crossing] = ticks
-            self.cross_start[crossing] = start
-            self.cross_moved[crossing] = moved
-            self.cross_count[crossing] = last
-            self.count = last
-            self.crossings = crossing + 1
+    def turn(self, radians: list[float], ticks: list[int]) -> None:
+        """Turns the shaft in at most 16 steps between these ticks, evenly in each, and tells the LM629 of the edges."""
+        spare = [0] * (_MOST_STEPS - len(radians))
+        c_radians = radians + spare
+        c_ticks = ticks + spare
+        self._turn(c_radians, c_ticks, len(radians))
 
-    def tell(self) -> None:
-        """Tells the LM629 of the edges since the last time."""
-        if self.crossings == 0:
-            return
+    def _turn(self, radians: list[float], ticks: list[int], steps: int) -> None:
         chip = self.chip
-        if chip is not None and not self._tell_run(chip):
-            self._tell_each(chip)
-        self.crossings = 0
-        self.told = self.count
+        least = 4.0  # ticks a count in which its decoder counts each edge
+        if chip is not None:
+            least += chip.encoder.spacing
+        slow = True
+        edges = 0
+        position = self.position
+        count = self.count
+        self.positions[0] = position
+        self.counts[0] = count
+        for step in range(steps):
+            moved = radians[step] * self.counts_per_radian
+            before = count
+            position = position + moved
+            count = int(position)
+            if count > position:
+                count -= 1
+            edges += abs(count - before)
+            if abs(moved) * least > ticks[step + 1] - ticks[step]:
+                slow = False
+            self.positions[step + 1] = position
+            self.counts[step + 1] = count
+        self.position = position
+        self.count = count
+        if edges and chip is not None:
+            one_way = edges == abs(count - self.counts[0])
+            if not (slow and one_way and self._tell_run(chip, radians, ticks, steps, edges)):
+                self._tell_each(chip, radians, ticks, steps)
 
-    def _tell_run(self, chip: Lm629) -> int:
-        """Tells of them all at once, if they go one way and so slowly that the decoder counts each. Returns whether."""
+    def _tell_run(self, chip: Lm629, radians: list[float], ticks: list[int], steps: int, edges: int) -> int:
+        """Tells of edges one way all at once. Returns whether the decoder takes it."""
         if chip.encoder_edges is not None or self.counts_per_turn:
             return 0
-        step = 1 if self.count > self.told else -1
-        least = step * (chip.encoder.spacing + 4.0)  # ticks a count
-        end_tick = self.cross_tick[0]
-        end = self.cross_start[0]
-        for crossing in range(self.crossings):
-            start_tick = self.cross_tick[crossing]
-            start = self.cross_start[crossing]
-            ticks = self.cross_ticks[crossing]
-            needed = self.cross_moved[crossing] * least
-            if not 0.0 <= needed <= ticks or (start - end) * least > start_tick - end_tick:
-                return 0
-            end_tick = start_tick + ticks
-            end = start + self.cross_moved[crossing]
-        edges = step * (self.count - self.told)
-        first_tick = self._edge_tick(0, self.told)
-        last = self.crossings - 1
-        before = self.count - step
-        last_tick = self._edge_tick(last, before)
-        before_tick = first_tick
-        if edges > 2:
-            if last > 0 and self.cross_count[last - 1] == before:
-                last -= 1
-            before_tick = self._edge_tick(last, before - step)
-        return chip.encoder.set_run(first_tick, before_tick, last_tick, edges, step, self.count)
+        first = 0
+        while self.counts[first + 1] == self.counts[0]:
+            first += 1
+        way = 1 if self.count > self.counts[0] else -1
+        before = self.count - way
+        step = self._step_to(self.count, steps - 1)
+        last_tick = self._edge_tick(radians, ticks, step, before)
+        before_tick = last_tick
+        if edges > 1:
+            step = self._step_to(before, step)
+            before_tick = self._edge_tick(radians, ticks, step, before - way)
+        return chip.encoder.set_run(ticks[first], before_tick, last_tick, edges, way, self.count)
 
-    def _tell_each(self, chip: Lm629) -> None:
-        """Tells of one after the other."""
-        self.count = self.told
-        for crossing in range(self.crossings):
-            while self.count != self.cross_count[crossing]:
-                tick = self._edge_tick(crossing, self.count)
-                self.count += 1 if self.cross_moved[crossing] > 0.0 else -1
+    def _step_to(self, count: int, step: int) -> int:
+        """The step that came to this count, `step` or before."""
+        while self.counts[step] == count:
+            step -= 1
+        return step
+
+    def _tell_each(self, chip: Lm629, radians: list[float], ticks: list[int], steps: int) -> None:
+        """Tells of one edge after the other."""
+        self.count = self.counts[0]
+        for step in range(steps):
+            while self.count != self.counts[step + 1]:
+                tick = self._edge_tick(radians, ticks, step, self.count)
+                self.count += 1 if radians[step] > 0.0 else -1
                 self._show(tick, chip)
 
-    def _edge_tick(self, crossing: int, count: int) -> int:
-        """The tick of the edge that leads away from a count."""
-        ticks = self.cross_ticks[crossing]
-        moved = self.cross_moved[crossing]
+    def _edge_tick(self, radians: list[float], ticks: list[int], step: int, count: int) -> int:
+        """The tick of the edge that leads away from a count in a step."""
+        length = ticks[step + 1] - ticks[step]
+        moved = radians[step] * self.counts_per_radian
         forward = moved > 0.0
-        exact = ((count + 1 if forward else count) - self.cross_start[crossing]) * (ticks / moved)
+        exact = ((count + 1 if forward else count) - self.positions[step]) * (length / moved)
         after = int(exact)
         if not forward or after < exact:
             after += 1  # forward the first tick at or after the crossing, backward the first beyond it
-        return self.cross_tick[crossing] + min(max(after, 1), ticks)
+        return ticks[step] + min(max(after, 1), length)
 
     def attach(self, tick: int, chip: Lm629) -> None:
         """Wires the outputs to the LM629 and shows it the levels of now."""
@@ -336,8 +328,6 @@ class Quadrature:
 
     def after_load(self) -> None:
         """Raises ValueError unless A and B show the position."""
-        self.crossings = 0
-        self.told = self.count
         if not self.count <= self.position < self.count + 1:
             raise ValueError(f"count is {self.count} at position {self.position}")
 
@@ -365,7 +355,7 @@ class DifferentialDrive(Plant):
         "right_encoder": Quadrature,
         "body": Body,
     }
-    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a", "rough")
+    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a", "rough", "ticks")
 
     def __init__(
         self,
@@ -380,6 +370,7 @@ class DifferentialDrive(Plant):
         self.torque_constant_nm_a = params.motor.torque_constant_nm_a
         self.tick = 0
         self.next_tick = LONGEST_STEP
+        self.ticks = [0] * 17  # `tick` and the ends of the steps since then
         self.left_winding = Winding(params)
         self.right_winding = Winding(params)
         counts = 4 * params.encoder.lines if params.encoder.index_pulse else 0
@@ -421,19 +412,23 @@ class DifferentialDrive(Plant):
         constant = self.torque_constant_nm_a
         impulse = constant * TICK_S
         begin = self.tick
+        self.ticks[0] = begin
+        steps = 0
         now = min(begin + LONGEST_STEP, last, left_tick, right_tick)
         while now <= until:
             if begin < now:
                 ticks = now - begin
+                if steps == _MOST_STEPS:
+                    self._move(steps)
+                    steps = 0
                 if self.rough is not None:
                     self.rough.feel(begin + (ticks >> 1))
                 left_charge = self.left_winding._pass(ticks, constant * self.body.left_rad_s)
                 right_charge = self.right_winding._pass(ticks, constant * self.body.right_rad_s)
-                self.body._push(impulse * left_charge, impulse * right_charge, ticks)
-                self.left_encoder.turn(self.body.turned_left_rad, begin, ticks)
-                self.right_encoder.turn(self.body.turned_right_rad, begin, ticks)
+                self.body._push(impulse * left_charge, impulse * right_charge, ticks, steps)
+                steps += 1
+                self.ticks[steps] = now
                 begin = now
-                self.tick = now
             if now == last:
                 break
             if now == left_tick and left is not None:
@@ -441,9 +436,17 @@ class DifferentialDrive(Plant):
             if now == right_tick and right is not None:
                 right_tick = self.right_winding.pass_edge(right)
             now = min(begin + LONGEST_STEP, last, left_tick, right_tick)
+        self._move(steps)
         self.next_tick = begin + LONGEST_STEP
-        self.left_encoder.tell()
-        self.right_encoder.tell()
+
+    def _move(self, steps: int) -> None:
+        """Posture and encoders follow what the shafts turned in these steps."""
+        body = self.body
+        body._roll(steps)
+        self.left_encoder._turn(body.turned_left_rad, self.ticks, steps)
+        self.right_encoder._turn(body.turned_right_rad, self.ticks, steps)
+        self.tick = self.ticks[steps]
+        self.ticks[0] = self.tick
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""

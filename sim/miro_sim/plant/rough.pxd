@@ -21,7 +21,8 @@ cdef class RoughBody(Body):
     @cython.locals(step_s=double, half_s=double, old_left=double, old_right=double, old_v=double, old_u=double,
                    old_w=double, most_left=double, most_right=double, old_left_slip=double, old_right_slip=double,
                    left_slip=double, right_slip=double, share=double)
-    cdef int _push(self, double left_nms, double right_nms, int ticks) except -1
+    cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
+    cdef int _roll(self, int steps) except -1
     @cython.locals(most=double, hub=double)
     cdef int _resist(self, double lever_m, double step_s) except -1
     @cython.locals(squares=double, cosine=double, sine=double, v=double, u=double)

@@ -110,7 +110,7 @@ class RoughBody(Body):
         """The next push is at this tick: the disturbing force is that of then."""
         self.forces.at(tick)
 
-    def _push(self, left_nms: float, right_nms: float, ticks: int) -> None:
+    def _push(self, left_nms: float, right_nms: float, ticks: int, step: int) -> None:
         """Applies motor impulses, disturbance and friction over `ticks`; moves on at the mean of old and new speed."""
         step_s = TICK_S * ticks
         half_s = 0.5 * step_s
@@ -144,11 +144,14 @@ class RoughBody(Body):
                 self.left_play_m -= half_s * (old_left_slip + left_slip)
             if self.right_force_n == 0.0:
                 self.right_play_m -= half_s * (old_right_slip + right_slip)
-        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
-        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
+        self.turned_left_rad[step] = half_s * (old_left + self.left_rad_s)
+        self.turned_right_rad[step] = half_s * (old_right + self.right_rad_s)
         self._glide(
             half_s * (old_v + self.v_m_s), half_s * (old_u + self.u_m_s), half_s * (old_w + self.w_rad_s)
         )
+
+    def _roll(self, steps: int) -> None:
+        """A push has moved the posture already."""
 
     def _resist(self, lever_m: float, step_s: float) -> None:
         """Rolling resistance of the wheel at `lever_m` to the right of the middle."""

@@ -331,7 +331,7 @@ def test_inside_the_backlash_the_shaft_turns_alone_and_then_takes_the_wheel_alon
     turned = 0.0
     for _ in range(300):
         one.push(1e-7, 1e-7, 2048)
-        turned += one.turned_left_rad if one.v_m_s == 0.0 else 0.0
+        turned += one.turned_left_rad[0] if one.v_m_s == 0.0 else 0.0
     assert turned == pytest.approx(0.4, abs=0.01)
     assert one.v_m_s > 0.02
     assert one.slips_m_s() == pytest.approx((0.0, 0.0), abs=1e-12)
@@ -345,7 +345,7 @@ def test_a_shaft_that_reverses_goes_through_all_the_backlash_before_the_wheel_fo
     for _ in range(300):
         one.push(-1e-7, -1e-7, 2048)
         if one.v_m_s == forward_m_s:
-            turned += one.turned_left_rad - forward_m_s / one.left_m_rad * 2048 / 24e6
+            turned += one.turned_left_rad[0] - forward_m_s / one.left_m_rad * 2048 / 24e6
     assert turned == pytest.approx(-0.8, abs=0.02)
     assert one.v_m_s < 0.9 * forward_m_s
 
