@@ -1,4 +1,5 @@
 cimport cython
+from libc cimport math
 from miro_exact.dmath cimport sincos
 from miro_sim.pitch cimport rays, scene, sensor
 
@@ -10,6 +11,10 @@ cdef long long _HALF_UM, _TOP_UM
 cdef bint _enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
 @cython.locals(latest='long long')
 cdef long long _entry(long long u, long long v, long long fall_u, long long fall_v) noexcept
+@cython.locals(place=double)
+cdef int _um(double metres) noexcept
+@cython.locals(below=double)
+cdef int _rounded(double x) noexcept
 
 
 @cython.final
@@ -22,6 +27,7 @@ cdef class Camera:
     cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, upper, lower, above, below
     cdef int covered_first, covered_end
     cdef int instants[6]
+    cdef double after_s[6]
     cdef int team_paint[10]
     cdef int identity_paint[10]
     cdef long long drift_um[10]
@@ -55,8 +61,8 @@ cdef class Camera:
     cdef int seen[128]
     cdef int height_um[128]
 
-    @cython.locals(body=int, number=int, field=int, place=int, share=double, after_s=double, way_m=double, sine=double,
-                   cosine=double, least_u=int, most_u=int, least_v=int, most_v=int)
+    @cython.locals(body=int, number=int, place=int, after_s=double, way_m=double, sine=double, cosine=double,
+                   least_u=int, most_u=int, least_v=int, most_v=int)
     cpdef robot(self, int team, int identity, double x_m, double y_m, double theta_rad, double v_m_s=*, double w_rad_s=*)
     @cython.locals(cosine='long long', sine='long long', drop='long long', x='long long', y='long long')
     cdef void _stand(self, int place) noexcept

@@ -70,6 +70,7 @@ class Camera:
             "field_sets",
             "fields",
             "instants",
+            "after_s",
             "side",
             "black",
             "robots",
@@ -101,8 +102,12 @@ class Camera:
         self.fields = settings.fields
         self.sets = settings.sub_exposures * settings.fields
         self.instants = [0] * 6
-        for at in range(self.sets):
-            self.instants[at] = 4 * (at // self.field_sets) + at % self.field_sets
+        self.after_s = [0.0] * 6  # after the tick of the frame
+        for number in range(self.sets):
+            field, at = divmod(number, self.field_sets)
+            share = (at * 2 + 1) / (2.0 * self.field_sets) - 0.5
+            self.instants[number] = 4 * field + at
+            self.after_s[number] = (field - 0.5 * (self.fields - 1)) * FIELD_S + share * settings.exposure_s
         self.side = NUMBERS["side"]
         self.black = NUMBERS["top"]
         self.edges = [0] * 132  # of each rectangle
@@ -193,17 +198,15 @@ class Camera:
         self.identity_paint[body] = NUMBERS[IDENTITIES[identity]]
         least_u, most_u, least_v, most_v = _FAR_UM, -_FAR_UM, _FAR_UM, -_FAR_UM
         for number in range(self.sets):
-            field = number // self.field_sets
-            share = (number % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
-            after_s = (field - 0.5 * (self.settings.fields - 1)) * FIELD_S + share * self.settings.exposure_s
+            after_s = self.after_s[number]
             way_m = v_m_s * after_s
             sine, cosine = sincos(theta_rad + 0.5 * w_rad_s * after_s)
             place = body * _SETS + self.instants[number]
-            self.x[place] = _within_sight(_um(x_m + way_m * cosine))
-            self.y[place] = _within_sight(_um(y_m + way_m * sine))
+            self.x[place] = _um(x_m + way_m * cosine)
+            self.y[place] = _um(y_m + way_m * sine)
             sine, cosine = sincos(theta_rad + w_rad_s * after_s)
-            self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
-            self.sin[place] = math.floor(sine * 32768.0 + 0.5)
+            self.cos[place] = _rounded(cosine * 32768.0)
+            self.sin[place] = _rounded(sine * 32768.0)
             self._stand(place)
             least_u, most_u = min(least_u, self.fall_u[0]), max(most_u, self.fall_u[0])
             least_v, most_v = min(least_v, self.fall_v[0]), max(most_v, self.fall_v[0])
@@ -757,12 +760,17 @@ class Camera:
 
 
 def _um(metres: float) -> int:
-    return math.floor(metres * 1e6 + 0.5)
-
-
-def _within_sight(place: int) -> int:
     """A place in um, no further away than what is further than anything that may be seen."""
-    return max(-_FAR_UM, min(place, _FAR_UM))
+    place = metres * 1e6
+    if not place < _FAR_UM:
+        return _FAR_UM
+    return _rounded(place) if place > -_FAR_UM else -_FAR_UM
+
+
+def _rounded(x: float) -> int:
+    """The nearest whole number, the greater one of two."""
+    below = math.floor(x + 0.5)
+    return int(below)
 
 
 def _enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
