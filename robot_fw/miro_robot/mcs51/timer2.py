@@ -144,14 +144,13 @@ class Timer2:
 
     def next_flag(self) -> int:
         """The `since` with which TF2 or EXF2 will ask if nothing changes, or NEVER_TICK."""
-        if self.falls():
-            return self.synced
+        first = self.synced if self.falls() else _NEVER
         if self.control & _TF2 or self.silent():
-            return _NEVER
-        if self.rate():
-            return self.synced + self.left() - 2
-        overflow = self.next_pin_overflow()
-        return overflow - 1 if overflow < _NEVER else _NEVER
+            return first
+        overflow = self.synced + self.left() - 1 if self.rate() else self.next_pin_overflow()
+        if overflow < _NEVER and overflow - 1 < first:
+            return overflow - 1
+        return first
 
     def next_overflow_tick(self) -> int:
         """Tick at which the state ends that overflows next as a baud rate generator, or NEVER_TICK."""
