@@ -73,5 +73,8 @@ cdef class Uart:
     cdef inline void _act(self, long long now) noexcept
     @cython.locals(tick='long long', last=int)
     cdef void _deliver(self) noexcept
-    @cython.locals(fall='long long', before='long long')
+    @cython.locals(start='long long')
     cpdef long long ri_tick(self) noexcept
+    @cython.locals(tick='long long', settled='long long', change='long long')
+    cdef inline long long _start_tick(self) noexcept
+    cdef long long turn_tick(self) noexcept

@@ -358,19 +358,34 @@ class Uart:
             return self.rx_next + (_LAST_ACTION + _ROLLOVERS - self.rx_count) * self.rx_period
         if self.rx_count:
             return _flag_tick(self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period)
-        if not self.scon & _REN or not self.latch & 1:
+        start = self._start_tick()
+        return _flag_tick(start + _LAST_ACTION * self.rx_period) if start < _STOPPED else _NEVER
+
+    def _start_tick(self) -> int:
+        """The 16x tick that finds the next start bit, as far as is known; NEVER_TICK if none can come.
+
+        It follows from the level at the next 16x tick and the edges after it: a run that ends forgets earlier ones.
+        """
+        tick = self.rx_next
+        if not self.scon & _REN or tick >= _STOPPED:
             return _NEVER
-        before = self.rx_next - self.rx_period
-        fall = self.rxd.next_edge(before)
-        if self.rx_last and not self.rxd.level_at(before):
-            fall = self.rx_next  # it fell under another clock, or none: the next 16x tick finds it
-        if fall > self.rxd.settled_tick:
-            fall = self.rxd.settled_tick
-        if fall <= self.rx_next:
-            fall = self.rx_next
-        else:
-            fall += (self.rx_next - fall) % self.rx_period
-        return _flag_tick(fall + _LAST_ACTION * self.rx_period) if fall < _STOPPED else _NEVER
+        if not self.latch & 1:  # P3.0 holds RXD low
+            return tick if self.rx_last else _NEVER
+        settled = self.rxd.settled_tick
+        if tick >= settled or (self.rx_last and not self.rxd.level_at(tick)):
+            return tick
+        change = self.rxd.next_edge(tick)
+        if change > settled:
+            change = settled
+        return change + (tick - change) % self.rx_period if change < _STOPPED else _NEVER
+
+    def turn_tick(self) -> int:
+        """A tick before which nothing changes what `ri_tick` knows: a fall, the vote of a start bit, RI."""
+        if self.rx_done == _NEVER and self.rx_count == 0:
+            return self._start_tick()
+        if self.rx_done == _NEVER and self.rx_count <= _ACTION:
+            return self.rx_next + (_ACTION - self.rx_count) * self.rx_period
+        return self.ri_tick()
 
     def check_times(self, tick: int) -> None:
         """Raises ValueError unless the port goes on at `tick`: what it sends comes after the edges on TXD."""
