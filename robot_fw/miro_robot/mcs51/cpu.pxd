@@ -64,8 +64,13 @@ cdef class Cpu(Executor):
     @cython.locals(now='long long', event='long long')
     cdef int boundary(self) except -1
     @cython.final
-    @cython.locals(peripherals=Peripherals, earliest='long long', source=int, sources=int)
+    @cython.locals(peripherals=Peripherals, blocked=bint, source=int)
     cdef inline int _attend(self, long long now) except -1
+    @cython.final
+    cdef inline int _note_end(self, long long now) except -1
+    @cython.final
+    @cython.locals(turn='long long')
+    cdef int _look_for_sleep(self, long long now) except -1
     @cython.final
     cdef inline int _watch_main_loop(self, long long now) except -1
     @cython.final

@@ -245,7 +245,7 @@ class Cpu(Executor):
         ):
             self.peripherals.ports.outside[port] = levels
         else:
-            self.peripherals.ports.push(port, levels, tick)
+            self.peripherals.push(port, levels, tick)
             self.next_event = 0
             self.limit = 0
 
@@ -255,8 +255,7 @@ class Cpu(Executor):
         """Whether only a reset or a new input can make it execute another instruction."""
         if self.powered_down:
             return True
-        sources = self.peripherals.interrupts.enabled()
-        return bool(self.idle) and self.peripherals.next_event(self.cycles, sources) == _NEVER
+        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _NEVER
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -278,11 +277,7 @@ class Cpu(Executor):
         self.next_event = 0
 
     def end_run(self) -> None:
-        """TXD is final up to now; RXD before it is no longer needed.
-
-        Pins that moved during the last instruction are seen in their own cycles, before the peripherals are at its end.
-        """
-        self.peripherals.apply_pushes(self.cycles - 1)
+        """TXD is final up to now; RXD before it is no longer needed."""
         self.peripherals.sync(self.cycles)
         self.peripherals.settle()
         now = 12 * self.cycles
@@ -301,12 +296,9 @@ class Cpu(Executor):
             self.stop = _WIRE_FULL
             return 1
         if now >= self.next_event and self._attend(now):
-            return 0
+            return 1 if self.stop else 0
         event = self._next_look()
         if (self.idle or self.powered_down) and now < event:
-            if self.stop_asleep and (self.powered_down or self.next_event >= _NEVER):
-                self.stop = ASLEEP
-                return 1
             if not self._taken_over():  # nor will it be at a mark
                 event = self.next_event if self.next_event < self.until else self.until
             self.idle_cycles += event - now
@@ -320,26 +312,48 @@ class Cpu(Executor):
         return event if event < self.next_mark else self.next_mark
 
     def _attend(self, now: int) -> int:
-        """Everything due at the start of cycle `now`: 1 if that was an interrupt."""
+        """Everything due at the start of cycle `now`: 1 if that was an interrupt, or ends the run.
+
+        A run ends before the pins of `now` are sampled: its state is that of any run that ends there.
+        """
         peripherals = self.peripherals
+        peripherals.sync(now)
+        blocked = self.blocked == now or self.powered_down
+        source = -1 if blocked else peripherals.interrupts.choose(now)
+        if source < 0:
+            self._note_end(now)
+        if self.stop:
+            return 1
         peripherals.apply_pushes(now)
         peripherals.sample_pins(now)
-        peripherals.sync(now)
-        if self.powered_down:
-            self.next_event = peripherals.ports.next_cycle
-            return 0
-        earliest = now + 1
-        if self.blocked != now:
-            source = peripherals.interrupts.choose(now)
-            if source >= 0:
-                self._enter(source)
-                return 1
-            earliest = now
-        sources = peripherals.interrupts.enabled() if self.idle else peripherals.interrupts.open()
-        self.next_event = peripherals.next_event(earliest, sources)
+        if source >= 0:
+            self._enter(source)
+            return 1
+        self.next_event = peripherals.next_event(now + 1 if blocked else now)
         if self.next_event <= now:  # all of now is done: nothing that is due may hold time up
             self.next_event = now + 1
+        if self.stop_asleep and self.idle:
+            self._look_for_sleep(now)
         return 0
+
+    def _note_end(self, now: int) -> None:
+        """Whether a mark, or sleep that nothing known ends, ends the run at the start of cycle `now`."""
+        if not self.idle and not self.powered_down:
+            if self.lines[self.pc] & _MARK:
+                self.stop = BREAKPOINT
+        elif self.stop_asleep:
+            self.peripherals.settle()
+            if self.asleep():
+                self.stop = ASLEEP
+
+    def _look_for_sleep(self, now: int) -> None:
+        """Looks up again when less may be known of what ends idle mode: then nothing may be left."""
+        self.peripherals.settle()
+        turn = self.peripherals.serial_turn()
+        if self.next_event >= _NEVER:
+            self.next_event = now + 1
+        elif turn < self.next_event:
+            self.next_event = turn
 
     def _watch_main_loop(self, now: int) -> None:
         """Once a millisecond: a fault if interrupts held the CPU at all marks for `main_loop_limit` cycles."""
@@ -386,7 +400,7 @@ class Cpu(Executor):
 
     def _expect(self, earliest: int) -> None:
         """What is due next may have changed; nothing that the pins ask for has."""
-        self.next_event = self.peripherals.next_event(earliest, self.peripherals.interrupts.open())
+        self.next_event = self.peripherals.next_event(earliest)
         self.limit = 0 if self.stop or self.txd.full else self._next_look()
 
     # Special function registers
@@ -443,8 +457,7 @@ class Cpu(Executor):
             self.next_event = 0
         elif value & _IDL:
             self.idle = 1
-            if self.stop_asleep or self.peripherals.interrupts.in_service:
-                # An event that has become later must not keep it awake; what was not waited for may end its sleep.
+            if self.stop_asleep:  # an event that has become later must not keep it awake
                 self.next_event = 0
         self.limit = 0
 
@@ -452,6 +465,8 @@ class Cpu(Executor):
         if value != self.peripherals.ports.latches[port]:
             if port == 3:
                 self.peripherals.write_p3(value, self.cycles)
+            elif port == 1:
+                self.peripherals.sync(self.cycles)
             self.peripherals.ports.latches[port] = value  # the pins follow with the next cycle
             if port & 1:  # P1 and P3 carry sampled inputs
                 self.next_event = 0

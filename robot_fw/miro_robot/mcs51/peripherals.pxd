@@ -58,16 +58,19 @@ cdef class Peripherals:
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
-    @cython.locals(event='long long', flag='long long')
-    cpdef long long next_event(self, long long now, int sources) except *  # Cython 3.2 writes -1 wrongly in a final class
+    @cython.locals(event='long long', flag='long long', sources=int)
+    cpdef long long next_event(self, long long now) except *  # Cython 3.2 writes -1 wrongly in a final class
     @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
+    @cython.locals(tick='long long')
+    cdef long long serial_turn(self) noexcept
     cdef int clock_serial(self) except -1
     @cython.locals(mode=int, next1='long long', period1='long long', next2='long long', period2='long long',
                    rx2=int, tx2=int)
     cdef void _set_serial_clock(self) noexcept
     @cython.locals(cycle='long long')
     cdef long long _timer1_tick(self) noexcept
+    cdef int push(self, int port, int levels, long long tick) except -1
     @cython.locals(cycle='long long')
     cdef int apply_pushes(self, long long now) except -1
     @cython.locals(ports=Ports, p1=int, p3=int, changed1=int, changed3=int)

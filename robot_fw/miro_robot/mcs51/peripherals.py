@@ -124,7 +124,10 @@ class Peripherals:
                 self._catch_up(cycle)
 
     def _catch_up(self, cycle: int) -> None:
-        """Something is due below `cycle`, or may be."""
+        """Something is due below `cycle`, or may be: first of all what pins did, in their own cycles."""
+        if self.ports.next_cycle < cycle:
+            self.apply_pushes(cycle - 1)
+            self.now = cycle
         if self.pulsed:
             self._sync_pulsed(cycle)
         else:
@@ -138,11 +141,13 @@ class Peripherals:
             self._note_quiet()
 
     def _note_quiet(self) -> None:
-        """`timer_wait` or `serial_wait` is new, or timer 2 sleeps or wakes."""
+        """`timer_wait`, `serial_wait` or the first push is new, or timer 2 sleeps or wakes."""
         self.quiet = -1
         if self.timer2.sleeps and not self.pulsed:
             serial = self.serial_wait // 12
             self.quiet = serial if serial < self.timer_wait else self.timer_wait
+            if self.ports.next_cycle < self.quiet:
+                self.quiet = self.ports.next_cycle
 
     def look_again(self) -> None:
         """What timers and serial port wait for has to be worked out."""
@@ -190,16 +195,17 @@ class Peripherals:
         tx = timer2 if self.timer2.control & _TCLK else ticks1
         self.uart.pulse(rx, tx, 12 * cycle + _S5P2)
 
-    def next_event(self, now: int, sources: int) -> int:
+    def next_event(self, now: int) -> int:
         """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or NEVER_TICK.
 
-        `sources`, as bits of IE: whose flags are waited for; that of the serial port always, which the bus is told of.
+        The flags of the serial port are waited for though a routine may hold their interrupt off: the bus is told.
         """
         event = self.interrupts.next_boundary(now)
         if self.ports.next_cycle < event:
             event = self.ports.next_cycle
         if self.frozen:
             return event
+        sources = self.interrupts.open()
         if sources & _BOTH_TIMERS:
             flag = self.timers.next_flag(sources) + 2
             if flag < event:
@@ -216,6 +222,13 @@ class Peripherals:
                 if flag < event:
                     event = flag
         return event
+
+    def serial_turn(self) -> int:
+        """The first cycle in which more may be known of the next flag of the serial port, which is up to date."""
+        tick = self.uart.turn_tick()
+        if self.serial_wait < tick:
+            tick = self.serial_wait
+        return tick // 12 + 1 if tick < _STOPPED else _NEVER
 
     def serial_tick(self) -> int:
         """A tick before which neither TI nor RI will go up."""
@@ -273,6 +286,11 @@ class Peripherals:
         return 12 * cycle + _S5P2 if cycle < _NEVER else _NEVER
 
     # Pins
+
+    def push(self, port: int, levels: int, tick: int) -> None:
+        """The outside puts `levels` on the pins of `port` at `tick`."""
+        self.ports.push(port, levels, tick)
+        self.quiet = -1
 
     def apply_pushes(self, now: int) -> None:
         """Lets the outside's pushes up to cycle `now` take effect, each in its own cycle."""

@@ -1,7 +1,7 @@
 """A CPU with a recording bus, and short cuts for running assembled lines on it."""
 
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.cpu import REACHED, Cpu
 from tests.robot.mcs51.asm import SFRS, assemble
 
 
@@ -62,3 +62,12 @@ def run_to_loop(text, cycles=100_000):
 
 def sfr(cpu, name):
     return cpu.sfr(SFRS[name])
+
+
+def whole_and_cut(prepare, until):
+    """Two CPUs of `prepare()`: one runs to cycle `until` in one piece, one stops after each cycle it can stop in."""
+    whole, cut = prepare(), prepare()
+    whole.run(until)
+    while cut.cycles < until and cut.run(cut.cycles + 1) == REACHED:
+        pass
+    return whole, cut
