@@ -105,19 +105,21 @@ class BareTarget(Target):
         self.line = BareLine(crystal_hz, bit_ticks, self.processor.begin_tick)
         self.oracle = BareOracle(self.processor.bus, self.processor.cpu)
         harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks)
-        program = Program(INPUTS.index(input), repair=self._repaired, character_ticks=_BITS * bit_ticks)
+        program = Program(
+            INPUTS.index(input),
+            repair=lambda body: self._repaired(body, self.program.frames - 1),
+            character_ticks=_BITS * bit_ticks,
+        )
         super().__init__(image, harness, program)
         self.code = 0
         self._wrong = ""
 
-    def _repaired(self, body: bytes) -> bytes:
+    def _repaired(self, body: bytes, number: int | None = None) -> bytes:
         """The characters of a frame. Raises BadInput where the wire format fails itself."""
         protocol = self.protocol
         if protocol is None:
             return body
-        return _asked(
-            protocol.repair, lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1)))
-        )
+        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
@@ -190,16 +192,10 @@ class BareTarget(Target):
                 protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples())
             )
         if self.input == "bytes":
-            each = [self._repaired_sample(body) for body in samples]
+            each = [self._repaired(body) for body in samples]
         else:
             each = [frame_input(body, self.input) for body in samples]
         return list(dict.fromkeys([*each, b"".join(each)]))
-
-    def _repaired_sample(self, body: bytes) -> bytes:
-        protocol = self.protocol
-        if protocol is None:
-            return body
-        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body))))
 
     def __repr__(self) -> str:
         return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"

@@ -14,7 +14,7 @@ from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
-from miro_robot.image import SPACE_BYTES, Image
+from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
@@ -152,13 +152,6 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = False
 
 
-def load_bare_firmware(path: str | None) -> Image:
-    """The image of --bare, of any size that fits into a processor. Raises UsageError without one."""
-    if path is None:
-        raise click.UsageError("--bare needs an IMAGE.ihx.")
-    return load_firmware(path, SPACE_BYTES)
-
-
 def bare_spec(options: FuzzOptions, engine: Literal["compiled", "python"]) -> TargetSpec:
     """What the processes of the engine run."""
     parameters = {"crystal_hz": options.crystal, "boot_ms": options.boot_ms}
@@ -194,7 +187,9 @@ def fuzz(options: FuzzOptions) -> int:
     Exit code 1: something was found and confirmed, or --covering was not reached.
     """
     active = cast(Literal["compiled", "python"], engines.active())
-    firmware = load_bare_firmware(options.image) if options.bare else load_firmware(options.image)
+    if options.bare and options.image is None:
+        raise click.UsageError("--bare needs an IMAGE.ihx.")
+    firmware = load_firmware(options.image, SPACE_BYTES if options.bare else FLASH_BYTES)
     robots, slot = int(options.robots), options.slot
     if slot >= robots:
         raise click.UsageError(f"--slot {slot} does not exist among {robots} robots; give 0 to {robots - 1}.")

@@ -62,10 +62,6 @@ class AnnotatedImage:
         self.image = image
         self.names = SymbolNames(image)
 
-    @property
-    def has_lines(self) -> bool:
-        return bool(self.debug.lines)
-
     def place(self, pc: int, tick: int) -> CodeLocation:
         line = self.debug.line_at(pc)
         text = " ".join(disassemble(self.image.code, pc, self.names).split())

@@ -62,8 +62,8 @@ def diff(options: DiffOptions) -> int:
     """
     compare, sources = options.compare, checked_sources(options.sources)
     a, b = file_in(options.a), file_in(options.b)
-    recordings = _read(a), _read(b)
-    made = _made(recordings[0], a), _made(recordings[1], b)
+    made = _made(a), _made(b)
+    recordings = made[0].recording, made[1].recording
     origins = list(source_differences(*made))
     notes: list[str] = []
     one, other = _same_robots(recordings, notes)
@@ -77,7 +77,7 @@ def diff(options: DiffOptions) -> int:
     exact = ExactDifference()
     if found:
         annotated = [annotated_of(one.image, images, sources) for one in made if one.image is not None]
-        exact = locate((a, b), recordings, made, annotated, found, notes)
+        exact = locate(made, annotated, found, notes)
 
     if not options.quiet and not compare.as_json:
         _print_sources(origins)
@@ -116,9 +116,10 @@ def _read(path: str) -> Recording:
     return recording
 
 
-def _made(recording: Recording, path: str) -> Made:
+def _made(path: str) -> Made:
+    recording = _read(path)
     scenario = parse_scenario(recording.source.scenario_text, f"{path}: scenario.toml")
-    return Made(recording.source, scenario, image_if_any(recording, path))
+    return Made(path, recording, scenario, image_if_any(recording, path))
 
 
 def _same_robots(recordings: tuple[Recording, Recording], notes: list[str]) -> tuple[Recording, Recording]:

@@ -35,11 +35,20 @@ class SourceDifference(msgspec.Struct, frozen=True):
 
 
 class Made(msgspec.Struct, frozen=True):
-    """What a recording was made from. `image` None: what it holds is none."""
+    """A recording, and what it was made from. `image` None: what it holds is none."""
 
-    source: RunSource
+    path: str
+    recording: Recording
     scenario: Scenario
     image: Image | None
+
+    @property
+    def source(self) -> RunSource:
+        return self.recording.source
+
+    def repeating(self, period: int, scripted: bool) -> World | None:
+        """See `rerun.job.repeating`."""
+        return repeating(self.recording, self.path, period, scripted)
 
 
 def source_differences(one: Made, other: Made) -> Iterator[SourceDifference]:
@@ -87,7 +96,7 @@ def _shown(value: Any) -> str:
     return "nothing" if value is None else str(value)
 
 
-Both = tuple[Recording, Recording]
+Both = tuple[Made, Made]
 
 
 class ExactDifference(msgspec.Struct, frozen=True):
@@ -106,20 +115,15 @@ class ExactDifference(msgspec.Struct, frozen=True):
 
 
 def locate(
-    paths: tuple[str, str],
-    recordings: Both,
-    made: tuple[Made, Made],
-    annotated: Sequence[AnnotatedImage],
-    found: Sequence[Difference],
-    notes: list[str],
+    made: Both, annotated: Sequence[AnnotatedImage], found: Sequence[Difference], notes: list[str]
 ) -> ExactDifference:
     """Runs both again as far as their digests allow; `notes` gets what could not be done, and why."""
     period = min(one.period for one in found)
-    first = _first_period(recordings, period)
+    first = _first_period(made, period)
     worlds = None
     try:
-        with plain_parameters(paths[0]):
-            worlds = _repeating(paths, recordings, first, notes)
+        with plain_parameters(made[0].path):
+            worlds = _repeating(made, first, notes)
     except BadInput as error:
         notes.append(f"they cannot be run again: {error}")
     if worlds is None:
@@ -132,35 +136,28 @@ def locate(
             " is in neither recording (another version of this program, or values that were changed)"
         )
         return ExactDifference(period)
-    return ExactDifference(
-        period, state, _firmwares(paths, recordings, made, annotated, _seen_tick(found), scripted)
-    )
+    return ExactDifference(period, state, _firmwares(made, annotated, _seen_tick(found), scripted))
 
 
-def _first_period(recordings: Both, period: int) -> int:
+def _first_period(made: Both, period: int) -> int:
     """Where the states differ first, by the digests; else the one before what was seen when `period` began."""
-    one, other = recordings
+    one, other = made
     if one.source.state == other.source.state:
-        for here, there in zip(one.periods, other.periods, strict=False):
+        for here, there in zip(one.recording.periods, other.recording.periods, strict=False):
             if here.digest != there.digest:
                 return here.index
     return max(0, period - 1)
 
 
-def _repeating(
-    paths: tuple[str, str], recordings: Both, period: int, notes: list[str]
-) -> tuple[World, World, bool] | None:
+def _repeating(made: Both, period: int, notes: list[str]) -> tuple[World, World, bool] | None:
     for scripted in (False, True):
-        worlds = [
-            repeating(recording, path, period, scripted)
-            for recording, path in zip(recordings, paths, strict=True)
-        ]
-        if worlds[0] is not None and worlds[1] is not None:
-            return worlds[0], worlds[1], scripted
+        one, other = (each.repeating(period, scripted) for each in made)
+        if one is not None and other is not None:
+            return one, other, scripted
     which = " and ".join(
         word
-        for word, recording, path in zip("AB", recordings, paths, strict=True)
-        if all(repeating(recording, path, period, scripted) is None for scripted in (False, True))
+        for word, each in zip("AB", made, strict=True)
+        if all(each.repeating(period, scripted) is None for scripted in (False, True))
     )
     whose = f"{which} does" if len(which) == 1 else "they do"
     notes.append(
@@ -176,12 +173,7 @@ def _seen_tick(found: Sequence[Difference]) -> int:
 
 
 def _firmwares(
-    paths: tuple[str, str],
-    recordings: Both,
-    made: tuple[Made, Made],
-    annotated: Sequence[AnnotatedImage],
-    tick: int,
-    scripted: bool,
+    made: Both, annotated: Sequence[AnnotatedImage], tick: int, scripted: bool
 ) -> FirmwareDifference | None:
     """Where the firmwares go apart, in runs that differ in nothing else."""
     alike = made[0].scenario == made[1].scenario and made[0].source.seed == made[1].source.seed
@@ -189,6 +181,6 @@ def _firmwares(
         return None
 
     def make(image: Image) -> World:
-        return world_of(recordings[0], paths[0], image, scripted)
+        return world_of(made[0].recording, made[0].path, image, scripted)
 
     return first_instruction(make, annotated[0], annotated[1], tick + LOOK_TICKS)

@@ -22,29 +22,6 @@ LINES = 5
 """Failures of one check that are listed."""
 
 
-def is_in_file(text: str) -> bool:
-    """Whether `--expect` names a function in a file: FILE.py:FUNCTION."""
-    path, _, function = text.rpartition(":")
-    return path.endswith(".py") and function.isidentifier()
-
-
-def refuse_files(given: Sequence[str]) -> None:
-    """Raises UsageError for a check in a file: only firmware on a bare processor is judged by one."""
-    for text in given:
-        if is_in_file(text):
-            what = "a check in a file is for firmware on a bare processor, and given by --check"
-            remedy = (
-                "a check of a run is in an installed distribution, and named by its key:"
-                " `mirotwin examples checks` writes one of your own; pip install it"
-            )
-            raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
-
-
-def as_setting(text: str) -> str:
-    """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
-    return f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true"
-
-
 EXPECT = Option(
     "--expect",
     metavar="KEY[=VALUE]",
@@ -60,9 +37,20 @@ CHECK = Option(
 
 
 def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
-    """What --expect was given, as settings of the scenario. Raises UsageError for a check in a file."""
-    refuse_files(expected)
-    return tuple(map(as_setting, expected))
+    """What --expect was given, as settings of the scenario; a KEY alone is a check with its defaults.
+
+    Raises UsageError for a check in a file, FILE.py:FUNCTION: only firmware on a bare processor is judged by one.
+    """
+    for text in expected:
+        path, _, function = text.rpartition(":")
+        if path.endswith(".py") and function.isidentifier():
+            what = "a check in a file is for firmware on a bare processor, and given by --check"
+            remedy = (
+                "a check of a run is in an installed distribution, and named by its key:"
+                " `mirotwin examples checks` writes one of your own; pip install it"
+            )
+            raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
+    return tuple(f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true" for text in expected)
 
 
 def told(checks: Checks) -> Iterator[tuple[bool, str]]:

@@ -27,7 +27,6 @@ from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check
 
 MARKER = "@pytest.mark.mirotwin"
-KEYS = ("scenario", "settings", "firmware", "seed", "expect", "boot")
 
 
 class RigOptions(msgspec.Struct, frozen=True):
@@ -81,6 +80,7 @@ _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "expect": ((dict,), "a table of checks"),
     "boot": ((bool,), "True or False"),
 }
+KEYS = tuple(_TYPES)
 
 
 def _check_key(key: str, value: Any) -> None:

@@ -56,7 +56,9 @@ def wire_tokens(robots: int) -> dict[str, bytes]:
     found = {"preamble": form.lead, "sync": form.sync, "begin": form.lead + form.sync}
     still = ((0, 0),) * robots
     messages: list[Message] = [TeamFrame(kind, 1, still) for kind in (FrameType.TEAM, FrameType.TEAM_ASK)]
-    messages += [ServiceFrame(1, 0, opcode, _lowest(opcode)) for opcode in Opcode]
+    messages += [
+        ServiceFrame(1, 0, opcode, tuple(field.low for field in SERVICE_DATA[opcode])) for opcode in Opcode
+    ]
     return found | {describe(message): encode(message, robots) for message in messages}
 
 
@@ -71,10 +73,6 @@ def message_tokens(robots: int) -> dict[str, bytes]:
             for value in (field.low, field.high, min(field.high + 1, (1 << 8 * field.size) - 1)):
                 limits[f"{field.name} {value}"] = value.to_bytes(field.size, "little")
     return heads | limits
-
-
-def _lowest(opcode: Opcode) -> tuple[int, ...]:
-    return tuple(field.low for field in SERVICE_DATA[opcode])
 
 
 def _unique(named: Mapping[str, bytes]) -> list[tuple[str, bytes]]:

@@ -98,7 +98,9 @@ class Unwinder:
             base = sp - height
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
-            known = entry >= 0 and (entry == 0 or (base > 0 and (by_interrupt or self._follows_call(back))))
+            known = entry >= 0 and (
+                entry == 0 or (base > 0 and (by_interrupt or self.call_before(back) >= 0))
+            )
             found.append(StackFrame(pc, entry if entry >= 0 else pc, base, by_interrupt, known))
             if entry == 0 or not known:
                 break
@@ -120,9 +122,6 @@ class Unwinder:
             if is_call(self.code[place]) and (self.code[place] == 0x12) == (size == _LCALL_BYTES):
                 return place
         return -1
-
-    def _follows_call(self, address: int) -> bool:
-        return self.call_before(address) >= 0
 
 
 def _agreed(ways: list[tuple[int, int]], own: int) -> tuple[int, int] | None:

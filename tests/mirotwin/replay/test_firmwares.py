@@ -9,8 +9,7 @@ from miro_robot.image import Symbols
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
 from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
-from mirotwin.replay.firmwares import first_instruction
-from mirotwin.replay.moved import moved
+from mirotwin.replay.firmwares import first_instruction, moved
 from mirotwin.replay.state_fields import extents, name_of_byte
 from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
