@@ -25,7 +25,7 @@ cdef class Camera:
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
     cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, upper, lower, above, below
-    cdef int covered_first, covered_end
+    cdef int covered_first, covered_end, lanes, times
     cdef int instants[6]
     cdef double after_s[6]
     cdef int team_paint[10]
@@ -86,7 +86,7 @@ cdef class Camera:
     @cython.locals(place=int, reach=int, x='long long', y='long long', u='long long', v='long long',
                    beside_u='long long', beside_v='long long')
     cdef inline long long _beside(self, int body, int pixel) noexcept
-    @cython.locals(bounds=int, column=int, number=int, at=int)
+    @cython.locals(bounds=int, still=bint, column=int, number=int, at=int, line=int)
     cdef void _find_corners(self, int body, int row, int left, int right) noexcept
     @cython.locals(rays=rays.Rays, x='double[4]', y='double[4]', u='int[4]', v='int[4]',
                    cosine=double, sine=double, shift_u=double, shift_v=double, column='long long', lane='long long',
@@ -99,11 +99,12 @@ cdef class Camera:
     cdef inline bint _inside(self, int column, int at) noexcept
     @cython.locals(beside=bint)
     cdef inline bint _outside(self, int column, int at) noexcept
-    @cython.locals(total='long long')
+    @cython.locals(whole=bint, total='long long')
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
-    @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, team=int, identity=int,
-                   total='long long')
+    @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, total='long long')
     cdef long long _alone(self, int body, int row, int column) noexcept
+    @cython.locals(packed='long long *', team=int, identity=int, total='long long')
+    cdef long long _paint_top(self, int body, int row, int column, int on_top) noexcept
     @cython.locals(at=int)
     cdef inline int _within(self, int row, int column, int box) noexcept
     @cython.locals(across_u=bint, across_v=bint, within=int, first=int, lane='long long')
@@ -140,7 +141,7 @@ cdef class Camera:
     cdef int _count_entering(self) noexcept
     @cython.locals(a=int, b=int, c=int, d=int, column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int* corners) noexcept
-    @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, number=int, at=int, body=int, sample=int, paint=int,
+    @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, number=int, at=int, first=int, open_paint=int, body=int, sample=int, paint=int,
                    height=int, ball=int, total='long long')
     cdef long long _samples(self, int row, int column) noexcept
     @cython.locals(fall_u='long long', fall_v='long long', sample=int, u='long long', v='long long', index=int,

@@ -83,7 +83,7 @@ class Camera:
         *("corner_u", "corner_v", "line_least_u", "line_most_u", "line_least_v", "line_most_v"),
         *("least_u", "most_u", "least_v", "most_v"),
         *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
-        *("above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
+        *("lanes", "times", "above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
         *("u", "v", "seen", "height_um"),
     )
 
@@ -144,6 +144,7 @@ class Camera:
         self.total = [0] * 4096
         self.first = 0
         self.samples = 16
+        self.lanes = self.times = 1  # instants of a field that are worked out, and how often each one counts
         self.upper = -1
         self.lower = -1
         self.above = 0
@@ -289,7 +290,7 @@ class Camera:
             if self.covered[at + column]:
                 sure = self.covered[at + column] == _SURE
                 total = self.total[at + column] if sure else self._samples(row, column)
-                self.sensor.put(column, total, self.scene.light(row * _WIDTH + column))
+                self.sensor.put(column, total, self.scene.light[row * _WIDTH + column])
 
     # ---- one robot
 
@@ -300,7 +301,7 @@ class Camera:
             self.covered[at] = 0
         self.covered_first, self.covered_end = _WIDTH, 0
         pixel = (top + height // 2) * _WIDTH + first + width // 2
-        most = (width + height + 6) * self.rays.spread_um  # neighbours are no further apart than two spreads
+        most = (width // 2 + height // 2 + 3) * self.rays.stride_um
         for body in range(self.robots):
             if self._beside(body, pixel) <= most:
                 self._cover_with(body, top, bottom, first, end)
@@ -353,14 +354,20 @@ class Camera:
         return max(beside_u, beside_v) - self.drift_um[body] - self.rays.spread_um - _ROUNDED_UM
 
     def _find_corners(self, body: int, row: int, left: int, right: int) -> None:
-        """The corners above a line, from `left` to `right`, in the axes of a robot; their bounds over all instants."""
+        """The corners above a line, from `left` to `right`, in the axes of a robot; their bounds over all instants.
+
+        Where a robot stands still, all instants of a field are like its first one.
+        """
         bounds = (row & 1) * _LINE
         for column in range(bounds + left, bounds + right + 1):
             self.line_least_u[column] = self.line_least_v[column] = _FAR_UM
             self.line_most_u[column] = self.line_most_v[column] = -_FAR_UM
-        for number in range(self.sets):
+        still = self.drift_um[body] == _ROUNDED_UM
+        self.lanes = 1 if still else self.field_sets
+        self.times = self.field_sets if still else 1
+        for number in range(0, self.sets, self.times):
             at = self.instants[number]
-            line = 4 * (at // 4 * _FIELD + bounds) + at % 4
+            line = 4 * ((at >> 2) * _FIELD + bounds) + (at & 3)
             self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
 
     def _turn_corners(self, place: int, corner: int, line: int, bounds: int, left: int, right: int) -> None:
@@ -435,12 +442,17 @@ class Camera:
 
     def _cover_pixel(self, body: int, row: int, column: int, index: int) -> None:
         """A pixel in which a robot may be seen: its paints, added over all samples and instants."""
-        if self._outside(column, 12 * body + 4 * _REACH):
+        whole = self._inside(column, 4 * _TOP)
+        if not whole and self._outside(column, 12 * body + 4 * _REACH):
             return
         if self.covered[index] or self.drift_um[body] > _FAST_UM:
             self.covered[index] = _UNSURE
             return
-        total = self._alone(body, row, column)
+        total = (
+            self._paint_top(body, row, column, 16 * self.field_sets)
+            if whole
+            else self._alone(body, row, column)
+        )
         if total != 0:
             self.covered[index] = _SURE if total > 0 else _UNSURE
             self.total[index] = total
@@ -465,12 +477,18 @@ class Camera:
             if entered < whole:
                 total = (whole - entered) * scene.packed[behind]
             total += (entered - on_top) * scene.packed[self.side]
-        if on_top:
-            team = self._within(row, column, _TEAM)
-            identity = self._within(row, column, _IDENTITY) if team < on_top else 0
-            total += team * scene.packed[self.team_paint[body]]
-            total += identity * scene.packed[self.identity_paint[body]]
-            total += (on_top - team - identity) * scene.packed[self.black]
+        return total + self._paint_top(body, row, column, on_top) if on_top else total
+
+    def _paint_top(self, body: int, row: int, column: int, on_top: int) -> int:
+        """The paints of those samples of a pixel that see the top."""
+        packed = self.scene.packed
+        team = self._within(row, column, _TEAM)
+        identity = self._within(row, column, _IDENTITY) if team < on_top else 0
+        total = (on_top - team - identity) * packed[self.black]
+        if team:
+            total += team * packed[self.team_paint[body]]
+        if identity:
+            total += identity * packed[self.identity_paint[body]]
         return total
 
     def _within(self, row: int, column: int, box: int) -> int:
@@ -497,11 +515,11 @@ class Camera:
 
     def _turn(self, row: int, column: int, at: int) -> None:
         """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
-        self.above = 4 * (at // 4 * _FIELD + (row & 1) * _LINE + column) + at % 4
-        self.below = 4 * (at // 4 * _FIELD + (~row & 1) * _LINE + column) + at % 4
+        self.above = 4 * ((at >> 2) * _FIELD + (row & 1) * _LINE + column) + (at & 3)
+        self.below = 4 * ((at >> 2) * _FIELD + (~row & 1) * _LINE + column) + (at & 3)
         if self.fields == 2:
-            self.first, self.samples = 8 * (at // 4), 8
-            self.upper, self.lower = at // 4 - 1, 0 - at // 4
+            self.first, self.samples = 8 * (at >> 2), 8
+            self.upper, self.lower = (at >> 2) - 1, 0 - (at >> 2)
 
     def _lay(
         self, corners: list[int], at: list[int], by: list[int], right: list[int], bend: list[int]
@@ -550,7 +568,7 @@ class Camera:
 
     def _add(self, within: list[int]) -> int:
         """What is counted at the instants of a field."""
-        return within[0] + within[1] + within[2] if self.field_sets == 3 else within[0]
+        return within[0] + within[1] + within[2] if self.lanes == 3 else within[0] * self.times
 
     def _count_both(self) -> int:
         """The same along both axes."""
@@ -619,12 +637,12 @@ class Camera:
             around = (most_u[lane] - u) * abs(along_v) + (most_v[lane] - v) * abs(along_u)
             off[lane], over[lane] = middle - around, middle + around
         gone = crossed_u = crossed_v = crossed = 0
-        for lane in range(self.field_sets):
+        for lane in range(self.lanes):
             gone += outside[lane] | (off[lane] > 0.0)
             crossed |= over[lane] > 0.0
             crossed_u |= across_u[lane]
             crossed_v |= across_v[lane]
-        if gone == self.field_sets:
+        if gone == self.lanes:
             return 0
         if crossed:
             return self._count_entering()
@@ -710,16 +728,19 @@ class Camera:
                 self._find_corners(body, row, column, column + 1)
                 self._find_corners(body, row + 1, column, column + 1)
                 for number in range(self.sets):
-                    self._turn(row, column, self.instants[number])
-                    self._see(body, self.instants[number], pixel)
+                    at = self.instants[number]
+                    self._turn(row, column, at if self.times == 1 else at & 4)
+                    self._see(body, at, pixel)
         total = 0
-        for number in range(self.sets):
-            at = self.instants[number]
-            self._turn(row, column, at)
-            for sample in range(self.first, self.first + self.samples):
+        for sample in range(16):
+            first = (sample >> 3) * 4 if self.fields == 2 else 0
+            open_paint = -1
+            for at in range(first, first + self.field_sets):
                 paint, height = self.seen[16 * at + sample], self.height_um[16 * at + sample]
                 if paint == _OUT:
-                    paint = behind if behind != _MIXED else scene.sample(pixel, sample)
+                    if open_paint < 0:
+                        open_paint = behind if behind != _MIXED else scene.sample(pixel, sample)
+                    paint = open_paint
                 elif ball_seen and height < _TOP_UM:
                     ball = scene.ball_above(pixel, sample, height)
                     paint = ball if ball >= 0 else paint

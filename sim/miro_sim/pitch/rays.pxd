@@ -21,5 +21,5 @@ cdef class Rays:
     cdef _gather(self)
     @cython.locals(widest='long long', x='long long', y='long long', i=int, j=int, corner=int, at=int, pixel=int)
     cdef long long _spread(self) noexcept
-    @cython.locals(widest='long long', x='long long', y='long long', j=int, pixel=int)
+    @cython.locals(widest='long long', x='long long', y='long long', pixel=int, other=int)
     cdef long long _stride(self) noexcept

@@ -30,7 +30,7 @@ class Rays:
     """The rays of one camera. Constant. All lengths in um, in the paper's axes.
 
     `spread_um`: no sample of a pixel is further than this from the mean of its corners, on the floor and at the top,
-    rounding included. `stride_um`: nor are the middles of two neighbours in a row from each other, at the top.
+    rounding included. `stride_um`: nor are the middles of two neighbours from each other, at the top.
     """
 
     NOT_STATE = (
@@ -112,12 +112,15 @@ class Rays:
         return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
 
     def _stride(self) -> int:
-        """The longest way from the middle of a pixel to that of its neighbour, both at the height of the tops."""
+        """The longest way from the middle of a pixel to that of a neighbour, both at the height of the tops."""
         widest = 0
-        for j in range(_HEIGHT):
-            for pixel in range(j * _WIDTH + 1, (j + 1) * _WIDTH):
-                x = self.middle_x[pixel] - self.middle_x[pixel - 1]
-                y = self.middle_y[pixel] - self.middle_y[pixel - 1]
+        for pixel in range(_WIDTH * _HEIGHT):
+            for other in (
+                pixel - 1 if pixel % _WIDTH else pixel,
+                pixel - _WIDTH if pixel >= _WIDTH else pixel,
+            ):
+                x = self.middle_x[pixel] - self.middle_x[other]
+                y = self.middle_y[pixel] - self.middle_y[other]
                 widest = max(widest, x * x + y * y)
         return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
 

@@ -17,7 +17,7 @@ cdef class Scene:
     cdef unsigned char[::1] paint
     cdef long long[::1] total
     cdef int[::1] lit, lit_first, lit_end
-    cdef short[::1] y, cb, cr
+    cdef short[::1] light, y, cb, cr
     cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y, falloff
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
     cdef readonly bint has_ball
@@ -27,7 +27,7 @@ cdef class Scene:
     @cython.locals(paint=int)
     cdef bint shows_ball(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', lost='long long')
-    cdef long long light(self, int pixel) noexcept
+    cdef inline long long _light(self, int pixel) noexcept
     @cython.locals(known_first=int, known_end=int, pixel=int)
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     @cython.locals(column=int, pixel=int)

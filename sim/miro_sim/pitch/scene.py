@@ -52,14 +52,14 @@ _FAR_SQUARE = 625e9  # of the corner of the pitch from its middle, in um^2
 class Scene:
     """The scene without robots; `ball`: above which place (um) its centre is, if there is one.
 
-    `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added. `y`, `cb`, `cr`: what the sensor makes of it
-    in the light of scale `lit`, in each line between two columns.
+    `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added; `light`: its share of the light, times 4096.
+    `y`, `cb`, `cr`: what the sensor makes of it in the light of scale `lit`, in each line between two columns.
     """
 
     NOT_STATE = (
         *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
         *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
-        *("falloff", "lit", "lit_first", "lit_end", "y", "cb", "cr"),
+        *("falloff", "light", "lit", "lit_first", "lit_end", "y", "cb", "cr"),
     )
 
     def __init__(self, rays: Rays, picture: PictureSettings, ball: tuple[int, int] | None) -> None:
@@ -70,6 +70,7 @@ class Scene:
         self.falloff = math.floor(picture.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
         self.paint = bytearray([_UNKNOWN]) * 76800
         self.total = array("q", bytes(8 * 76800))
+        self.light = array("h", bytes(2 * 76800))
         self.lit = array("i", b"\xff" * (4 * 240))  # -1
         self.lit_first = array("i", bytes(4 * 240))
         self.lit_end = array("i", bytes(4 * 240))
@@ -109,7 +110,7 @@ class Scene:
         end = top + rays.fall_y[pixel]
         return not ((top > far and end > far) or (top < 0 - far and end < 0 - far))
 
-    def light(self, pixel: int) -> int:
+    def _light(self, pixel: int) -> int:
         """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
         x = self.rays.middle_x[pixel] - self.middle_x
         y = self.rays.middle_y[pixel] - self.middle_y
@@ -135,7 +136,8 @@ class Scene:
         for column in range(first, end):
             pixel = row * _WIDTH + column
             self.behind(pixel)
-            sensor.put(column, self.total[pixel] * instants, self.light(pixel))
+            self.light[pixel] = self._light(pixel)
+            sensor.put(column, self.total[pixel] * instants, self.light[pixel])
             self.y[pixel] = sensor.y[column + _PAD]
             self.cb[pixel] = sensor.cb[column + _PAD]
             self.cr[pixel] = sensor.cr[column + _PAD]

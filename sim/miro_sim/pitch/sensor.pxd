@@ -36,12 +36,13 @@ cdef class Sensor:
     cdef int _shown(self, long long total, long long light) noexcept
     @cython.locals(first='long long', blocks=int)
     cdef void write(self, int row, int left, int width, bytearray out, int at) except *
-    @cython.locals(block='long long', column='long long', last='unsigned int', part=int)
+    @cython.locals(levels='const unsigned char *', words='unsigned int *', block='long long', column='long long',
+                   last='unsigned int', word='unsigned int', part=int)
     cdef void _quantise(self, long long first, long long end, long long blocks, unsigned char* out,
                         long long at) noexcept
-    @cython.locals(levels='const unsigned char *')
-    cdef inline void _write_pixel(self, long long column, unsigned int word, unsigned int last, unsigned char* out,
-                                  long long at) noexcept
+    @cython.locals(y='unsigned char', cb='unsigned char', cr='unsigned char')
+    cdef inline void _write_pixel(self, const unsigned char* levels, long long column, unsigned int word,
+                                  unsigned int last, unsigned char* out, long long at) noexcept
     @cython.locals(first='long long', lane='long long', step='long long', sums='int[8]', bend=short)
     cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)

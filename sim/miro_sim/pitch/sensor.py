@@ -166,28 +166,27 @@ class Sensor:
 
     def _quantise(self, first: int, end: int, blocks: int, out: bytearray, at: int) -> None:
         """The bytes of pixels into `out`, where column 0 would be `at`; there is a block of noise for three of them."""
+        levels, words = self.levels, self.words
         for block in range(blocks):
             column = first - first % 3 + 3 * block
-            last = self.words[336 + block]
+            last = words[336 + block]
             if first <= column and column + 3 <= end:
-                self._write_pixel(column, self.words[block], last, out, at)
-                self._write_pixel(column + 1, self.words[112 + block], last >> 4, out, at)
-                self._write_pixel(column + 2, self.words[224 + block], last >> 8, out, at)
+                self._write_pixel(levels, column, words[block], last, out, at)
+                self._write_pixel(levels, column + 1, words[112 + block], last >> 4, out, at)
+                self._write_pixel(levels, column + 2, words[224 + block], last >> 8, out, at)
             else:
-                for part in range(3):
-                    if first <= column + part < end:
-                        self._write_pixel(
-                            column + part, self.words[112 * part + block], last >> 4 * part, out, at
-                        )
+                for part in range(max(first - column, 0), min(end - column, 3)):
+                    word = words[112 * part + block]
+                    self._write_pixel(levels, column + part, word, last >> 4 * part, out, at)
 
-    def _write_pixel(self, column: int, word: int, last: int, out: bytearray, at: int) -> None:
+    def _write_pixel(self, levels: bytes, column: int, word: int, last: int, out: bytearray, at: int) -> None:
         """Y, Cb, Cr of a pixel with their noise: 12 random bits each, the highest four in `last`."""
-        levels = self.levels
         at += 3 * column
         column += _PAD
-        out[at] = levels[self.y[column] + self.luma_noise[word & 4095]]
-        out[at + 1] = levels[self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095]]
-        out[at + 2] = levels[self.soft_cr[column] + self.chroma_noise[word >> 24 | (last & 15) << 8]]
+        y = levels[self.y[column] + self.luma_noise[word & 4095]]
+        cb = levels[self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095]]
+        cr = levels[self.soft_cr[column] + self.chroma_noise[word >> 24 | (last & 15) << 8]]
+        out[at], out[at + 1], out[at + 2] = y, cb, cr
 
     def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
         """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border.
