@@ -412,7 +412,7 @@ class Adapter:
         known = sorted(self.its.symbols.instructions)
         address = int(given["memoryReference"], 16) + (given.get("offset") or 0)
         at = bisect.bisect_left(known, address) + (given.get("instructionOffset") or 0)
-        wanted = range(at, at + given["instructionCount"])
+        wanted = range(at, at + min(given["instructionCount"], SIZES["code"]))
         return {"instructions": [self._instruction(known, index) for index in wanted]}
 
     def _instruction(self, known: list[int], index: int) -> Message:

@@ -187,6 +187,15 @@ def test_breakpoints_that_cannot_be_set_say_why(adapter):
     assert client.until(event="stopped")["body"]["description"] == "the run begins here"
 
 
+def test_no_more_instructions_are_listed_than_a_program_memory_holds(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    for count, listed in ((3, 3), (10**12, 1 << 16)):
+        found = client.ask("disassemble", memoryReference="0x0000", instructionCount=count)["body"]
+        assert len(found["instructions"]) == listed
+    assert [one["presentationHint"] for one in found["instructions"][-1:]] == ["invalid"]
+
+
 def test_sources_are_told_by_their_names_and_breakpoints_may_be_none(adapter):
     _, client = adapter
     client.begin(subject="fig6")
