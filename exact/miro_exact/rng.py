@@ -56,21 +56,9 @@ class Stream:
     """
 
     NOT_STATE = (
-        "block",
-        "draws",
-        "group",
-        "k0",
-        "k1",
-        "least",
-        "name",
-        "name0",
-        "name1",
-        "seed",
-        "w0",
-        "w1",
-        "w2",
-        "w3",
-    )
+        "block", "draws", "group", "k0", "k1", "least", "name", "name0", "name1", "seed", "w0",
+        "w1", "w2", "w3",
+    )  # fmt: skip
 
     def __init__(self, seed: int, name: str) -> None:
         if not 0 <= seed <= MAX_SEED:

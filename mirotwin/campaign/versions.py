@@ -13,20 +13,9 @@ import msgspec
 
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
 NOT_OF_RUNS = (
-    "camera",
-    "campaign/reproduce",
-    "debug",
-    "desk",
-    "firmware",
-    "fuzz",
-    "ports",
-    "recording/capture",
-    "replay",
-    "report/foxglove",
-    "report/page",
-    "run",
-    "testing",
-)
+    "camera", "campaign/reproduce", "debug", "desk", "firmware", "fuzz", "ports",
+    "recording/capture", "replay", "report/foxglove", "report/page", "run", "testing",
+)  # fmt: skip
 """Folders of `mirotwin` that no run of a campaign uses."""
 GROUPS = ("mirotwin.laws", "mirotwin.estimators", "mirotwin.references", "mirotwin.checks")
 

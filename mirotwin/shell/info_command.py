@@ -14,19 +14,9 @@ from mirotwin.shell.options import FIRMWARE, Engine
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
-    "numpy",
-    "msgspec",
-    "click",
-    "rich",
-    "mcap",
-    "pillow",
-    "pyserial",
-    "crcmod-plus",
-    "pyvcd",
-    "tomli-w",
-    "pyarrow",
-    "distributed",
-)
+    "numpy", "msgspec", "click", "rich", "mcap", "pillow", "pyserial", "crcmod-plus", "pyvcd",
+    "tomli-w", "pyarrow", "distributed",
+)  # fmt: skip
 
 PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"
 

@@ -15,16 +15,9 @@ from miro_protocol.table import TELEMETRY, downlink
 from miro_protocol.transmission import Transmission
 
 __all__ = [
-    "RUN_LIMIT",
-    "Damaged",
-    "Decoder",
-    "Event",
-    "Reason",
-    "Received",
-    "Symbol",
-    "TelemetryDecoder",
+    "RUN_LIMIT", "Damaged", "Decoder", "Event", "Reason", "Received", "Symbol", "TelemetryDecoder",
     "WindowDecoder",
-]
+]  # fmt: skip
 
 
 class WindowDecoder(Scanner):

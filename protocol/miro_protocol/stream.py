@@ -38,19 +38,9 @@ from miro_protocol.stream_line import StreamError as StreamError
 from miro_protocol.transmission import Transmission
 
 __all__ = [
-    "MAX_TICK",
-    "Entry",
-    "Header",
-    "Reader",
-    "StreamError",
-    "StreamFile",
-    "decode",
-    "format_line",
-    "format_stream",
-    "parse",
-    "read",
-    "write",
-]
+    "MAX_TICK", "Entry", "Header", "Reader", "StreamError", "StreamFile", "decode", "format_line",
+    "format_stream", "parse", "read", "write",
+]  # fmt: skip
 
 
 class StreamFile(msgspec.Struct, frozen=True):

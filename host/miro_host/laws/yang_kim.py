@@ -17,14 +17,8 @@ from miro_host.references.interface import Reference
 
 POSITION_ERROR_M = 0.024  # rho_f of equation (11): the upper bound of the measurement error, section V-A
 NOT_NEGATIVE = (
-    "gamma1_per_s",
-    "gamma2_per_s",
-    "q1_per_s",
-    "q2_per_s",
-    "p1_m_s2",
-    "p2_rad_s2",
-    "cosine_guard",
-)
+    "gamma1_per_s", "gamma2_per_s", "q1_per_s", "q2_per_s", "p1_m_s2", "p2_rad_s2", "cosine_guard",
+)  # fmt: skip
 
 Gain = Annotated[float, Meta(ge=0.0, le=1e6)]
 Width = Annotated[float, Meta(gt=0.0, le=1e6)]

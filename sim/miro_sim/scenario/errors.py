@@ -36,23 +36,9 @@ UNITS = {
     "nm": "newton metres",
 }
 MORE_UNITS = (
-    "us",
-    "ns",
-    "min",
-    "mm",
-    "km",
-    "turns",
-    "khz",
-    "mhz",
-    "ticks",
-    "cm_s",
-    "deg_s",
-    "g",
-    "gcm2",
-    "mv",
-    "uh",
-    "mnm",
-)
+    "us", "ns", "min", "mm", "km", "turns", "khz", "mhz", "ticks", "cm_s", "deg_s", "g", "gcm2",
+    "mv", "uh", "mnm",
+)  # fmt: skip
 TYPE_NAMES = {**toml_text.TYPE_NAMES, "array": "an array of tables"}
 PARTS_OF_A_ROBOT = ("reference", "controller")
 """Tables that every robot of a scenario needs."""
