@@ -17,31 +17,25 @@ from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, FrameType, Opcode
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import NAME, FiniteNumber
 
-HEADING = "A robot at a port"
 MAX_SPEED_M_S = 0.5
 """Of each wheel, unless another limit is given. A third of what the robot can do."""
 STOP_FRAMES = 3
 WHEELS = Wheels()
 _WHERE = "Talk to a robot: /dev/ttyUSB0, or any URL that pyserial knows."
 _MOTION = "Send what moves a robot, too. Without it only what lets it stand is sent."
-_FASTEST = FiniteNumber(0.0, WHEELS.limit_m_s)
+_FASTEST = "Refuse what makes a wheel faster, in m/s."
+_SPEED = FiniteNumber(0.0, WHEELS.limit_m_s)
 
 
 class DeskOptions(Options, frozen=True, kw_only=True):
     """Where a robot is, and what may be done to it. `port` None: no robot, only its twin."""
 
-    port: Annotated[str | None, Option(type=NAME, metavar="URL", heading=HEADING, help=_WHERE)] = None
-    allow_motion: Annotated[bool, Option(heading=HEADING, needs="port", help=_MOTION)] = False
-    max_speed: Annotated[
-        float,
-        Option(
-            type=_FASTEST,
-            metavar="M_S",
-            heading=HEADING,
-            needs="port",
-            help="Refuse what makes a wheel faster, in m/s.",
-        ),
-    ] = MAX_SPEED_M_S
+    HEADING = "A robot at a port"
+    port: Annotated[str | None, Option(type=NAME, metavar="URL", help=_WHERE)] = None
+    allow_motion: Annotated[bool, Option(needs="port", help=_MOTION)] = False
+    max_speed: Annotated[float, Option(type=_SPEED, metavar="M_S", needs="port", help=_FASTEST)] = (
+        MAX_SPEED_M_S
+    )
 
 
 class Guard:

@@ -12,7 +12,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Period
-from mirotwin.desk.guard import HEADING, DeskOptions
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.runner import report_faults
@@ -82,6 +82,7 @@ def _told(verdict: CaseVerdict, again: str, quiet: bool) -> int:
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
 _OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
+AT_PORT = DeskOptions.HEADING
 
 
 class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
@@ -99,9 +100,9 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     desk: DeskOptions = DeskOptions()
     out: Annotated[
         Path | None,
-        OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=HEADING),
+        OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=AT_PORT),
     ] = None
-    force: Annotated[bool, FORCE.saying("Replace a recording in the folder.", heading=HEADING)] = False
+    force: Annotated[bool, FORCE.saying("Replace a recording in the folder.", heading=AT_PORT)] = False
     engine: Engine = None
     everything: Annotated[
         bool,

@@ -16,7 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 from mirotwin.report.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
 from mirotwin.report.page.link import LinkMark, lanes_of
-from mirotwin.report.page.tracks import SIDES, PageTrack, PageTracks
+from mirotwin.report.page.tracks import SIDES, PageTracks
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 MOST_FAILURES = 20
@@ -85,26 +85,17 @@ def _errors(tracks: PageTracks, times: Any, label: str, band: float, value_of: C
         )
         _of_robot(dots, number, fill_color="measured")
         truth = {"t": _times(robot.errors.ticks), "value": value_of(robot.errors)}
-        _of_robot(
-            made.line("t", "value", source=ColumnDataSource(truth), line_width=1.8),
-            number,
-            line_color="truth",
-        )
+        _line(made, number, ColumnDataSource(truth), "value", "truth", 1.8)
     return made
 
 
 def _speeds(tracks: PageTracks, times: Any, label: str, name: str, least: float) -> Any:
     made = panel(label, times, x_label="t [s]")
     for number, robot in enumerate(tracks.robots):
-        found = {
-            "t": _period_times(tracks),
-            "truth": _array(robot, name),
-            "told": _array(robot, f"told_{name}"),
-        }
-        source = ColumnDataSource(found)
-        told = made.step("t", "told", source=source, mode="after", line_width=1.4)
-        _of_robot(told, number, line_color="told")
-        _of_robot(made.line("t", "truth", source=source, line_width=1.8), number, line_color="truth")
+        found = {"truth": np.array(getattr(robot, name)), "told": np.array(getattr(robot, f"told_{name}"))}
+        source = ColumnDataSource({"t": _times(tracks.ticks), **found})
+        _line(made, number, source, "told", "told", 1.4, mode="after")
+        _line(made, number, source, "truth", "truth", 1.8)
         _widen(made, number, tracks, least, found["truth"], found["told"])
     return made
 
@@ -113,20 +104,14 @@ def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
     made = panel(f"{side} [m/s]", times, x_label="t [s]")
     for number, robot in enumerate(tracks.robots):
         wheel, fine = robot.wheels[side], robot.fine[side]
-        found = {
-            "t": _period_times(tracks),
-            **{name: np.array(getattr(wheel, name)) for name in ("told", "actual")},
-        }
-        source = ColumnDataSource(found)
-        of_profile = (
-            (fine.times_s, fine.values) if len(fine.values) else (_period_times(tracks), wheel.profile)
-        )
+        period_times = _times(tracks.ticks)
+        found = {name: np.array(getattr(wheel, name)) for name in ("told", "actual")}
+        source = ColumnDataSource({"t": period_times, **found})
+        of_profile = (fine.times_s, fine.values) if len(fine.values) else (period_times, wheel.profile)
         profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})
-        told = made.step("t", "told", source=source, mode="after", line_width=1.0)
-        _of_robot(told, number, line_color="told")
-        _of_robot(made.line("t", "profile", source=profile, line_width=1.6), number, line_color="profile")
-        actual = made.line("t", "actual", source=source, line_width=1.6)
-        _of_robot(actual, number, line_color="truth")
+        _line(made, number, source, "told", "told", 1.0, mode="after")
+        _line(made, number, profile, "profile", "profile", 1.6)
+        _line(made, number, source, "actual", "truth", 1.6)
         _widen(made, number, tracks, LEAST_M_S, found["told"], found["actual"], of_profile[1])
     return made
 
@@ -171,19 +156,17 @@ def _link(marks: Sequence[LinkMark], times: Any) -> Any:
     return made
 
 
+def _line(made: Any, number: int, source: Any, name: str, colour: str, width: float, **step: str) -> None:
+    """A column against time; `mode`: in steps."""
+    draw = made.step if step else made.line
+    _of_robot(draw("t", name, source=source, line_width=width, **step), number, line_color=colour)
+
+
 def _of_robot(renderer: Any, number: int, **colours: str) -> None:
     renderer.tags = [f"robot:{number}"]
     renderer.visible = number == 0
     tagged(renderer.glyph, **colours)
 
 
-def _period_times(tracks: PageTracks) -> Any:
-    return _times(tracks.ticks)
-
-
 def _times(ticks: Any) -> Any:
     return np.array(ticks, dtype=np.float64) / TICKS_PER_SECOND
-
-
-def _array(robot: PageTrack, name: str) -> Any:
-    return np.array(getattr(robot, name))
