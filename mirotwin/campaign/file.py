@@ -40,6 +40,7 @@ from miro_exact.domain import MAX_SEED
 from miro_exact.inputs import read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
 from miro_sim.scenario.base import beside
+from miro_sim.scenario.file import decode
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
@@ -99,12 +100,10 @@ def read(path: Path) -> CampaignFile:
         own = BUILTIN / f"{path}.toml"
         return msgspec.structs.replace(parse(own.read_text(encoding="utf-8"), own), path=str(path))
     try:
-        text = read_input(path, TEXT_KIB << 10).decode("utf-8")
+        text = decode(read_input(path, TEXT_KIB << 10), str(path))
     except FileNotFoundError:
         remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin_names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
-    except UnicodeDecodeError:
-        raise BadInput(path, "", "not UTF-8 text", "save the file as UTF-8") from None
     return parse(text, path)
 
 

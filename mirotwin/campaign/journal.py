@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -169,11 +168,10 @@ def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
             if not line.endswith(b"\n"):
                 return
             end += len(line)
-            found: RunOutcome | None = None
-            with suppress(msgspec.DecodeError, UnicodeDecodeError):
+            try:
                 found = decoder.decode(line)
-            if found is None:
-                raise BadInput(path, number, "is no outcome of a run", "start again with --force")
+            except (msgspec.DecodeError, UnicodeDecodeError):
+                raise BadInput(path, number, "is no outcome of a run", "start again with --force") from None
             yield found, end
 
 

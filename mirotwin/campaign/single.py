@@ -5,7 +5,7 @@ A process keeps images, and scenarios with their settings, so that a run costs l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -26,7 +26,7 @@ from mirotwin.report.summary import summarise
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.interface import Check, Expectation
+from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step
 from mirotwin.verify.steps.player import Player, player_of
@@ -77,15 +77,18 @@ def _run(job: Work) -> RunOutcome:
     wall_s = now_s() - began_s
     checks.finish()
     summary = summarise(world, tracks, wall_s)
-    verdicts = _verdicts(checks, player)
-    failure = _failure(checks, player)
+    judges = (checks, *(player.checks if player else ()))
+    failures = [one for group in judges for one in group.failures]
+    failure = f"{min(failures, key=lambda one: one.tick)}" if failures else ""
+    if player is not None and player.failure is not None:
+        failure = f"step: {player.failure}"
     return RunOutcome(
         run=job.run,
         verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
         failure=failure,
         digest=tracks.digest,
         figures=figures_of(summary, tracks),
-        checks={verdict.name: verdict.verdict for verdict in verdicts},
+        checks=_verdicts(judges),
         wall_s=wall_s,
     )
 
@@ -110,20 +113,10 @@ def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorde
         player.finish()
 
 
-def _verdicts(checks: Checks, player: Player | None) -> list[Expectation]:
+def _verdicts(judges: Iterable[Checks]) -> dict[str, str]:
     """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
     order = ("failed", "not judged", "passed")
-    found: dict[str, Expectation] = {}
-    for group in (checks, *(player.checks if player else ())):
-        for one in group.verdicts():
-            before = found.get(one.name)
-            if before is None or order.index(one.verdict) < order.index(before.verdict):
-                found[one.name] = one
-    return list(found.values())
-
-
-def _failure(checks: Checks, player: Player | None) -> str:
-    if player is not None and player.failure is not None:
-        return f"step: {player.failure}"
-    failures = [one for group in (checks, *(player.checks if player else ())) for one in group.failures]
-    return f"{min(failures, key=lambda one: one.tick)}" if failures else ""
+    found: dict[str, str] = {}
+    for one in (one for group in judges for one in group.verdicts()):
+        found[one.name] = min(found.get(one.name, one.verdict), one.verdict, key=order.index)
+    return found
