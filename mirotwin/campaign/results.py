@@ -145,9 +145,8 @@ def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
 
 def _check_size(path: str | Path, metadata: Any) -> None:
     """Before anything is read: a small file may hold many rows, which are many equal ones."""
-    size = 0
-    for at in range(metadata.num_row_groups):
-        size += metadata.row_group(at).total_byte_size
+    groups = map(metadata.row_group, range(metadata.num_row_groups))
+    size = sum(group.total_byte_size for group in groups)
     if metadata.num_rows > MOST_ROWS:
         raise BadInput(path, "", f"holds {metadata.num_rows} runs, more than {MOST_ROWS}", GIVE)
     if metadata.num_columns > MOST_COLUMNS:

@@ -72,13 +72,10 @@ class Difference(msgspec.Struct, frozen=True):
 
 def first_per_channel(found: Iterable[Difference]) -> list[tuple[Difference, int]]:
     """The first difference of each channel of each robot, and how many the channel has; in the order of `found`."""
-    first: dict[tuple[int, int, str], Difference] = {}
-    count: dict[tuple[int, int, str], int] = {}
+    by_channel: dict[tuple[int, int, str], list[Difference]] = {}
     for one in found:
-        key = one.network, one.slot, one.channel
-        first.setdefault(key, one)
-        count[key] = count.get(key, 0) + 1
-    return [(one, count[key]) for key, one in first.items()]
+        by_channel.setdefault((one.network, one.slot, one.channel), []).append(one)
+    return [(alike[0], len(alike)) for alike in by_channel.values()]
 
 
 def shown(value: object) -> str:

@@ -124,9 +124,7 @@ class McapWriter:
 
     def _summary(self) -> list[tuple[Opcode, list[bytes]]]:
         """The groups of the summary section, in the order of the library's writer."""
-        messages = 0
-        for count in self._counts.values():
-            messages += count
+        messages = sum(self._counts.values())
         lists = self._channels, self._attachments, self._metadata, self._chunks
         times = min(self._times, default=0), max(self._times, default=0)
         counts = struct.pack("<QH4I", messages, len(self._schemas), *map(len, lists))

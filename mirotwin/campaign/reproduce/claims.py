@@ -21,7 +21,7 @@ from mirotwin.campaign.reproduce.plan import (
     STARTS,
     Group,
 )
-from mirotwin.campaign.reproduce.rows import RunRow, Table, count, middle, never_settled, settled
+from mirotwin.campaign.reproduce.rows import RunRow, Table, middle, never_settled, settled
 
 HOLDS, PART, NOT, NOT_JUDGED = "holds", "holds in part", "does not hold", "not judged"
 MOST = 0.9
@@ -142,7 +142,7 @@ def _heading(table: Table) -> ClaimResult:
 def _motion(figure: int, words: str) -> Callable[[Table], ClaimResult]:
     def claim(table: Table) -> ClaimResult:
         rows = rows_of(table, figure, PAPER)
-        moved = count(rows, lambda row: row.reversals > 0)
+        moved = sum(row.reversals > 0 for row in rows)
         share = moved / len(rows) if rows else 0.0
         return ClaimResult(
             f"Fig. {figure}",
@@ -157,7 +157,7 @@ def _motion(figure: int, words: str) -> Callable[[Table], ClaimResult]:
 
 def _assumption_3(table: Table) -> ClaimResult:
     rows = rows_of(table, 7, PAPER)
-    crossed = count(rows, lambda row: row.crossings > 0)
+    crossed = sum(row.crossings > 0 for row in rows)
     return ClaimResult(
         "Fig. 7",
         "the motion comes from assumption 3, which the robot keeps: its heading is never across the line to the origin",

@@ -90,8 +90,6 @@ def _figures(table: Table, folder: str) -> Iterator[str]:
 
 
 def _line(name: str, rows: Sequence[RunRow]) -> str:
-    backward = len([1 for row in rows if row.reversals > 0])
-    across = len([1 for row in rows if row.crossings > 0])
     cells = [
         name,
         number(middle(rows, "rms_position_cm")),
@@ -101,8 +99,8 @@ def _line(name: str, rows: Sequence[RunRow]) -> str:
         f"{number(middle(rows, 'rms_x_cm'))} / {number(middle(rows, 'rms_y_cm'))}",
         number(middle(rows, "rms_theta_deg")),
         f"{never_settled(rows)} of {len(rows)}",
-        f"{backward}",
-        f"{across}",
+        f"{sum(row.reversals > 0 for row in rows)}",
+        f"{sum(row.crossings > 0 for row in rows)}",
         number(middle(settled(rows), "chattering_m_s2")),
     ]
     return "| " + " | ".join(cells) + " |"

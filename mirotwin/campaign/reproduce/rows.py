@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any
 
@@ -105,14 +105,9 @@ def middle_seeds(table: Table) -> dict[str, int]:
     return found
 
 
-def count(rows: Sequence[RunRow], holds: Callable[[RunRow], bool]) -> int:
-    """In how many rows."""
-    return len([row for row in rows if holds(row)])
-
-
 def never_settled(rows: Sequence[RunRow]) -> int:
     """Runs that end outside of 3 cm or 0.15 rad, and runs that failed."""
-    return count(rows, lambda row: not row.settled)
+    return sum(not row.settled for row in rows)
 
 
 def settled(rows: Sequence[RunRow]) -> list[RunRow]:
