@@ -33,7 +33,7 @@ FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
 RESUMED_ATTACHMENT = "resumed.world"
 """Only in a recording of a run that went on from a saved world."""
-TOGETHER = 10
+TOGETHER = 40
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
 """Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed,
@@ -136,11 +136,19 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with self._undisturbed:
-            self._write_waiting()
-            if error is not None:
-                reason = {"reason": str(error)} if isinstance(error, BadInput) else {}
-                self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__, **reason})
-            self._writer.finish()
+            try:
+                self._write_waiting()
+            except Exception as unwritten:
+                self._end(unwritten)
+                raise
+            self._end(error)
+
+    def _end(self, error: BaseException | None) -> None:
+        """Writes the end of the file; `error` broke the run off."""
+        if error is not None:
+            reason = {"reason": str(error)} if isinstance(error, BadInput) else {}
+            self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__, **reason})
+        self._writer.finish()
 
     def flush(self) -> None:
         """What was added up to now is kept even if this process is killed."""

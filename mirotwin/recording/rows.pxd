@@ -2,18 +2,16 @@
 cimport cython
 
 cdef int _MESSAGE, _HEAD, _BEFORE_LENGTH
-cdef bytes _EMPTY_HEAD
+cdef bytes _EMPTY_HEAD, _EMPTY_ENTRY
 cdef unsigned int _CRC_32, _ONE, _BYTE
 
 
 cdef class Index:
     cdef readonly long long channel
-    cdef readonly Py_ssize_t size
-    cdef object array
-    cdef unsigned long long[::1] entries
+    cdef readonly bytearray row
 
+    @cython.locals(begin=Py_ssize_t)
     cdef add(self, unsigned long long time_ns, unsigned long long offset)
-    cpdef bytes as_bytes(self)
 
 
 cdef class Chunk:

@@ -5,8 +5,6 @@ What belongs in a message says `channels`, what becomes of a chunk that is full 
 
 from __future__ import annotations
 
-import sys
-from array import array
 from collections.abc import Callable
 from functools import cache
 
@@ -40,35 +38,25 @@ _MESSAGE = 5  # opcode
 _HEAD = 31  # bytes: opcode, length, channel, sequence, log time, publish time
 _BEFORE_LENGTH = 9
 _EMPTY_HEAD = bytes(_HEAD)
+_EMPTY_ENTRY = bytes(16)  # of an index: time, offset
 _CRC_32 = 0xEDB88320  # polynomials have the highest power in the lowest bit
 _ONE = 1 << 31
 _BYTE = 1 << 23  # x^8
 
 
 class Index:
-    """Times and offsets of the messages that a channel has in a chunk, in one row."""
+    """Times and offsets of the messages that a channel has in a chunk, in one row as it stands in a file."""
 
     def __init__(self, channel: int) -> None:
         self.channel = channel
-        self.array = array("Q", bytes(256))
-        self.entries = memoryview(self.array)
-        self.size = 0  # of the row
+        self.row = bytearray()
 
     def add(self, time_ns: int, offset: int) -> None:
         """Adds a message."""
-        if self.size == len(self.entries):
-            self.array = self.array + self.array
-            self.entries = memoryview(self.array)
-        self.entries[self.size] = time_ns
-        self.entries[self.size + 1] = offset
-        self.size += 2
-
-    def as_bytes(self) -> bytes:
-        """The row as it stands in a file."""
-        row = self.array[: self.size]
-        if sys.byteorder == "big":
-            row.byteswap()
-        return row.tobytes()
+        begin = len(self.row)
+        self.row += _EMPTY_ENTRY
+        _put(self.row, begin, time_ns)
+        _put(self.row, begin + 8, offset)
 
 
 class Chunk:

@@ -149,10 +149,10 @@ class McapWriter:
         index_start, offsets, rows = self._end, {}, bytearray()
         for channel, index in chunk.indexes.items():
             offsets[channel] = index_start + len(rows)
-            entries = index.as_bytes()
-            rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + len(entries), channel, len(entries))
-            rows += entries
-            self._counts[channel] = self._counts.get(channel, 0) + len(entries) // _ENTRY
+            entries = len(index.row)
+            rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + entries, channel, entries)
+            rows += index.row
+            self._counts[channel] = self._counts.get(channel, 0) + entries // _ENTRY
         self._put(rows)
         self._times += (chunk.first_ns, chunk.last_ns)
         place = struct.pack("<4Q", chunk.first_ns, chunk.last_ns, start, len(head) + size)

@@ -26,7 +26,7 @@ from mirotwin.recording import channels, topics, writer
 from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
-from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.recording.recorder import TOGETHER, Recorder, RunSource
 from mirotwin.recording.rows import Chunk, joined_crc
 from mirotwin.recording.writer import MAGIC
 from tests.mirotwin.synthetic import periods
@@ -161,9 +161,10 @@ def write_all(recorder, written):
         recorder.write(period)
 
 
-def test_a_period_that_cannot_be_written_leaves_a_recording_of_those_before():
+@pytest.mark.parametrize("count", [20, TOGETHER + 20])
+def test_a_period_that_cannot_be_written_leaves_a_recording_of_those_before(count):
     stream = io.BytesIO()
-    written = [*periods(20)]
+    written = [*periods(count)]
     lost = msgspec.structs.replace(written[11].robots[0], left=None)
     written[11] = msgspec.structs.replace(written[11], robots=(lost,))
     with pytest.raises(TypeError), Recorder(stream, SOURCE) as recorder:
