@@ -138,7 +138,7 @@ class MeasuredErrors(TrackingErrors):
         exposed = seen.tick if isinstance(seen, Sighting) else tick - self.delay_frames * CONTROL_PERIOD_TICKS
         reference = self._references.get(exposed)
         if reference is not None:
-            self.append(error_of(msgspec.structs.replace(robot, truth=seen, reference=reference), exposed))
+            self.append(error_of(seen, reference, exposed))
 
 
 class RobotTrack:
@@ -158,7 +158,7 @@ class RobotTrack:
         self.truth.append(robot.truth)
         self.reference.append(robot.reference)
         self.measured.append(robot.measurement)
-        self.errors.append(error_of(robot, tick))
+        self.errors.append(error_of(robot.truth, robot.reference, tick))
         if self._measures:
             self.measured_errors.add(robot, tick)
 
@@ -215,13 +215,12 @@ def wrapped(angle_rad: float) -> float:
     return angle + TWO_PI if angle <= -math.pi else angle
 
 
-def error_of(robot: RobotPeriod, tick: int) -> ErrorSample:
-    """The tracking error in a robot's record."""
-    truth, at = robot.truth, robot.reference
+def error_of(at: Posture, reference: Posture, tick: int) -> ErrorSample:
+    """The tracking error of a robot that is `at` a posture instead of the reference's."""
     return ErrorSample(
         tick,
-        100.0 * (truth.x_m - at.x_m),
-        100.0 * (truth.y_m - at.y_m),
-        wrapped(truth.theta_rad - at.theta_rad),
-        not pitch.holds(Posture(truth.x_m, truth.y_m, wrapped(truth.theta_rad))),
+        100.0 * (at.x_m - reference.x_m),
+        100.0 * (at.y_m - reference.y_m),
+        wrapped(at.theta_rad - reference.theta_rad),
+        not pitch.holds(Posture(at.x_m, at.y_m, wrapped(at.theta_rad))),
     )

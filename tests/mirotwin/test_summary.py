@@ -162,8 +162,9 @@ def test_the_columns_of_a_run_say_what_its_periods_say():
     assert (tracks.count, tracks.digest) == (40, run[-1].digest)
     for index, track in enumerate(tracks.robots.values()):
         records = [(period.robots[index], period.tick) for period in run]
-        assert list(track.errors) == [error_of(*record) for record in records]
-        assert track.errors[-2:] == [error_of(*record) for record in records[-2:]]
+        errors = [error_of(robot.truth, robot.reference, tick) for robot, tick in records]
+        assert list(track.errors) == errors
+        assert track.errors[-2:] == errors[-2:]
         assert track.truth.points_cm()[0] == [100.0 * robot.truth.x_m for robot, _ in records]
         assert track.reference.points_cm()[1] == [100.0 * robot.reference.y_m for robot, _ in records]
         assert track.measured.points_cm()[0] == [

@@ -126,7 +126,7 @@ def _networks(period: Period) -> list[int]:
 
 
 def _error(robot: RobotPeriod, tick: int) -> ErrorMessage:
-    found = error_of(robot, tick)
+    found = error_of(robot.truth, robot.reference, tick)
     return ErrorMessage(tick, found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch)
 
 

@@ -79,7 +79,7 @@ class _CourseMonitor(Monitor[Check]):
         if tick < self.first_tick:
             return
         self.judged += 1
-        before, found = self.wrong, self.found(error_of(record, tick))
+        before, found = self.wrong, self.found(error_of(record.truth, record.reference, tick))
         self.wrong = bool(found)
         if found and not before:
             self.fail(tick, self.wanted(), found)

@@ -48,7 +48,8 @@ def test_a_measurement_that_is_missing_is_no_number(recorded, robot):
 
 
 def test_errors_are_those_of_the_summary(recorded, robot):
-    assert list(robot.errors) == [error_of(period.robots[0], period.tick) for period in recorded]
+    errors = [error_of(one.truth, one.reference, period.tick) for period in recorded for one in period.robots]
+    assert list(robot.errors) == errors
 
 
 def test_the_speed_of_a_wheel_is_its_counts_over_the_samples_between_two_exposures(recorded, robot):
