@@ -318,7 +318,7 @@ class Cpu(Executor):
         """
         peripherals = self.peripherals
         peripherals.sync(now)
-        blocked = self.blocked == now or self.powered_down
+        blocked = self.blocked == now or self.powered_down != 0
         source = -1 if blocked else peripherals.interrupts.choose(now)
         if source < 0:
             self._note_end(now)
@@ -329,6 +329,9 @@ class Cpu(Executor):
         if source >= 0:
             self._enter(source)
             return 1
+        if self.powered_down:
+            self.next_event = peripherals.ports.next_cycle
+            return 0
         self.next_event = peripherals.next_event(now + 1 if blocked else now)
         if self.next_event <= now:  # all of now is done: nothing that is due may hold time up
             self.next_event = now + 1
