@@ -2,19 +2,20 @@
 
 Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
+
+Functions import what has to wait until the engine is chosen.
 """
 
 import argparse
 import json
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from importlib import resources
 from pathlib import Path
 
-from benchmarks.disturbances import CASES
-from miro_sim.scenario.file import load
-from miro_sim.scenario.profiles import profiles
+from miro_exact import engine
 from tests import children
-from tests.sim.digest_of import digest
+from tests.sim.digest_of import REFUSED, digest
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
@@ -30,6 +31,9 @@ CAMERAS = (
 
 def names():
     """Of all runs, the short one first."""
+    from benchmarks.disturbances import CASES
+    from miro_sim.scenario.profiles import profiles
+
     yield SHORT
     builtin = resources.files("miro_sim.scenario") / "builtin"
     for name in sorted(
@@ -48,6 +52,8 @@ def names():
 
 
 def _name(scenario, *settings):
+    from miro_sim.scenario.file import load
+
     duration_s = load(str(ROOT / scenario) if "/" in scenario else scenario).scenario.duration_s
     return f"{scenario} {duration_s:g} s seed 7" + "".join(
         f" --set {one.replace(' ', '')}" for one in settings
@@ -55,20 +61,34 @@ def _name(scenario, *settings):
 
 
 def main():
-    """Prints the names of those that differ; exit code 1 if there are some."""
+    """Prints the names of those that differ; exit code 1 if there are some, 3 if the engine is refused."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="for a change of bits that is meant")
-    write = parser.parse_args().write
+    parser.add_argument(
+        "--engine", choices=engine.ENGINES, default="compiled", help="python: uncompiled, for minutes"
+    )
+    options = parser.parse_args()
     golden = json.loads(GOLDEN.read_text())
-    wanted = list(names())
-    with ProcessPoolExecutor(initializer=children.reset_signals) as pool:
-        found = dict(zip(wanted, pool.map(digest, wanted), strict=True))
+    try:
+        engine.select(options.engine)
+        wanted = list(names())
+        with ProcessPoolExecutor(initializer=_begin, initargs=(options.engine,)) as pool:
+            found = dict(zip(wanted, pool.map(digest, wanted), strict=True))
+    except engine.EngineError as error:
+        print(error, file=sys.stderr)
+        return REFUSED
     differing = [name for name in {**golden, **found} if golden.get(name) != found.get(name)]
     for name in differing:
         print(name)
-    if write:
+    if options.write:
         GOLDEN.write_text(json.dumps(found, indent=1) + "\n")
-    return 1 if differing and not write else 0
+    return 1 if differing and not options.write else 0
+
+
+def _begin(name):
+    """In each process of the pool."""
+    children.reset_signals()
+    engine.select(name)
 
 
 if __name__ == "__main__":
