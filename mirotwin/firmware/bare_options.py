@@ -13,8 +13,8 @@ from miro_exact.inputs import TEXT_BYTES, read_input
 from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
-from miro_robot.image import Image
-from mirotwin.firmware.code_place import FLASH_BYTES, SPACE_BYTES, address_of, check_code_at, place_of
+from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
+from mirotwin.firmware.code_place import address_of, check_code_at, place_of
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole

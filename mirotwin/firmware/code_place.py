@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_robot.image import Image
+from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.shell.command import Option
-
-FLASH_BYTES = 8192
-SPACE_BYTES = 65536
-
 
 SYMBOL = Option(
     "--symbol",

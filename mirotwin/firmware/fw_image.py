@@ -10,12 +10,13 @@ import click
 
 from miro_exact.rng import Stream
 from miro_protocol.c_header import render
+from miro_robot.image import SPACE_BYTES
 from miro_robot.image.debug_info import DebugInfo
 from miro_robot.inspect.listing import text_lines
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.vector_draw import draw_vectors
 from miro_robot.mcs51.vectors import encode
-from mirotwin.firmware.code_place import SPACE_BYTES, SYMBOL, functions_at
+from mirotwin.firmware.code_place import SYMBOL, functions_at
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware

@@ -11,9 +11,8 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.runner import report_faults
-from mirotwin.run.run_files import RunFiles, digest_in
+from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
-from mirotwin.run.run_stops import Stops
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals

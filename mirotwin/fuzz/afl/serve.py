@@ -26,7 +26,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.job import Counts
@@ -84,16 +84,6 @@ RUNS_A_COUNT = 64
 """Executions after which the counters are written again."""
 
 
-class Served(Protocol):
-    """What of a target the server uses."""
-
-    map_size: int
-    executions: int
-
-    def use_map(self, edges: memoryview) -> None: ...
-    def run(self, data: memoryview) -> int: ...
-
-
 def wait_status(kind: int) -> int:
     """What AFL++ is told of a run that gave `kind`: 0, or a signal, which is the number in a crash's file name."""
     return min(FIRST_SIGNAL + kind - 1, LAST_SIGNAL) if kind else 0
@@ -105,7 +95,7 @@ def hello(map_size: int) -> bytes:
     return struct.pack("<I", options)
 
 
-def answer(target: Served, cases: memoryview, control: int, status: int, keep: Callable[[], None]) -> None:
+def answer(target: Target, cases: memoryview, control: int, status: int, keep: Callable[[], None]) -> None:
     """Runs what AFL++ puts into `cases` until it closes `control`. `keep` is called now and then."""
     length, data = cases[:4].cast("I"), cases[4:]
     answers = [struct.pack("<II", NO_PROCESS, wait_status(kind)) for kind in range(256)]
@@ -118,7 +108,7 @@ def answer(target: Served, cases: memoryview, control: int, status: int, keep: C
         keep()
 
 
-def serve(target: Served, counts: Counts, control: int = CONTROL_FD, status: int = STATUS_FD) -> bool:
+def serve(target: Target, counts: Counts, control: int = CONTROL_FD, status: int = STATUS_FD) -> bool:
     """Serves AFL++ until it ends; False when there is none."""
     if MAP_VARIABLE in os.environ:
         target.use_map(attach(int(os.environ[MAP_VARIABLE]))[: target.map_size])

@@ -28,6 +28,7 @@ from miro_exact.bad_input import did_you_mean
 from miro_exact.clock import ticks
 from miro_host.plugins import PluginError
 from miro_host.raised import at_place, defined_at
+from miro_protocol.table import TICKS_PER_MS
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
@@ -40,7 +41,6 @@ EVENT_KINDS = (
     *("reset", "power", "radio", "touch"),
 )
 """The kinds that `EVENTS` of a monitor may name."""
-TICKS_PER_MS = 24_000
 KEPT = 100
 """Failures of a monitor that are kept; the others are only counted."""
 
