@@ -14,6 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,28 +54,22 @@ class Status(msgspec.Struct, frozen=True):
     waiting: int
 
 
+@dataclass(eq=False)
 class Campaign:
     """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
     `judged`: inputs that those have looked at; `reached_by`: the stream that reached what was to be reached.
     """
 
-    def __init__(
-        self,
-        engine: Engine,
-        triage: Triage,
-        folder: CampaignFolder,
-        expected: Mapping[str, Any],
-        covering: Covering | None = None,
-        tell: Callable[[Crash], None] = lambda crash: None,
-    ) -> None:
-        self.engine = engine
+    engine: Engine
+    triage: Triage
+    folder: CampaignFolder
+    expected: Mapping[str, Any]
+    covering: Covering | None = None
+    tell: Callable[[Crash], None] = lambda crash: None
+
+    def __post_init__(self) -> None:
         self._progress = EngineProgress()
-        self.triage = triage
-        self.folder = folder
-        self.expected = expected
-        self.covering = covering
-        self.tell = tell
         self.judged = 0
         self.inputs = 0
         self.reached_by: Path | None = None

@@ -40,15 +40,11 @@ def inputs(
 
 
 def _session(robots: int, slot: int, foreign: bool) -> Bytes:
-    return _joined(st.one_of(*_operations(robots, slot, foreign)))
-
-
-def _operations(robots: int, slot: int, foreign: bool) -> list[Bytes]:
     """One strategy an operation, some more than one."""
     form = downlink(robots)
     places = st.integers(0, 256 * form.wire_size - 1).map(lambda both: bytes([both >> 8, both & 0xFF]))
     place = st.sampled_from(_BYTES[: form.wire_size])
-    return [
+    operations = [
         *_frame_operations(form.payload_size, slot, foreign),
         _operation("again"),
         _operation("raw", _counted()),
@@ -59,6 +55,7 @@ def _operations(robots: int, slot: int, foreign: bool) -> list[Bytes]:
         _operation("stop bit", place),
         _operation("reset"),
     ]
+    return _joined(st.one_of(*operations))
 
 
 def _frame_operations(size: int, slot: int, foreign: bool) -> list[Bytes]:

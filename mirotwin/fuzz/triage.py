@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -56,28 +57,22 @@ class Crash(msgspec.Struct, frozen=True, kw_only=True):
         return self.folder == CONFIRMED
 
 
+@dataclass(eq=False)
 class Triage:
     """All that was found so far. `more`: by name, inputs that came down to the same crash or were not looked at.
 
     `unrepeated`: inputs that the engine said had failed and that do not fail again.
     """
 
-    def __init__(
-        self,
-        reached: InputCoverage,
-        oracle: Oracle,
-        folder: CampaignFolder,
-        sources: Sources,
-        minimise_s: float = MINIMISE_S,
-        tell: Callable[[], None] = lambda: None,
-    ) -> None:
-        self.target = oracle.target
-        self.reached = reached
-        self.oracle = oracle
-        self.folder = folder
-        self.sources = sources
-        self.minimise_s = minimise_s
-        self.tell = tell
+    reached: InputCoverage
+    oracle: Oracle
+    folder: CampaignFolder
+    sources: Sources
+    minimise_s: float = MINIMISE_S
+    tell: Callable[[], None] = lambda: None
+
+    def __post_init__(self) -> None:
+        self.target = self.oracle.target
         self.found: list[Crash] = []
         self.more: Counter[str] = Counter()
         self.unrepeated = 0

@@ -219,7 +219,9 @@ def conform(options: ConformOptions) -> int:
         raise lost
     if any(one.failures or one.cause for one in outcomes):
         return _report_faults(outcomes) or EXPECTATION_FAILED
-    return _report_faults(outcomes) or (DONE if any(one.passed for one in outcomes) else NOTHING_JUDGED)
+    return _report_faults(outcomes) or (
+        DONE if any(one.verdict == "passed" for one in outcomes) else NOTHING_JUDGED
+    )
 
 
 def _tell(

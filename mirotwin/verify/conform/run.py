@@ -48,10 +48,6 @@ class Outcome(msgspec.Struct, frozen=True):
     unsure: str = ""
 
     @property
-    def passed(self) -> bool:
-        return self.verdict == "passed"
-
-    @property
     def verdict(self) -> str:
         if self.failures:
             return "failed"
