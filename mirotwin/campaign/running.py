@@ -15,7 +15,7 @@ from mirotwin.campaign.journal import FORM, Head, Journal, journal_path
 from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
-from mirotwin.shell.outputs import check_file
+from mirotwin.shell.outputs import check_file, make_folder
 
 MANY_RUNS = 100_000
 """More have to be asked for: they take most of a day."""
@@ -60,7 +60,7 @@ def run(
     tables.require_arrow()
     refuse_many(plan, many)
     head = head_of(plan)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent, "--out")
     if not force and complete(path, head):
         journal_path(path).unlink(missing_ok=True)  # left by a process that ended before it was taken away
         return Tally(plan.runs, plan.runs)

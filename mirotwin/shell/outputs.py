@@ -201,6 +201,14 @@ def _ways_out(names: Sequence[str]) -> str:
     return f"choose another with --out, or replace {ours} and their parts with --force"
 
 
+def make_folder(path: Path, option: str) -> None:
+    """Makes a folder and those above it, if they are not there. Raises OutputError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(path, reason_of(error), f"choose another folder with {option}") from None
+
+
 def check_file(path: Path, option: str) -> None:
     """Whether a single file could be written there, asked before the work that fills it. Raises OutputError."""
     remedy = f"choose another file with {option}"

@@ -114,6 +114,10 @@ def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(her
         (["short.toml", "--seeds", "0-9999999"], "has 20000000 runs, more than 100000"),
         (["nothing.toml"], "nothing.toml: there is no such file"),
         (["short.toml", "--out", "short.csv"], "results are a .parquet file"),
+        (
+            ["short.toml", "--out", "short.toml/a.parquet"],
+            "short.toml: File exists; choose another folder with --out",
+        ),
         (["show", "nothing.parquet"], "nothing.parquet: there is no such file"),
         (["show", "short.toml"], "short.toml: is no Parquet file"),
     ],
