@@ -43,18 +43,7 @@ from typing import Any, NamedTuple, Protocol
 
 from miro_exact import engine
 from miro_exact.domain import DomainError
-from miro_exact.fields import (
-    FLAG,
-    TICK,
-    Items,
-    Kind,
-    Number,
-    Octets,
-    Queue,
-    Row,
-    Rows,
-    out_of_range,
-)
+from miro_exact.fields import FLAG, TICK, Items, Kind, Number, Octets, Queue, Row, Rows, out_of_range
 
 __all__ = [
     "FLAG",

@@ -26,16 +26,7 @@ from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.console import facts_table, plain_table, show
-from mirotwin.shell.options import (
-    FORCE,
-    OUT,
-    PATH,
-    SEED,
-    SET,
-    Engine,
-    FiniteNumber,
-    ScenarioName,
-)
+from mirotwin.shell.options import FORCE, OUT, PATH, SEED, SET, Engine, FiniteNumber, ScenarioName
 from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
 from mirotwin.shell.program import tell_notes
 

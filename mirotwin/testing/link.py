@@ -13,14 +13,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
-from miro_protocol.frames import (
-    ContentError,
-    Message,
-    ServiceFrame,
-    TeamFrame,
-    TelemetryFrame,
-    encode,
-)
+from miro_protocol.frames import ContentError, Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
 from miro_sim.periods import Period
 from miro_sim.world.conditions import Answer, Condition, Heard

@@ -15,16 +15,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.options import (
-    ARTIFACTS,
-    JUNIT,
-    NAME,
-    QUIET,
-    SET,
-    Engine,
-    Firmware,
-    Seed,
-)
+from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
 from mirotwin.shell.program import (
     BAD_INPUT,

@@ -25,14 +25,7 @@ from miro_protocol import pcapng, stream
 from miro_protocol.events import Damaged, Received
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, describe
 from miro_protocol.stream_line import FIRST_LINE, needs_version_2
-from miro_protocol.table import (
-    FLAG_MEANINGS,
-    SERVICE_DATA,
-    TELEMETRY_FIELDS,
-    VELOCITY,
-    FrameType,
-    Opcode,
-)
+from miro_protocol.table import FLAG_MEANINGS, SERVICE_DATA, TELEMETRY_FIELDS, VELOCITY, FrameType, Opcode
 from miro_protocol.transmission import Transmission, character_ticks
 from mirotwin.recording.capture.rows import DecodedRow, rows
 
