@@ -13,16 +13,8 @@ from msgspec import Meta
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import (
-    DEGREE,
-    Cm,
-    Reference,
-    ReferenceParameters,
-    SamplingPace,
-    TurnDeg,
-    with_polar_form,
-)
-from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
+from miro_host.references.interface import DEGREE, Reference, SamplingPace, TurnDeg, with_polar_form
+from miro_host.references.ramp import Ramp, RampedReference
 
 PI = 3.141592653589793
 
@@ -75,20 +67,15 @@ class Arc(msgspec.Struct, frozen=True):
         return self.ramp.pace(min(step_m, step_rad / kappa), 2.0 * PI / kappa)
 
 
-class ArcRef(ReferenceParameters, frozen=True, kw_only=True, tag="arc"):
+class ArcRef(RampedReference, frozen=True, kw_only=True, tag="arc"):
     """A circular arc: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
 
-    start_x_cm: Cm = 0.0
-    start_y_cm: Cm = 0.0
     heading_deg: TurnDeg = 60.0
     curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
-    speed_m_s: Speed = 0.20
-    ramp_s: Seconds = 0.5
-    drive_s: DriveS | None = None
 
     def trajectory(self, duration_s: float) -> Arc:
         return Arc(
-            ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
+            self.ramp(duration_s),
             self.heading_deg * DEGREE,
             self.curvature_per_m,
             self.start_x_cm / 100.0,

@@ -6,16 +6,8 @@ import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import (
-    DEGREE,
-    Cm,
-    Reference,
-    ReferenceParameters,
-    SamplingPace,
-    TurnDeg,
-    with_polar_form,
-)
-from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
+from miro_host.references.interface import DEGREE, Reference, SamplingPace, with_polar_form
+from miro_host.references.ramp import Ramp, RampedReference
 
 
 class StraightLine(msgspec.Struct, frozen=True):
@@ -41,23 +33,16 @@ class StraightLine(msgspec.Struct, frozen=True):
         return self.ramp.pace(step_m, math.inf)
 
 
-class LineRef(ReferenceParameters, frozen=True, kw_only=True, tag="line"):
+class LineRef(RampedReference, frozen=True, kw_only=True, tag="line"):
     """A straight line, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
 
     With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
     Without, it moves for the whole duration.
     """
 
-    start_x_cm: Cm = 0.0
-    start_y_cm: Cm = 0.0
-    heading_deg: TurnDeg = 0.0
-    speed_m_s: Speed = 0.20
-    ramp_s: Seconds = 0.5
-    drive_s: DriveS | None = None
-
     def trajectory(self, duration_s: float) -> StraightLine:
         return StraightLine(
-            ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
+            self.ramp(duration_s),
             self.heading_deg * DEGREE,
             self.start_x_cm / 100.0,
             self.start_y_cm / 100.0,

@@ -5,11 +5,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from miro_host.references.interface import SamplingPace
-
-Speed = Annotated[float, Meta(ge=0.0, le=1.46)]
-Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
-DriveS = Annotated[float, Meta(ge=0.0, le=86_400.0)]
+from miro_host.references.interface import Cm, ReferenceParameters, SamplingPace, TurnDeg
 
 
 class Ramp(msgspec.Struct, frozen=True):
@@ -66,8 +62,18 @@ class Ramp(msgspec.Struct, frozen=True):
         return self.speed_m_s * (t_s - 0.5 * self.ramp_s)
 
 
-def ramp_for(speed_m_s: float, ramp_s: float, drive_s: float | None, duration_s: float) -> Ramp:
-    """The profile that a scenario's keys choose for a run of `duration_s`: without `drive_s` it has no ramp down."""
-    if drive_s is None:
-        return Ramp(speed_m_s, ramp_s, max(duration_s, ramp_s))
-    return Ramp(speed_m_s, ramp_s, drive_s, ramp_down=True)
+class RampedReference(ReferenceParameters, frozen=True, kw_only=True):
+    """The parameters of a path that begins somewhere, in some direction, and is run with a speed ramp."""
+
+    start_x_cm: Cm = 0.0
+    start_y_cm: Cm = 0.0
+    heading_deg: TurnDeg = 0.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
+    ramp_s: Annotated[float, Meta(ge=0.0, le=1e3)] = 0.5
+    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
+
+    def ramp(self, duration_s: float) -> Ramp:
+        """The profile for a run of `duration_s`."""
+        if self.drive_s is None:
+            return Ramp(self.speed_m_s, self.ramp_s, max(duration_s, self.ramp_s))
+        return Ramp(self.speed_m_s, self.ramp_s, self.drive_s, ramp_down=True)

@@ -12,16 +12,8 @@ from msgspec import Meta
 
 from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import (
-    DEGREE,
-    Cm,
-    Reference,
-    ReferenceParameters,
-    SamplingPace,
-    TurnDeg,
-    with_polar_form,
-)
-from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
+from miro_host.references.interface import DEGREE, Reference, SamplingPace, with_polar_form
+from miro_host.references.ramp import Ramp, RampedReference
 
 FULL_TURN = 6.283185307179586
 
@@ -75,25 +67,19 @@ class Sine(msgspec.Struct, frozen=True):
         return self.ramp.pace(step_m, math.inf, self.wavelength_m)
 
 
-class SineRef(ReferenceParameters, frozen=True, kw_only=True, tag="sine"):
+class SineRef(RampedReference, frozen=True, kw_only=True, tag="sine"):
     """A sine about an axis, from the axis on. `speed_m_s`, `ramp_s` and `drive_s` are those of a line along the axis.
 
     `heading_deg` is that of the axis. The path begins at atan(2 pi amplitude / wavelength) to its left; with a negative
     amplitude, to its right.
     """
 
-    start_x_cm: Cm = 0.0
-    start_y_cm: Cm = 0.0
-    heading_deg: TurnDeg = 0.0
     amplitude_cm: Annotated[float, Meta(ge=-100.0, le=100.0)] = 5.0
     wavelength_cm: Annotated[float, Meta(ge=1.0, le=1_000.0)] = 60.0
-    speed_m_s: Speed = 0.20
-    ramp_s: Seconds = 0.5
-    drive_s: DriveS | None = None
 
     def trajectory(self, duration_s: float) -> Sine:
         return Sine(
-            ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
+            self.ramp(duration_s),
             self.amplitude_cm / 100.0,
             self.wavelength_cm / 100.0,
             self.heading_deg * DEGREE,
