@@ -26,8 +26,10 @@ deviations are divided by the confidence, but by no less than `LEAST_CONFIDENCE`
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_args
 
+import msgspec
 from msgspec import Meta
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -49,21 +51,16 @@ sqrt(50) times as much in each."""
 TOLD_NOISE = (0.0081, 0.028)
 """Of any other posture: a third of the bounds in section V-A of the paper, and whole pixels."""
 
-_RANGES = {
-    "age_s": (0.0, 0.25),
-    "dead_s": (0.0, 0.2),
-    "lag_s": (0.0, 0.05),
-    "slope_m_s2": (0.1, 1000.0),
-    "position_noise_m": (1e-6, 1.0),
-    "heading_noise_rad": (1e-6, 3.0),
-    "position_drift_m": (0.0, 1.0),
-    "heading_drift_rad": (0.0, 3.0),
-    "wheel_spread": (1e-6, 0.5),
-    "wheel_drift": (0.0, 0.1),
-    "doubt": (0.0, 1.0),
-    "rim_noise_m_s": (0.0, 1.0),
-    "gate": (1.0, 1000.0),
-}
+
+@cache
+def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
+    """The least and the most of each parameter, as its annotation says."""
+    found = {}
+    for field in msgspec.structs.fields(parameters):
+        for kind in (field.type, *get_args(field.type)):
+            for meta in getattr(kind, "__metadata__", ()):
+                found[field.name] = meta.ge, meta.le
+    return found
 
 
 class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
@@ -97,7 +94,7 @@ class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
     gate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 5.0
 
     def __post_init__(self) -> None:
-        for name, (least, most) in _RANGES.items():
+        for name, (least, most) in _ranges(type(self)).items():
             value = getattr(self, name)
             if value is not None and not least <= value <= most:
                 raise ValueError(f"{name}: {value!r} is out of range; must be {least} to {most}")

@@ -46,14 +46,6 @@ SURPRISE = 1.5
 """Mean of the camera's innovations along the heading, in standard deviations, above which the robot is taken to slip.
 Of white noise the mean has a standard deviation of 0.42."""
 
-_RANGES = {
-    "sampled_s": (0.0, 0.02),
-    "count_noise_m": (1e-6, 0.1),
-    "count_gate": (1.0, 1000.0),
-    "warp_m": (0.0, 0.1),
-    "warp_length_m": (0.01, 10.0),
-}
-
 
 class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+telemetry"):
     """Those of `ekf`, and: `sampled_s`, how long before its answer's first start bit a robot reads its counts (the left
@@ -68,14 +60,6 @@ class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+
     count_gate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 8.0
     warp_m: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     warp_length_m: Annotated[float, Meta(ge=0.01, le=10.0)] = 0.5
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name, (least, most) in _RANGES.items():
-            if not least <= getattr(self, name) <= most:
-                raise ValueError(
-                    f"{name}: {getattr(self, name)!r} is out of range; must be {least} to {most}"
-                )
 
     def estimator(self) -> "EkfTelemetry":
         return EkfTelemetry(self)
