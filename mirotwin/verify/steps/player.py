@@ -31,8 +31,7 @@ from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.frame_sender import FrameSender
-from mirotwin.verify.steps.keys import Step
-from mirotwin.verify.steps.sends import Send, SendBytes, SendFrame, SendPoll, SendService, SendTeam
+from mirotwin.verify.steps.keys import Send, SendBytes, SendFrame, SendPoll, SendService, SendTeam, Step
 
 WHEELS = Wheels()
 

@@ -21,6 +21,7 @@ from mirotwin.verify.checks.expect import checks_of_table, expectations_of
 from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.steps.keys import (
     PLAIN,
+    SENDS,
     VERBS,
     CheckStep,
     HoldStep,
@@ -32,7 +33,6 @@ from mirotwin.verify.steps.keys import (
     WaitStep,
     WithinMs,
 )
-from mirotwin.verify.steps.sends import SENDS
 
 S = TypeVar("S", bound=msgspec.Struct)
 _NO_KEYS = ("number", "checks")

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.conform import ahead
-from mirotwin.verify.conform.ahead import FEWEST, tried_ahead
-from mirotwin.verify.conform.run import Outcome, try_all
+from mirotwin.verify.conform import run
+from mirotwin.verify.conform.run import FEWEST, Outcome, tried_ahead, try_all
 from mirotwin.verify.conform.table import RULES
 from tests import children
 from tests.mirotwin.verify.checks.rig import own_image
@@ -24,7 +23,7 @@ SOME = RULES[: 2 * FEWEST]
 
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch):
-    monkeypatch.setattr(ahead, "has_core", lambda: True)
+    monkeypatch.setattr(run, "has_core", lambda: True)
 
 
 def failing(rule):
@@ -91,7 +90,7 @@ def test_an_error_is_raised_where_the_first_process_meets_it(no_children):
 def test_few_rules_and_a_single_core_need_no_process(monkeypatch):
     with tried_ahead(SOME[: FEWEST - 1], failing) as tried:
         assert tried is failing
-    monkeypatch.setattr(ahead, "has_core", lambda: False)
+    monkeypatch.setattr(run, "has_core", lambda: False)
     with tried_ahead(SOME, failing) as tried:
         assert tried is failing
 
@@ -106,15 +105,15 @@ def test_outcomes_are_those_of_one_process(code):
 
 HOLDS = """
 import os, time
-from mirotwin.verify.conform import ahead
+from mirotwin.verify.conform import run
 from mirotwin.verify.conform.table import RULES
 
-ahead.has_core = lambda: True
+run.has_core = lambda: True
 def tried(rule):
     os.write(1, b"%d\\n" % os.getpid())
     time.sleep(1)
 
-with ahead.tried_ahead(RULES, tried) as one:
+with run.tried_ahead(RULES, tried) as one:
     one(RULES[1])
 """
 

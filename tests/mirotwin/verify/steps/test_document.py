@@ -4,9 +4,8 @@ import re
 from pathlib import Path
 
 from miro_sim.world.conditions import CONDITIONS
-from mirotwin.verify.steps.keys import VERBS, StreamStep
+from mirotwin.verify.steps.keys import SENDS, VERBS, SendFrame, StreamStep
 from mirotwin.verify.steps.running import run_test
-from mirotwin.verify.steps.sends import SENDS, SendFrame
 from tests.mirotwin.verify.steps.rig import own_image
 
 PAGE = (Path(__file__).parents[4] / "mirotwin/verify/steps/README.md").read_text(encoding="utf-8")

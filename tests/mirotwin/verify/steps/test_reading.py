@@ -9,10 +9,20 @@ from hypothesis import strategies as st
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.world.conditions import CONDITIONS, Command, WheelSpeeds
-from mirotwin.verify.steps.keys import PLAIN, VERBS, NeverStep, PauseStep, SendStep, WaitStep
+from mirotwin.verify.steps.keys import (
+    PLAIN,
+    SENDS,
+    VERBS,
+    NeverStep,
+    PauseStep,
+    SendBytes,
+    SendStep,
+    SendTeam,
+    WaitStep,
+    acceleration_units,
+)
 from mirotwin.verify.steps.player import check_symbols
 from mirotwin.verify.steps.reading import steps_of
-from mirotwin.verify.steps.sends import SENDS, SendBytes, SendTeam, acceleration_units
 from tests.mirotwin.verify.steps.rig import ORIGIN, own_image, read, scenario_of
 
 WRONG = {
