@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TypeVar
 
 import msgspec
 
-from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
+from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, use_one_of, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Heard, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table, expectations_of
@@ -172,7 +172,7 @@ class _Table:
         if isinstance(event, str) and event in choices:
             self.refuse(verb, "expected a name", f'write {verb} = "{event}", and its other keys beside it')
         what = f"{value!r} is not one of the choices"
-        self.refuse(verb, what, f"use {' or '.join(', '.join(choices).rsplit(', ', 1))}")
+        self.refuse(verb, what, use_one_of(choices))
 
     def rest(self, struct: type[S], verb: str, hidden: Sequence[str] = ()) -> S:
         """The struct of the keys that are left; `verb` named it."""
@@ -194,7 +194,7 @@ class _Table:
         try:
             return msgspec.convert(dict(given), struct)
         except msgspec.ValidationError as error:
-            self.refuse_value(f"{error}")
+            self.refuse_value(f"{error}", struct)
 
     def with_checks(self, step: CheckStep) -> CheckStep:
         """The checks of a step's table, in the words of `[expect]`."""
@@ -210,10 +210,10 @@ class _Table:
         place = f"step {self.index + 1}"
         raise ScenarioError(self.origin, f"{place}.{key}" if key else place, what, remedy)
 
-    def refuse_value(self, message: str) -> NoReturn:
-        """What msgspec found: its place, value and limits in the words of the scenario."""
+    def refuse_value(self, message: str, struct: type[msgspec.Struct] = Step) -> NoReturn:
+        """What msgspec found in a `struct`: its place, value and limits in the words of the scenario."""
         what, _, path = message.partition(" - at `$")
         raw = {"step": [dict(table) for table in self.scenario.step]}
         found = value_error(self.origin, raw, f"{what} - at `$.step[{self.index}]{path.rstrip('`')}`")
         place = re.sub(r"^step\[\d+\]\.?", "", f"{found.place}")
-        self.refuse(place, found.what, found.remedy)
+        self.refuse(place, found.what, found.remedy or choices_of(struct, place))

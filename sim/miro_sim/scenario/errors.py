@@ -1,6 +1,7 @@
 """What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -250,13 +251,25 @@ def _choices_at(raw: Any, path: str) -> str:
     found, table = _type_at(raw, path), _type_at(raw, above)
     if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
         choices = REGISTRIES[table.cls].names()
-    elif literals := [one for one in _options(found) if isinstance(one, msgspec.inspect.LiteralType)]:
-        choices = [str(value) for literal in literals for value in literal.values]
-    else:
+    elif not (choices := _literals(found)):
         choices = [str(struct.tag) for struct in _structs_at(raw, above) if struct.tag_field == key]
-    if not choices:
-        return ""
+    note = ": slots of a frame; each [[network.robot]] is a robot" if key == "robots" else ""
+    return use_one_of(choices) + note if choices else ""
+
+
+def _literals(found: msgspec.inspect.Type | None) -> list[str]:
+    literals = [one for one in _options(found) if isinstance(one, msgspec.inspect.LiteralType)]
+    return [str(value) for literal in literals for value in literal.values]
+
+
+def choices_of(struct: type[msgspec.Struct], key: str) -> str:
+    """What a key of a struct may hold, if that is one of a few words or numbers."""
+    fields = msgspec.structs.fields(struct)
+    found = [_literals(_type_of(field.type)) for field in fields if field.encode_name == key]
+    return use_one_of(found[0]) if found and found[0] else ""
+
+
+def use_one_of(choices: Iterable[str]) -> str:
+    """The remedy for what is not one of them."""
     *others, last = choices
-    if key == "robots":
-        return f"use {', '.join(others)} or {last}: slots of a frame; each [[network.robot]] is a robot"
     return f"use {', '.join(others)} or {last}" if others else f"use {last}"
