@@ -86,7 +86,7 @@ cdef class Camera:
     @cython.locals(place=int, reach=int, x='long long', y='long long', u='long long', v='long long',
                    beside_u='long long', beside_v='long long')
     cdef inline long long _beside(self, int body, int pixel) noexcept
-    @cython.locals(bounds=int, still=bint, column=int, number=int, at=int, line=int)
+    @cython.locals(bounds=int, still=bint, column='long long', lane='long long', number=int, at=int, line=int)
     cdef void _find_corners(self, int body, int row, int left, int right) noexcept
     @cython.locals(rays=rays.Rays, x='double[4]', y='double[4]', u='int[4]', v='int[4]',
                    cosine=double, sine=double, shift_u=double, shift_v=double, column='long long', lane='long long',

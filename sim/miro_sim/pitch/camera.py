@@ -359,9 +359,10 @@ class Camera:
         Where a robot stands still, all instants of a field are like its first one.
         """
         bounds = (row & 1) * _LINE
-        for column in range(bounds + left, bounds + right + 1):
-            self.line_least_u[column] = self.line_least_v[column] = _FAR_UM
-            self.line_most_u[column] = self.line_most_v[column] = -_FAR_UM
+        for column in range(bounds + left, bounds + right + 1, 4):  # as many together
+            for lane in range(4):
+                self.line_least_u[column + lane] = self.line_least_v[column + lane] = _LIFT
+                self.line_most_u[column + lane] = self.line_most_v[column + lane] = -_LIFT
         still = self.drift_um[body] == _ROUNDED_UM
         self.lanes = 1 if still else self.field_sets
         self.times = self.field_sets if still else 1

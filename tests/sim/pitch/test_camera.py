@@ -15,6 +15,8 @@ from miro_host.eye.patterns import PATTERNS
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.picture_settings import PictureSettings
 from tests.children import run
+from tests.naive.camera import Body
+from tests.sim.pitch.scenes import Rig, Scene
 from tests.sim.pitch.windows import check_rig
 
 LENS = CameraParameters()
@@ -201,6 +203,27 @@ def test_what_cannot_be_is_refused():
         one.robot(number // 5, number % 5, 0.1 * number, 0.0, 0.0)
     with pytest.raises(ValueError, match="room for 10 robots"):
         one.robot(0, 0, 0.0, 0.5, 0.0)
+
+
+@pytest.mark.parametrize("fields", [1, 2])
+@pytest.mark.parametrize("sub_exposures", [1, 3])
+@pytest.mark.parametrize(
+    ("x_m", "v_m_s"), [(0.55, 5000.0), (0.55, -1e12), (600.0, 0.0), (-1e9, 0.0), (0.55, 0.0), (0.55, 1000.0)]
+)
+def test_robots_that_are_far_or_leave_within_an_exposure_are_drawn_as_the_slow_twin_draws_them(
+    x_m, v_m_s, sub_exposures, fields
+):
+    drawn = Rig(
+        LENS,
+        replace(QUIET, sub_exposures=sub_exposures, fields=fields),
+        PATTERNS["diagonal"],
+        Stream(3, "test"),
+    )
+    bodies = [Body(0, 0, x_m, 0.35, 0.4, v_m_s, 0.0), Body(1, 2, 0.62, 0.38, 0.0, 0.0, 0.0)]
+    one = Scene(bodies, None, 5, 4711, (140, 110, 24, 12))
+    eye = drawn.camera()
+    one.put(eye)
+    assert eye.window(*one.window) == one.drawn_by(drawn.naive())
 
 
 def test_an_exposure_of_no_time_shows_the_lamps_as_they_are_then():
