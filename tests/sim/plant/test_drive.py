@@ -237,14 +237,15 @@ def test_looking_changes_nothing_and_a_past_tick_is_no_step():
     assert drive.next_tick == drive.tick + 2048
 
 
-def test_a_long_advance_is_cut_into_pwm_periods():
+@pytest.mark.parametrize("periods", [10, 16, 17, 40])
+def test_a_long_advance_is_cut_into_pwm_periods(periods):
     one, other = DifferentialDrive(PARAMS), DifferentialDrive(PARAMS)
     for drive in (one, other):
         drive.set_bridge(0, 0, 1, 1)
-    one.advance(10 * 2048 + 100)
-    for _ in range(10):
+    one.advance(periods * 2048 + 100)
+    for _ in range(periods):
         other.advance(other.next_tick)
-    other.advance(10 * 2048 + 100)
+    other.advance(periods * 2048 + 100)
     assert snapshot(one) == snapshot(other)
 
 
