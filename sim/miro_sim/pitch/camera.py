@@ -366,10 +366,11 @@ class Camera:
         still = self.drift_um[body] == _ROUNDED_UM
         self.lanes = 1 if still else self.field_sets
         self.times = self.field_sets if still else 1
-        for number in range(0, self.sets, self.times):
-            at = self.instants[number]
-            line = 4 * ((at >> 2) * _FIELD + bounds) + (at & 3)
-            self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
+        for number in range(self.sets):
+            if number % self.times == 0:
+                at = self.instants[number]
+                line = 4 * ((at >> 2) * _FIELD + bounds) + (at & 3)
+                self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
 
     def _turn_corners(self, place: int, corner: int, line: int, bounds: int, left: int, right: int) -> None:
         """The same at one instant. In doubles, which hold these products exactly."""
