@@ -108,6 +108,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
     """
 
     EVENTS = ("sent",)
+    LATER = True
 
     def __init__(self, check: ActsAtAll, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -119,6 +120,9 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
         self.air = self.before = self._air()
+        self.seen: list[
+            tuple[tuple[int, ...], int]
+        ] = []  # air and reset at the end of periods, the oldest first
         self.counted = self.shown = 0
         self.begun_tick = -1
         self.chip = self.board.left
@@ -138,6 +142,9 @@ class AliveMonitor(Monitor[ActsAtAll]):
         if listener is None or not board.powered or board.held or listener.link_state != UP:
             return ()
         return (listener.bit_errors,)
+
+    def period_over(self) -> None:
+        self.seen.append((self._air(), self.chip.reset_tick))
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick
@@ -161,10 +168,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
                     self.waiting.append((end_tick, self.before, words))
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        self._look_at_resets(record, tick)
+        air, reset_tick = self.seen.pop(0)
+        self._look_at_resets(record, tick, reset_tick)
         if not self.needed:
             return
-        self.before, self.air = self.air, self._air()
+        self.before, self.air = self.air, air
         due = self._due(tick) if self.waiting else []
         left, right = self.words
         self.left.look(record.left, left)
@@ -178,12 +186,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
         if due:
             self._judge(record, tick)
 
-    def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
+    def _look_at_resets(self, record: RobotPeriod, now: int, reset_tick: int) -> None:
         """In the order of time. The board may have gone on: what it has done after `now` is kept for later."""
-        tick = self.chip.reset_tick
-        if tick != self.reset_tick:
-            self.resets.append(tick)
-            self.reset_tick = tick
+        if reset_tick != self.reset_tick:
+            self.resets.append(reset_tick)
+            self.reset_tick = reset_tick
         if self.turned and not self.resets:
             return
         due = [one for one in self.resets if one <= now]

@@ -70,6 +70,8 @@ class InsidePitch(Check, frozen=True, kw_only=True, tag="inside_pitch"):
 class _CourseMonitor(Monitor[Check]):
     """Notes when the robot begins to be wrong. `first_tick`: from then on it is judged."""
 
+    LATER = True
+
     def __init__(self, check: Check, subject: Subject, first_tick: int) -> None:
         super().__init__(check, subject)
         self.first_tick = first_tick

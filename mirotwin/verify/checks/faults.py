@@ -58,6 +58,8 @@ class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
 
 
 class FaultMonitor(Monitor[FaultCheck]):
+    LATER = True
+
     def __init__(self, check: FaultCheck, subject: Subject) -> None:
         super().__init__(check, subject)
         self.judged = 1

@@ -118,6 +118,9 @@ class Monitor(Generic[C_co]):
     EVENTS: tuple[str, ...] = ()
     """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
+    LATER = False
+    """Whether it may be told of some control periods together. It must not read the robot itself then, but for
+    `period_over` and `end`."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         self.check = check
@@ -146,6 +149,9 @@ class Monitor(Generic[C_co]):
 
     def period(self, record: RobotPeriod, tick: int) -> None:
         """The robot as it was at `tick`, the start of the control period that is over."""
+
+    def period_over(self) -> None:
+        """A control period is over, which `period` is told of now or later: what is read of the robot is as it is."""
 
     def until(self, tick: int) -> None:
         """All events before `tick` have been told."""

@@ -9,7 +9,8 @@
 The world tells its observers at the end of each control period. Parts of a board run ahead of each other, so only
 events before the tick at which the world stands are told, in the order of ticks; the others wait for the next look. A
 wait (`World.run_until`) may note an event twice and take it back; at the end of a period each stands in the log once.
-Nothing here changes a bit of the run.
+Nothing here changes a bit of the run. Where all monitors may be told later, some control periods are told together:
+after a simulated one the caches hold nothing of this.
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ _FROM_RECEIVED = ("frame", "damaged")
 _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
+TOGETHER = 10
+"""Control periods at most that are told together. The logs hold events of twice as many at the highest rate."""
 
 
 class ExpectationFailed(AssertionError):
@@ -99,6 +102,8 @@ class Checks:
         ]
         self.finished = False
         self.index = world.index
+        self.untold: list[tuple[Period, int]] = []  # and where the world stood at their end
+        self.together = TOGETHER if all(watched.later for watched in self.robots) else 1
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
@@ -107,19 +112,31 @@ class Checks:
                 f"control period {period.index} follows {self.index - 1}: the world was loaded; begin new checks then"
             )
         self.index += 1
-        for watched, record in zip(self.robots, period.robots, strict=True):
-            watched.look(record, period.tick, self.world.tick)
+        self.untold.append((period, self.world.tick))
+        for watched in self.robots:
+            watched.period_over()
+        if len(self.untold) >= self.together:
+            self._tell()
+
+    def _tell(self) -> None:
+        """Tells of the control periods that were not told of."""
+        untold, self.untold = self.untold, []
+        for period, tick in untold:
+            for watched, record in zip(self.robots, period.robots, strict=True):
+                watched.look(record, period.tick, tick)
 
     def finish(self) -> None:
         """The run is over, by itself or because it was broken off."""
         if not self.finished:
             self.finished = True
             self.world.observers.remove(self._look)
+            self._tell()
             for watched in self.robots:
                 watched.end(self.world.tick)
 
     @property
     def monitors(self) -> list[Monitor[Any]]:
+        self._tell()
         return [monitor for watched in self.robots for monitor in watched.monitors]
 
     @property
@@ -161,6 +178,8 @@ class _RobotMonitors:
         self.network = network
         self.robot = robot
         self.monitors = [self._guarded(check, partial(checked_monitor, check, subject)) for check in checks]
+        self.later = all(monitor.LATER for monitor in self.monitors)
+        self.of_ends = [one for one in self.monitors if type(one).period_over is not Monitor.period_over]
         self.of_periods = [one for one in self.monitors if type(one).period is not Monitor.period]
         self.of_times = [one for one in self.monitors if type(one).until is not Monitor.until]
         self.of_events: dict[str, list[Monitor[Any]]] = {}
@@ -178,6 +197,14 @@ class _RobotMonitors:
         self.faults = len(robot.board.faults)
         self.waiting: list[Event] = []
         self.lost = 0
+
+    def period_over(self) -> None:
+        """A control period is over."""
+        for monitor in self.of_ends:
+            try:
+                monitor.period_over()
+            except (Exception, SystemExit) as error:
+                raise self._cannot_judge(monitor.check, error) from error
 
     def look(self, record: Any, begun_tick: int, tick: int) -> None:
         """Tells the monitors of the control period that began at `begun_tick` and of events before `tick`."""

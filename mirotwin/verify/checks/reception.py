@@ -214,6 +214,8 @@ class FramesAccepted(Check, frozen=True, kw_only=True, tag="frames_accepted_min"
 class AcceptedMonitor(Monitor[FramesAccepted]):
     """`counter`: the firmware's, which wraps at 2^16, `frames` does not."""
 
+    LATER = True
+
     def __init__(self, check: FramesAccepted, subject: Subject) -> None:
         super().__init__(check, subject)
         self.counter = 0

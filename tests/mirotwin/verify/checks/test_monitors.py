@@ -14,6 +14,7 @@ from mirotwin.verify.checks.interface import Check, Monitor
 from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
 from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
+from tests.mirotwin.verify.conform.images import BABBLES, HANGS, image_of
 
 EVERYTHING = ALL + "tracks_within_cm = 0.1\nsettles_within_s = 0.2\ninside_pitch = true\n"
 TWO = f"""
@@ -52,6 +53,48 @@ def test_a_run_with_all_checks_has_the_digest_of_one_without(seed):
     assert digest == plain.digest
     assert {one.name for one in verdicts if one.verdict == "failed"} >= {"tracks_within_cm"}
     assert failures
+
+
+LATER = """
+name = "later"
+duration_s = 1.5
+stop_on_fault = false
+
+[expect]
+tracks_within_cm = 0.8
+inside_pitch = true
+frames_accepted_min = 40
+
+[[network]]
+radio.profile = "{profile}"
+robot = [{{ slot = 0, reference.kind = "line" }}, {{ slot = 2, reference.kind = "arc" }}]
+"""
+
+
+@pytest.mark.parametrize(
+    "image", [own_image(), image_of(HANGS), image_of(BABBLES)], ids=["own", "hangs", "babbles"]
+)
+@pytest.mark.parametrize("profile", ["weaker", "fade15"])
+def test_periods_that_are_told_together_are_judged_as_one_by_one(image, profile):
+    """Who asks for failures is told of all periods so far."""
+
+    def found(asking):
+        world = World(parse(LATER.format(profile=profile), "later", (), expectations_of), 2, image)
+        checks = Checks(world)
+        draw = random.Random(5)
+        seen = []
+        while not world.finished:
+            world.step()
+            if draw.random() < 0.1:
+                world.set_reset(draw.randrange(2), slot=draw.choice((0, 2)))
+            if asking:
+                seen = checks.failures
+        assert checks.together > 1
+        assert not asking or seen == checks.failures
+        checks.finish()
+        return checks.verdicts(), checks.failures, [repr(one) for one in checks.monitors]
+
+    assert found(asking=False) == found(asking=True)
 
 
 @pytest.mark.parametrize("seed", range(3))
