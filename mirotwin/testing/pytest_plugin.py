@@ -32,49 +32,39 @@ _INI = {
 _SEED, _RIG = "_mirotwin_seed", "mirotwin_rig"
 
 
+_OPTIONS: tuple[tuple[str, str, type, str], ...] = (
+    ("--mirotwin-firmware", "IMAGE.ihx", str, _INI["mirotwin_firmware"]),
+    ("--mirotwin-seed", "N", int, "the seed of all tests"),
+    ("--mirotwin-artifacts", "DIR", str, _INI["mirotwin_artifacts"]),
+    ("--mirotwin-repeat", "N", int, _INI["mirotwin_repeat"]),
+    ("--mirotwin-pages", "", bool, "make the page of each failed test, too: some seconds each"),
+    ("--mirotwin-port", "URL", str, "run against the robots at this port, not against their twin"),
+    ("--mirotwin-allow-motion", "", bool, "with a port: send what moves a robot"),
+    ("--mirotwin-max-speed", "M_S", float, "with a port: refuse faster wheels (default: 0.5)"),
+    (
+        "--firmware-coverage",
+        "FILE.info",
+        str,
+        "write which lines of the firmware the tests ran, as an lcov tracefile",
+    ),
+    ("--firmware-image", "IMAGE.ihx", str, "the image to watch (default: the robot's own)"),
+    ("--firmware-sources", "DIR", list, "where its C files are"),
+    ("--firmware-coverage-fail-under", "PERCENT", float, "fail when fewer of the lines ran"),
+)
+"""Name, what stands for its value in the help, type (bool: a switch; list: may be repeated), help."""
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("mirotwin", "worlds for tests, firmware coverage (mirotwin)")
-    group.addoption("--mirotwin-firmware", metavar="IMAGE.ihx", help=_INI["mirotwin_firmware"])
-    group.addoption("--mirotwin-seed", metavar="N", type=int, help="the seed of all tests")
-    group.addoption("--mirotwin-artifacts", metavar="DIR", help=_INI["mirotwin_artifacts"])
-    group.addoption("--mirotwin-repeat", metavar="N", type=int, help=_INI["mirotwin_repeat"])
-    group.addoption(
-        "--mirotwin-pages",
-        action="store_true",
-        help="make the page of each failed test, too: some seconds each",
-    )
-    group.addoption(
-        "--mirotwin-port", metavar="URL", help="run against the robots at this port, not against their twin"
-    )
-    group.addoption(
-        "--mirotwin-allow-motion", action="store_true", help="with a port: send what moves a robot"
-    )
-    group.addoption(
-        "--mirotwin-max-speed",
-        metavar="M_S",
-        type=float,
-        help="with a port: refuse faster wheels (default: 0.5)",
-    )
+    for name, metavar, kind, what in _OPTIONS:
+        if kind is bool:
+            group.addoption(name, action="store_true", help=what)
+        elif kind is list:
+            group.addoption(name, metavar=metavar, action="append", default=[], help=what)
+        else:
+            group.addoption(name, metavar=metavar, type=kind, help=what)
     for name, what in _INI.items():
         parser.addini(name, what, type="string")
-    group.addoption(
-        "--firmware-coverage",
-        metavar="FILE.info",
-        help="write which lines of the firmware the tests ran, as an lcov tracefile",
-    )
-    group.addoption(
-        "--firmware-image", metavar="IMAGE.ihx", help="the image to watch (default: the robot's own)"
-    )
-    group.addoption(
-        "--firmware-sources", metavar="DIR", action="append", default=[], help="where its C files are"
-    )
-    group.addoption(
-        "--firmware-coverage-fail-under",
-        metavar="PERCENT",
-        type=float,
-        default=0.0,
-        help="fail when fewer of the lines ran",
-    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -90,7 +80,7 @@ def pytest_configure(config: pytest.Config) -> None:
         from mirotwin.testing import port_fixtures
 
         config.pluginmanager.register(port_fixtures.PortFixtures(config), port_fixtures.NAME)
-    share = config.getoption("--firmware-coverage-fail-under")
+    share = config.getoption("--firmware-coverage-fail-under") or 0.0
     if not 0.0 <= share <= 100.0:
         raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")
     if share and not config.getoption("--firmware-coverage"):

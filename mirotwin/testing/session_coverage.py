@@ -32,7 +32,7 @@ class FirmwareCoverage:
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self.out = Path(config.getoption("--firmware-coverage"))
-        self.wanted: float = config.getoption("--firmware-coverage-fail-under")
+        self.wanted: float = config.getoption("--firmware-coverage-fail-under") or 0.0
         self.from_workers: list[Counts] = []
         self.counters = Counters()
         try:
