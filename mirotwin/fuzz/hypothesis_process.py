@@ -129,17 +129,17 @@ KINDS = ("queue", "crashes")
 _PROGRESS = "progress"
 
 
-class Told(msgspec.Struct, frozen=True):
+class JobProgress(msgspec.Struct, frozen=True):
     """What a process tells of itself."""
 
     executions: int
     edges: int
 
 
-def told(folder: Path) -> Told | None:
+def told(folder: Path) -> JobProgress | None:
     """What the process of that folder told last; None before that."""
     try:
-        return msgspec.json.decode((folder / _PROGRESS).read_bytes(), type=Told)
+        return msgspec.json.decode((folder / _PROGRESS).read_bytes(), type=JobProgress)
     except FileNotFoundError:
         return None
 
@@ -162,7 +162,7 @@ class _Kept:
         now_s = time.monotonic()
         if now_s - self.told_s >= TOLD_S:
             self.told_s = now_s
-            now = Told(explorer.target.executions, explorer.edges)
+            now = JobProgress(explorer.target.executions, explorer.edges)
             _write(self.folder / _PROGRESS, msgspec.json.encode(now))
         return True
 

@@ -34,7 +34,7 @@ class Answer(msgspec.Struct, frozen=True):
     said: TelemetryFrame | None
 
 
-class Setting(msgspec.Struct, frozen=True):
+class FilterSetting(msgspec.Struct, frozen=True):
     """The filter words (kp, ki, kd, il) that a chip took at `tick`."""
 
     tick: int
@@ -51,7 +51,7 @@ class Observed:
         self._orders = Orders()
         self.orders: dict[str, list[Order]] = {side: [Order(-1, side, "off")] for side in SIDES}
         self._filter: dict[str, list[int]] = {side: [0, 0, 0, 0] for side in SIDES}
-        self.filters: dict[str, list[Setting]] = {side: [] for side in SIDES}
+        self.filters: dict[str, list[FilterSetting]] = {side: [] for side in SIDES}
         self.commands: list[Event] = []
         self.heard: list[Event] = []
         self.answers: list[Answer] = []
@@ -102,7 +102,7 @@ class Observed:
                 if control & 8 >> place and words:
                     self._filter[event.side][place] = words.pop(0)
         elif event.opcode == _UDF:
-            self.filters[event.side].append(Setting(event.tick, tuple(self._filter[event.side])))
+            self.filters[event.side].append(FilterSetting(event.tick, tuple(self._filter[event.side])))
 
     # ---- asked by the rules --------------------------------------------------------------------------------
 
