@@ -135,7 +135,7 @@ def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
     except FileNotFoundError:
         raise BadInput(path, "", "there is no such file", GIVE) from None
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        reason = f"{error}".partition("\n")[0]
+        reason = f"{error}".partition("\n")[0].rstrip(".")
         raise BadInput(path, "", f"is no Parquet file: {reason}", GIVE) from None
     for name in (*about.factors, *about.drawn, *EACH_ROW):
         if table[name].null_count:

@@ -6,7 +6,7 @@ import os
 from typing import Annotated
 
 from miro_exact import clock
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import builtin_names, load
@@ -167,9 +167,8 @@ def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
     """(network, place among its robots) of the robot that was asked for. Raises BadInput."""
     network = options.network or 0
     if network >= len(world.networks):
-        raise BadInput(
-            options.subject, f"--network {network}", f"there are {len(world.networks)}, numbered from 0"
-        )
+        there = amount(len(world.networks), "network is there", "networks are there, from 0 on")
+        raise BadInput(options.subject, f"--network {network}", "there is no such network", there)
     slots = [robot.spec.slot for robot in world.networks[network].robots]
     if options.slot is None:
         return network, 0
