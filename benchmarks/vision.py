@@ -30,9 +30,8 @@ from miro_sim.pitch import ground
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.picture_settings import PictureSettings
-from miro_sim.pitch.static_field import StaticField
 from miro_sim.scenario.camera_keys import CalibrationErrorSizes, PixelCamera
-from miro_sim.world.sight import calibration_for
+from miro_sim.world.sight import StaticField, calibration_for
 
 QUIET = PictureSettings(
     light_falloff=0.0, flicker=0.0, chroma_bandwidth_hz=0.0, luma_noise=0.0, chroma_noise=0.0

@@ -12,8 +12,7 @@ from serial.serialutil import SerialException
 
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
-from miro_sim.scenario.file import ScenarioText
-from miro_sim.scenario.live import live_scenario
+from miro_sim.scenario.file import ScenarioText, live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.url import UrlOptions
 from mirotwin.recording import runner

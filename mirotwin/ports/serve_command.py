@@ -8,7 +8,7 @@ from selectors import DefaultSelector
 from typing import Annotated
 
 from miro_exact.clock import ticks
-from miro_sim.scenario.live import LONGEST_S, live_scenario
+from miro_sim.scenario.file import LONGEST_S, live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import Session

@@ -16,8 +16,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
+from miro_sim.scenario.file import LONGEST_S
 from miro_sim.scenario.keys import MAX_NETWORKS
-from miro_sim.scenario.live import LONGEST_S
 from mirotwin.rerun.pacing import FASTEST
 
 SCHEME = "miro://"

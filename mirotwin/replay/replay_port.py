@@ -13,9 +13,8 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_sim.scenario.file import changed
+from miro_sim.scenario.file import changed, live_settings
 from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.live import live_settings
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort
 from mirotwin.recording.compare import CompareRule

@@ -24,6 +24,8 @@ from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.variants import with_variant
 
 _BUILTIN = Path(__file__).parent / "builtin"
+LONGEST_S = 86_400.0
+"""The longest duration that a scenario may have: a day."""
 Also = Callable[[Scenario, str], object]
 """Another check of a scenario, whose origin is the second argument: raises ScenarioError."""
 
@@ -124,11 +126,9 @@ def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = not
 
 def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = nothing_else) -> Scenario:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
-    return (
-        _checked(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
-        if settings
-        else scenario
-    )
+    if not settings:
+        return scenario
+    return _checked(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
 
 
 def _parsed(
@@ -223,6 +223,34 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
                 raise ScenarioError(origin, path, error.what, error.remedy) from None
         complete.append(network)
     return {**raw, "network": complete}
+
+
+def live_scenario(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
+    """The scenario that `source` names, with `settings` and then those of a live session made in it.
+
+    Its hosts send nothing, because a program at a port does; it lasts a day at most. References that would leave the
+    pitch stop where the scenario's own duration ends. Nothing steers by them; they are the robots' starts, and what the
+    summary compares with. Raises ScenarioError as `load` does, also for a reference of one's own that leaves the pitch
+    within a day, and for a scenario with steps.
+    """
+    if source in builtin_names():
+        settings = ("expect={}", *settings)  # which its own controller is to fulfil, and nothing steers here
+    own = load(source, settings, also)
+    if own.scenario.step:
+        what = "a live session does no steps"
+        raise ScenarioError(source, "step", what, "run them by `mirotwin test`, or remove them")
+    return load(source, (*settings, *live_settings(own.scenario)), also)
+
+
+def live_settings(scenario: Scenario) -> list[str]:
+    """The settings that make a scenario last a day, with hosts that send nothing."""
+    found = [f"duration_s={LONGEST_S!r}"]
+    for index, network in enumerate(scenario.networks):
+        found.append(f'network.{index}.host="silent"')
+        for place, robot in enumerate(network.robot):
+            if getattr(robot.reference, "drive_s", 0.0) is None:  # it would move all the time
+                found.append(f"network.{index}.robot.{place}.reference.drive_s={scenario.duration_s!r}")
+    return found
 
 
 def written(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ import time
 from selectors import DefaultSelector
 from typing import TypeVar
 
-from miro_sim.scenario.live import live_scenario
+from miro_sim.scenario.file import live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort

@@ -7,8 +7,7 @@ import pytest
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import source_text
-from miro_sim.scenario.live import live_scenario
+from miro_sim.scenario.file import live_scenario, source_text
 from miro_sim.world.world import World
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.rerun.job import script_of

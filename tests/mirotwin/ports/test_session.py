@@ -3,7 +3,7 @@
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_sim.scenario.live import live_scenario
+from miro_sim.scenario.file import live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
