@@ -2,15 +2,12 @@ cimport cython
 from libc cimport math
 from miro_exact.dmath cimport sincos
 from miro_sim.pitch cimport rays, scene, sensor
+from miro_sim.pitch.rays cimport enters, entry
 
 cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _FIELD, _BAND
 cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _NEAR, _LOW_U, _HIGH_U, _LOW_V, _HIGH_V, _LIFT, _FAST_UM
 cdef long long _HALF_UM, _TOP_UM
 
-@cython.locals(most='long long')
-cdef bint _enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
-@cython.locals(latest='long long')
-cdef long long _entry(long long u, long long v, long long fall_u, long long fall_v) noexcept
 @cython.locals(place=double)
 cdef int _um(double metres) noexcept
 @cython.locals(below=double)

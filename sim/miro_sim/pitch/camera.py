@@ -25,7 +25,7 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
 from miro_sim.pitch.paints import NUMBERS
 from miro_sim.pitch.picture_settings import PictureSettings
-from miro_sim.pitch.rays import Rays, rays_of
+from miro_sim.pitch.rays import Rays, enters, entry, rays_of
 from miro_sim.pitch.scene import Scene, scene_of
 from miro_sim.pitch.sensor import Sensor
 
@@ -616,7 +616,7 @@ class Camera:
         return entered
 
     def _enter(self, place: int, pixel: int) -> int:
-        """How many samples at the instants of a field see any of a robot: as `_enters`."""
+        """How many samples at the instants of a field see any of a robot: as `rays.enters`."""
         least_u, most_u, least_v, most_v = [0] * 4, [0] * 4, [0] * 4, [0] * 4
         self._bound_corners(self.corner_u, least_u, most_u)
         self._bound_corners(self.corner_v, least_v, most_v)
@@ -763,8 +763,8 @@ class Camera:
             if self._lies_in(_TOP, u, v):
                 self.seen[index] = self._top(body, u, v)
                 self.height_um[index] = _TOP_UM
-            elif _enters(u, v, fall_u, fall_v):
-                height = _entry(u, v, fall_u, fall_v)
+            elif enters(u, v, fall_u, fall_v):
+                height = entry(u, v, fall_u, fall_v)
                 if height > self.height_um[index]:
                     self.seen[index] = self.side
                     self.height_um[index] = height
@@ -794,23 +794,3 @@ def _rounded(x: float) -> int:
     """The nearest whole number, the greater one of two."""
     below = math.floor(x + 0.5)
     return int(below)
-
-
-def _enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
-    """Whether the line from (u, v) on by the fall meets the square of a robot (separating axes)."""
-    if (u < -_HALF_UM and u + fall_u < -_HALF_UM) or (u > _HALF_UM and u + fall_u > _HALF_UM):
-        return False  # both ends are beyond one side
-    if (v < -_HALF_UM and v + fall_v < -_HALF_UM) or (v > _HALF_UM and v + fall_v > _HALF_UM):
-        return False
-    most = _HALF_UM * (abs(fall_u) + abs(fall_v))
-    return -most <= u * fall_v - v * fall_u <= most
-
-
-def _entry(u: int, v: int, fall_u: int, fall_v: int) -> int:
-    """The height at which such a line, which begins outside the square of a robot, enters it."""
-    latest = 0
-    if abs(u) > _HALF_UM and fall_u != 0:
-        latest = (abs(u) - _HALF_UM << 16) // abs(fall_u)
-    if abs(v) > _HALF_UM and fall_v != 0:
-        latest = max(latest, (abs(v) - _HALF_UM << 16) // abs(fall_v))
-    return _TOP_UM - (_TOP_UM * latest >> 16)

@@ -2,11 +2,15 @@ cimport cython
 from miro_host.eye cimport lens
 
 cdef int _WIDTH, _HEIGHT, _CORNERS, _MARGIN_SPARE_UM
-cdef long long _TOP_UM, _MOST
+cdef long long _TOP_UM, _HALF_UM, _MOST
 
 
 @cython.locals(p=int, q=int)
 cpdef long long between(long long a, long long b, long long c, long long d, int sample) noexcept
+@cython.locals(most='long long')
+cpdef bint enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
+@cython.locals(latest='long long')
+cpdef long long entry(long long u, long long v, long long fall_u, long long fall_v) noexcept
 
 
 @cython.final

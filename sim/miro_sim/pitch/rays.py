@@ -22,6 +22,7 @@ _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321
 _TOP_UM = 75_000
+_HALF_UM = 37_500
 _MOST = 8 << 22  # a slope of 8 is 83 degrees: products of slopes and lengths stay within 64 bits
 _MARGIN_SPARE_UM = 4  # what rounding adds: a bilinear mean, and a turn into a robot's axes
 
@@ -130,6 +131,26 @@ def between(a: int, b: int, c: int, d: int, sample: int) -> int:
     p = 2 * (sample & 3) + 1
     q = 2 * (sample >> 2) + 1
     return ((a * (8 - q) + c * q) * (8 - p) + (b * (8 - q) + d * q) * p) >> 6
+
+
+def enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
+    """Whether the line from (u, v) on by the fall meets the square of a robot (separating axes)."""
+    if (u < -_HALF_UM and u + fall_u < -_HALF_UM) or (u > _HALF_UM and u + fall_u > _HALF_UM):
+        return False  # both ends are beyond one side
+    if (v < -_HALF_UM and v + fall_v < -_HALF_UM) or (v > _HALF_UM and v + fall_v > _HALF_UM):
+        return False
+    most = _HALF_UM * (abs(fall_u) + abs(fall_v))
+    return -most <= u * fall_v - v * fall_u <= most
+
+
+def entry(u: int, v: int, fall_u: int, fall_v: int) -> int:
+    """The height at which such a line, which begins outside the square of a robot, enters it."""
+    latest = 0
+    if abs(u) > _HALF_UM and fall_u != 0:
+        latest = (abs(u) - _HALF_UM << 16) // abs(fall_u)
+    if abs(v) > _HALF_UM and fall_v != 0:
+        latest = max(latest, (abs(v) - _HALF_UM << 16) // abs(fall_v))
+    return _TOP_UM - (_TOP_UM * latest >> 16)
 
 
 def _um(metres: float) -> int:
