@@ -88,6 +88,8 @@ class Waits:
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
         """See `World.run_until`."""
         world = self.world
+        if within is not None and not isinstance(within, int):
+            raise ValueError(f"{within!r} is no whole number of ticks; mirotwin.ms(40) gives one")
         if within is not None and within < 0:
             raise ValueError(f"within {within}: give a number of ticks that is not negative")
         begun_tick = world.tick

@@ -162,3 +162,16 @@ def test_what_cannot_be_sent_is_refused(keys, said):
 def test_a_field_that_telemetry_does_not_have_is_refused():
     with pytest.raises(BadInput, match="telemetry has no field 'acepted'; it has seq, slot, flags"):
         rig().links[0].expect(acepted=1, within=1)
+
+
+@pytest.mark.parametrize(
+    "wait",
+    [
+        lambda link: link.expect(within=0.08),
+        lambda link: link.expect_bytes(b"\x55", within=0.08),
+        lambda link: link.expect_silence(0.08),
+    ],
+)
+def test_seconds_where_ticks_belong_are_refused(wait):
+    with pytest.raises(ValueError, match=r"is no whole number of ticks; mirotwin.ms\(40\) gives one"):
+        wait(rig().links[0])
