@@ -38,7 +38,7 @@ cdef class Timer2:
     @cython.locals(left=int, down=int, step=int, span=int, overflows='long long', beyond='long long')
     cdef void _pass(self, long long counts, int rate, long long first) noexcept
     cdef void _overflowed(self, long long overflows, long long cycle) noexcept
-    @cython.locals(first='long long', overflow='long long')
+    @cython.locals(overflow='long long')
     cpdef long long next_flag(self) noexcept
     cpdef long long next_overflow_tick(self) noexcept
     cdef int counts_pin(self) noexcept

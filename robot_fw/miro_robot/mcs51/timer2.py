@@ -143,14 +143,16 @@ class Timer2:
         self.interrupts.ask(_TIMER2, cycle - 1)
 
     def next_flag(self) -> int:
-        """The `since` with which TF2 or EXF2 will ask if nothing changes, or NEVER_TICK."""
-        first = self.synced if self.falls() else _NEVER
+        """No `since` with which TF2 or EXF2 will ask if nothing changes comes before this; NEVER_TICK if none will."""
+        if self.falls():
+            # EXF2 asks a cycle later, but TF2 may go up in the same cycle: by a reload, too.
+            return self.synced - 1
         if self.control & _TF2 or self.silent():
-            return first
-        overflow = self.synced + self.left() - 1 if self.rate() else self.next_pin_overflow()
-        if overflow < _NEVER and overflow - 1 < first:
-            return overflow - 1
-        return first
+            return _NEVER
+        if self.rate():
+            return self.synced + self.left() - 2
+        overflow = self.next_pin_overflow()
+        return overflow - 1 if overflow < _NEVER else _NEVER
 
     def next_overflow_tick(self) -> int:
         """Tick at which the state ends that overflows next as a baud rate generator, or NEVER_TICK."""

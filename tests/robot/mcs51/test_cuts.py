@@ -46,21 +46,25 @@ def test_a_port_latch_that_holds_rxd_low_is_received_as_a_break():
     assert snapshot(whole) == snapshot(cut)
 
 
-def test_tf2_interrupts_a_cycle_before_exf2_of_the_same_cycle():
-    """4316E section 2.16: TF2 is polled in its own cycle. A fall on T2 and T2EX in cycle 20 sets both flags in 21."""
+@pytest.mark.parametrize(
+    ("t2con", "rcap2"), [("0Fh", 0x00), ("0Ch", 0xFF)], ids=["counter", "reload of FFFFh"]
+)
+def test_tf2_interrupts_a_cycle_before_exf2_of_the_same_cycle(t2con, rcap2):
+    """4316E section 2.16: TF2 is polled in its own cycle. A fall on T2 and T2EX in cycle 24 sets both flags in 25."""
 
     def prepare():
         cpu = cpu_with(
-            "LJMP main\nORG 002Bh\nSJMP $\nORG 0040h\nmain:\nMOV IE,#0A0h\nMOV TL2,#0FFh\nMOV TH2,#0FFh\n"
-            "MOV T2CON,#0Fh\n" + "NOP\n" * 40
+            "LJMP main\nORG 002Bh\nSJMP $\nORG 0040h\nmain:\nMOV IE,#0A0h\n"
+            f"MOV RCAP2L,#{rcap2}\nMOV RCAP2H,#{rcap2}\nMOV TL2,#0FFh\nMOV TH2,#{0xFF - rcap2}\n"
+            f"MOV T2CON,#{t2con}\n" + "NOP\n" * 40
         )
-        cpu.set_external(1, T2_AND_T2EX_LOW, 12 * 20)
+        cpu.set_external(1, T2_AND_T2EX_LOW, 12 * 24)
         return cpu
 
     cpu = prepare()
     assert cpu.run_until_pc(0x2B, 100) == BREAKPOINT
-    assert cpu.cycles == 24
-    whole, cut = whole_and_cut(prepare, 23)
+    assert cpu.cycles == 28
+    whole, cut = whole_and_cut(prepare, 27)
     assert snapshot(whole) == snapshot(cut)
 
 
