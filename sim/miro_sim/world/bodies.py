@@ -7,6 +7,7 @@ report changes nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 from operator import itemgetter
@@ -26,8 +27,7 @@ class Bodies:
     def __init__(self, robots: Sequence[Robot]) -> None:
         self.robots = list(robots)
         self.pairs: list[tuple[Robot, Robot, float]] = [
-            (one, other, one.drive.params.top_speed_m_s() + other.drive.params.top_speed_m_s())
-            for one, other in combinations(robots, 2)
+            (one, other, _most_m_s(one) + _most_m_s(other)) for one, other in combinations(robots, 2)
         ]
         self.looks: list[tuple[int, int]] = []  # in this piece: index of a pair, and its first tick
         self.start_again([])
@@ -87,6 +87,12 @@ class Bodies:
             self.next_tick = min(self.next_ticks)
         found.sort(key=itemgetter(0))
         return found
+
+
+def _most_m_s(robot: Robot) -> float:
+    """No robot is faster, unless a force pushes it."""
+    params = robot.drive.params
+    return math.inf if params.disturbance.is_on() else params.top_speed_m_s()
 
 
 def _noted(robot: Robot, tick: int) -> Pose:

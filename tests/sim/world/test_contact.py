@@ -152,7 +152,7 @@ def touches_by_looking_always(world, end_tick):
     while world.tick < end_tick:
         world.run_to(world.tick + GRID_TICKS)
         at = [robot.drive.pose_at(world.tick) for robot in robots]
-        now = [(a, b) for a, b in itertools.combinations(range(5), 2) if touch(at[a], at[b])]
+        now = [(a, b) for a, b in itertools.combinations(range(len(robots)), 2) if touch(at[a], at[b])]
         found += [(world.tick, (0, a), (0, b)) for a, b in now if (a, b) not in before]
         before = now
     return found
@@ -191,3 +191,31 @@ def test_after_a_load_a_contact_is_reported_when_it_begins_and_not_again():
         other.run_until(wait.Touch(), within=GRID_TICKS)
     world.load(apart)
     assert world.run_until(wait.Touch()).tick == tick
+
+
+PUSHED = """
+name = "pushed"
+duration_s = 1.0
+camera.kind = "gaussian"
+
+[[network]]
+
+[[network.robot]]
+slot = 0
+reference = {kind = "line", start_x_cm = 15, start_y_cm = 35, speed_m_s = 0.05}
+drive = {battery.voltage_v = 1, tyre.grip = 0.05, disturbance.force_n = 5}
+
+[[network.robot]]
+slot = 1
+reference = {kind = "line", start_x_cm = 85, start_y_cm = 35, speed_m_s = 0.01}
+drive.battery.voltage_v = 1
+"""
+
+
+@pytest.mark.parametrize("cut_ticks", [800_800, 300_007])
+def test_a_robot_that_a_force_pushes_faster_than_it_drives_is_reported_where_it_touches(cut_ticks):
+    world, slow = (World(file.parse(PUSHED, "pushed"), 3, image()) for _ in range(2))
+    end_tick = 15 * 800_800
+    while world.tick < end_tick:
+        world.run_to(min(end_tick, world.tick + cut_ticks))
+    assert touches(world) == touches_by_looking_always(slow, end_tick) != []
