@@ -2,5 +2,5 @@
 
 What belongs here: everything that observes running firmware and turns the result into text or records. What does
 not: the CPU itself (`mcs51/`), which knows of all this only that an inspector may run it, and the command line
-(`mirotwin.commands.fw_*`). Watching changes no bit of a run.
+(`mirotwin fw`). Watching changes no bit of a run.
 """
