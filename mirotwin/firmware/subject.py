@@ -6,9 +6,10 @@ import os
 from typing import Annotated
 
 from miro_exact import clock
-from miro_exact.bad_input import BadInput, amount
+from miro_exact.bad_input import BadInput
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
+from miro_sim.scenario.errors import use_one_of
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
@@ -167,8 +168,8 @@ def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
     """(network, place among its robots) of the robot that was asked for. Raises BadInput."""
     network = options.network or 0
     if network >= len(world.networks):
-        there = amount(len(world.networks), "network is there", "networks are there, from 0 on")
-        raise BadInput(options.subject, f"--network {network}", "there is no such network", there)
+        remedy = use_one_of(map(str, range(len(world.networks))))
+        raise BadInput(options.subject, f"--network {network}", "there is no such network", remedy)
     slots = [robot.spec.slot for robot in world.networks[network].robots]
     if options.slot is None:
         return network, 0

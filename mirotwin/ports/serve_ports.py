@@ -8,7 +8,8 @@ from pathlib import Path
 from selectors import BaseSelector
 from typing import Annotated
 
-from miro_exact.bad_input import BadInput, amount, shortened
+from miro_exact.bad_input import BadInput, shortened
+from miro_sim.scenario.errors import use_one_of
 from miro_sim.world.world import World
 from mirotwin.ports import endpoint
 from mirotwin.ports.endpoint import Endpoint, Tell
@@ -103,8 +104,8 @@ def open_ports(
 
     def context(option: str, network: int) -> endpoint.PortContext:
         if network >= len(radios):
-            there = amount(len(radios), "network is there", "networks are there, from 0 on")
-            raise BadInput(option, "", f"there is no network {network}", there)
+            remedy = use_one_of(map(str, range(len(radios))))
+            raise BadInput(option, "", f"there is no network {network}", remedy)
         return endpoint.PortContext(radios[network], selector, tell)
 
     pty = options.pty if options.pty or options.tcp or options.rfc2217 else [("", 0)]

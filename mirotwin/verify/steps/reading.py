@@ -62,8 +62,7 @@ def problem(step: Step, scenario: Scenario) -> str:
     """Why this step cannot be done in this scenario, as `key: what; remedy`, or the empty string."""
     networks = scenario.networks
     if step.network >= len(networks):
-        there = "there is one" if len(networks) == 1 else f"there are {len(networks)}, from 0 on"
-        return f"network: there is no network {step.network}; {there}"
+        return f"network: there is no network {step.network}; {use_one_of(map(str, range(len(networks))))}"
     return step.problem(networks[step.network])
 
 

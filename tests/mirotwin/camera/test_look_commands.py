@@ -165,7 +165,7 @@ def test_looking_changes_no_bit_of_the_world(short):
         (("fig6", "--from", "7s"), "the run ends at tick"),
         (("fig6", "--from", "7 sec"), "is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks"),
         (("fig6", "--slot", "1"), "no robot in that slot; there is 0"),
-        (("fig6", "--network", "1"), "there is no such network; 1 network is there"),
+        (("fig6", "--network", "1"), "there is no such network; use 0"),
         (("fig6", "--until", "main"), "--until does not apply to it"),
         (("fig5",), "no such scenario"),
         (("gone.ihx",), "there is no such file"),

@@ -140,7 +140,7 @@ def test_the_command_line_replays_a_session(mirotwin, tmp_path):
     [
         (["nope"], "no such scenario"),
         (["fig6", "--tcp", "70000"], "'70000' is no port, such as 7000, or 7000@1 for network 1."),
-        (["fig6", "--tcp", "0@1"], "--tcp: there is no network 1; 1 network is there"),
+        (["fig6", "--tcp", "0@1"], "--tcp: there is no network 1; use 0"),
         (["fig6", "--host", "203.0.113.9", "--tcp", "0"], "--tcp 0: 203.0.113.9: "),
         (["fig6", "--pace", "0"], "--pace"),
         (["fig6", "--duration", "1000000000s"], "--duration"),

@@ -34,7 +34,7 @@ WRONG = {
     '{ send = "team", left_cm_s = 20 }': "step 1.left_cm_s: unknown key; use left_m_s, in metres per second",
     '{ send = "team", left_m_s = 3 }': "step 1.left_m_s: 3 is out of range; must be <= 2.876 in metres per sec",
     '{ send = "team", slot = 3 }': "step 1.slot: 3 does not exist on a network of 3 robots; use 0 to 2",
-    '{ send = "team", network = 1 }': "step 1.network: there is no network 1; there is one",
+    '{ send = "team", network = 1 }': "step 1.network: there is no network 1; use 0",
     '{ send = "team", team_m_s = [[0, 0]] }': "step 1.team_m_s: 1 pair for 3 slots; give one pair",
     '{ send = "team", slot = 0, team_m_s = [[0, 0], [0, 0], [0, 0]] }': "step 1.team_m_s: tells all slots; leave",
     '{ send = "team", wrong_bits = [120] }': "step 1.wrong_bits: 120 is none of 120 bits from HDR to CRC; use 0",
