@@ -1,4 +1,4 @@
-"""A target: a machine that runs one fuzz input after the other, from the same moment each time; the robot as one."""
+"""Targets: machines that run one fuzz input after the other, from the same moment each time; the robot is one."""
 
 from __future__ import annotations
 

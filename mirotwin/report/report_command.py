@@ -149,7 +149,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
     notes = []
     if extras.broken_off:
         notes.append(
-            f"This run was broken off: the page shows {amount(len(recorded), 'control period')} that it recorded."
+            f"This run was broken off: the page shows what it recorded, {amount(len(recorded), 'control period')}."
         )
     if other:
         recorded = [period for period in again.periods if period.index in shown]

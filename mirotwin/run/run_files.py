@@ -42,14 +42,11 @@ if TYPE_CHECKING:
     from mirotwin.camera.view import View
     from mirotwin.verify.steps.player import Player
 
-
 SUMMARY = "summary.json"
 FIGURE = "figure.svg"
 FLUSH_S = 0.2
 """Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
-
-
-SUFFIX = ".world"
+WORLD_SUFFIX = ".world"
 
 
 class Stops:
@@ -68,7 +65,7 @@ class Stops:
     @property
     def names(self) -> list[str]:
         """The files that it writes."""
-        return [f"at-{tick}{SUFFIX}" for tick in self.save_ticks]
+        return [f"at-{tick}{WORLD_SUFFIX}" for tick in self.save_ticks]
 
     def begin(self, world: World) -> None:
         """Puts `world` to where the saved one is, and to the end of its control period."""
@@ -102,7 +99,7 @@ class Stops:
         while not world.finished and world.tick < end_tick:
             world.run_to(min([end_tick, world.period_end, *waiting[:1]]))
             if waiting and world.tick == waiting[0]:
-                folder.part(f"at-{waiting.pop(0)}{SUFFIX}").write_bytes(world.save())
+                folder.part(f"at-{waiting.pop(0)}{WORLD_SUFFIX}").write_bytes(world.save())
 
     def __bool__(self) -> bool:
         return bool(self.save_ticks or self.to_tick is not None or self.resume is not None)
@@ -248,8 +245,8 @@ class RunFiles:
         with suppress(OSError):  # a full disk, which is reported as what broke the run off
             self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False, reason=reason)))
         complain(
-            f"the run broke off after {amount(self.tracks.count, 'control period; it is', 'control periods; they are')}"
-            f" in {self.folder.path / part_name(RECORDING)}"
+            f"the run broke off after {amount(self.tracks.count, 'control period')},"
+            f" recorded in {self.folder.path / part_name(RECORDING)}"
         )
 
 

@@ -1,5 +1,5 @@
-"""Between pytest's items and rigs: making a test's rig, judging it, telling what came of it, and what a failed test
-leaves: the lines of its report, and a folder of its own with them, its case and its page.
+"""Between pytest's items and rigs: makes a test's rig, judges it, and reports its result. A failed test leaves a folder
+with the lines of its report, its case and its page.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true" for text in expected)
 
 
-def told(checks: Checks) -> Iterator[tuple[bool, str]]:
+def failure_lines(checks: Checks) -> Iterator[tuple[bool, str]]:
     """Which checks failed and which had nothing to judge, a line each, and whether it failed.
 
     Firmware faults have lines and an exit code of their own.
@@ -69,9 +69,9 @@ def told(checks: Checks) -> Iterator[tuple[bool, str]]:
 
 
 def report_failures(checks: Checks) -> int:
-    """Says the same on stderr; returns the exit code."""
+    """Says on stderr which checks failed and which had nothing to judge; returns the exit code."""
     code = DONE
-    for failed, line in told(checks):
+    for failed, line in failure_lines(checks):
         complain(line)
         code = EXPECTATION_FAILED if failed else code
     return code

@@ -55,5 +55,7 @@ def ball(at: tuple[float, float, float], radius_m: float, color: Color) -> Spher
 def line(
     points: Iterable[Point], z_m: float, wide_m: float, color: Color, kind: int = LINE_STRIP
 ) -> LinePrimitive:
-    """From point to point at one height; LINE_LOOP: back to the first, LINE_LIST: from each other one to the next."""
+    """At one height. LINE_STRIP: from point to point; LINE_LOOP: and back to the first; LINE_LIST: from the first to
+    the second, from the third to the fourth, and so on.
+    """
     return LinePrimitive(kind, ORIGIN, wide_m, False, tuple(Vector3(x, y, z_m) for x, y in points), color)

@@ -120,9 +120,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
         self.air = self.before = self._air()
-        self.seen: list[
-            tuple[tuple[int, ...], int]
-        ] = []  # air and reset at the end of periods, the oldest first
+        self.seen: list[tuple[tuple[int, ...], int]] = []
+        """Air, and tick of the last reset, at the end of each control period that is not judged, oldest first."""
         self.counted = self.shown = 0
         self.begun_tick = -1
         self.chip = self.board.left

@@ -119,7 +119,7 @@ class Monitor(Generic[C_co]):
     """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
     LATER = False
-    """Whether it may be told of some control periods together. It must not read the robot itself then, but for
+    """Whether it may be told of several control periods at once. If so, it must not read the robot except in
     `period_over` and `end`."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
@@ -151,7 +151,7 @@ class Monitor(Generic[C_co]):
         """The robot as it was at `tick`, the start of the control period that is over."""
 
     def period_over(self) -> None:
-        """A control period is over, which `period` is told of now or later: what is read of the robot is as it is."""
+        """A control period is over. The robot can be read as it is now; `period` is called now or later."""
 
     def until(self, tick: int) -> None:
         """All events before `tick` have been told."""

@@ -24,7 +24,7 @@ from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import told
+from mirotwin.verify.expectations import failure_lines
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.verify.steps.player import Player, check_symbols
 from mirotwin.verify.steps.reading import everything, steps_of
@@ -149,7 +149,7 @@ def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str,
     ]
     if player.failure is not None:
         lines.append(f"step failed: {player.failure}")
-    found = [one for group in (checks, *player.checks) for one in told(group)]
+    found = [one for group in (checks, *player.checks) for one in failure_lines(group)]
     lines += [line for failed, line in found if failed]
     return tuple(lines), tuple(line for failed, line in found if not failed)
 

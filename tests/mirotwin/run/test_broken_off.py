@@ -93,7 +93,7 @@ def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
     assert (found, out) == (code, "")
     first, last = filter(None, err.splitlines())  # after ^C, a new line
     assert first == (
-        f"mirotwin: the run broke off after 3 control periods; they are in {tmp_path / 'run.part.mcap'}"
+        f"mirotwin: the run broke off after 3 control periods, recorded in {tmp_path / 'run.part.mcap'}"
     )
     assert last.endswith(said)
     assert names(tmp_path) == sorted([*before, *PARTS])
