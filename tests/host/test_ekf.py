@@ -1,11 +1,13 @@
 """The extended Kalman filter: what it learns, what it refuses, what it bridges, and what it remembers."""
 
 import math
+from typing import Annotated
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import Meta
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import restore, snapshot
@@ -245,3 +247,13 @@ def test_a_number_that_is_not_finite_is_found():
 def test_a_parameter_out_of_range_is_refused(name, value):
     with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
         EkfParameters(**{name: value})
+
+
+def test_a_derived_filter_may_have_keys_with_one_bound_or_none():
+    class Own(EkfParameters, frozen=True, kw_only=True, tag="own"):
+        length_m: Annotated[float, Meta(gt=0.0)] = 0.1
+        least_m: Annotated[float, Meta(ge=0.0), "where nothing is sure"] = 0.1
+
+    assert Own(length_m=2.0, least_m=3.0).length_m == 2.0
+    with pytest.raises(ValueError, match="gate"):
+        Own(gate=0.0)

@@ -54,12 +54,13 @@ TOLD_NOISE = (0.0081, 0.028)
 
 @cache
 def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
-    """The least and the most of each parameter, as its annotation says."""
+    """The least and the most of each parameter whose annotation says both."""
     found = {}
     for field in msgspec.structs.fields(parameters):
         for kind in (field.type, *get_args(field.type)):
             for meta in getattr(kind, "__metadata__", ()):
-                found[field.name] = meta.ge, meta.le
+                if isinstance(meta, Meta) and meta.ge is not None and meta.le is not None:
+                    found[field.name] = meta.ge, meta.le
     return found
 
 
