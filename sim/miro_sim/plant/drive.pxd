@@ -24,6 +24,7 @@ cdef class Winding:
     cdef long long row[6]
     cdef readonly Decay decay
 
+    cdef inline bint rests(self) noexcept
     @cython.locals(longest=int)
     cpdef int after_load(self) except -1
     cpdef void set_bridge(self, int enable, int forward) noexcept
@@ -94,7 +95,13 @@ cdef class DifferentialDrive(Plant):
     @cython.final
     @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int, steps=cython.int, constant=double,
                    impulse=double, left_charge=double, right_charge=double)
-    cdef int _run(self, long long until, long long last, long long left_tick, long long right_tick) except -1
+    cdef void _run(self, long long until, long long last, long long left_tick, long long right_tick) except *
+    @cython.final
+    @cython.locals(still=cython.bint)
+    cdef inline bint _stands(self) noexcept
+    @cython.final
+    @cython.locals(end=cython.longlong)
+    cdef inline void _stand(self, long long until, long long last) noexcept
     @cython.final
     @cython.locals(body=Body)
     cdef int _move(self, int steps) except -1

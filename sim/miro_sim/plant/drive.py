@@ -189,6 +189,10 @@ class Winding:
         self.current_a = final * (1.0 - dmath.exp_within(-ticks / self.tau[kind]))
         return final * ticks - self.tau[kind] * self.current_a
 
+    def rests(self) -> bool:
+        """Whether no current flows and the bridge is off and stays so: nothing drives a shaft that stands."""
+        return self.current_a == 0.0 and self.drive == 0 and self.wait_ticks == 0
+
     def after_load(self) -> None:
         """Raises ValueError unless the bridge waits exactly while it does not do what its inputs ask for."""
         longest = self.off_ticks if self.drive != 0 else self.on_ticks
@@ -407,6 +411,9 @@ class DifferentialDrive(Plant):
 
     def _run(self, until: int, last: int, left_tick: int, right_tick: int) -> None:
         """Steps that end by `until`, until one has ended at `last`; edges of PWM from these two ticks on."""
+        if last <= left_tick and last <= right_tick and self._stands():
+            self._stand(until, last)
+            return
         left = self.left
         right = self.right
         constant = self.torque_constant_nm_a
@@ -438,6 +445,17 @@ class DifferentialDrive(Plant):
             now = min(begin + LONGEST_STEP, last, left_tick, right_tick)
         self._move(steps)
         self.next_tick = begin + LONGEST_STEP
+
+    def _stands(self) -> bool:
+        """Whether all steps up to the next edge of PWM change nothing."""
+        still = self.body.left_rad_s == 0.0 and self.body.right_rad_s == 0.0 and self.rough is None
+        return still and self.left_winding.rests() and self.right_winding.rests()
+
+    def _stand(self, until: int, last: int) -> None:
+        """The time of such steps."""
+        end = last if last <= until else until - (until - self.tick) % LONGEST_STEP
+        self.tick = max(self.tick, end)
+        self.next_tick = self.tick + LONGEST_STEP
 
     def _move(self, steps: int) -> None:
         """Posture and encoders follow what the shafts turned in these steps."""

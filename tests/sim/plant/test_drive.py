@@ -249,6 +249,35 @@ def test_a_long_advance_is_cut_into_pwm_periods(periods):
     assert snapshot(one) == snapshot(other)
 
 
+def test_a_drive_that_stands_goes_on_in_pwm_periods_like_one_that_moves():
+    """Up to a tick, and between edges of PWM without one: the last step ends by the tick that is asked for."""
+    drive = DifferentialDrive(PARAMS)
+    drive.attach(Lm629(), Lm629())
+    begun = snapshot(drive)
+    found = []
+    for until in (2047, 2048, 9000, 9001, 10240):
+        drive.run_pulses(until)
+        found.append((drive.tick, drive.next_tick))
+    assert found == [(0, 2048), (2048, 4096), (8192, 10240), (8192, 10240), (10240, 12288)]
+    drive.advance(10300)
+    assert (drive.tick, drive.next_tick) == (10300, 12348)
+    other = DifferentialDrive(PARAMS)
+    restore(other, begun)
+    other.advance(10300)
+    assert snapshot(drive) == snapshot(other)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_bridge_that_waits_to_be_on_ends_the_rest(side):
+    """The delay is shorter than a step: a drive that stood moves in the step in which its bridge begins to drive."""
+    drive = DifferentialDrive(PARAMS)
+    drive.advance(5000)
+    drive.set_bridge(5000, side, 1, 1)
+    drive.advance(7048)
+    assert (drive.left_winding, drive.right_winding)[side].current_a > 0.0
+    assert (drive.body.left_rad_s, drive.body.right_rad_s)[side] > 0.0
+
+
 @settings(max_examples=20)
 @given(MAGNITUDES, MAGNITUDES, MAGNITUDES, MAGNITUDES)
 def test_a_restored_drive_goes_on_with_the_same_bits(left, right, next_left, next_right):
