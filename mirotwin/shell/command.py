@@ -166,7 +166,7 @@ class _Field(NamedTuple):
     def label(self) -> str:
         """How a message calls it."""
         if isinstance(self.declared, Argument):
-            return self.declared.metavar
+            return self.declared.metavar.strip("[]")
         assert self.declared is not None
         names = self.declared.names or (f"--{self.name.replace('_', '-')}",)
         return max(names, key=len)
