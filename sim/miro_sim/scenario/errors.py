@@ -52,6 +52,13 @@ class ScenarioError(BadInput):
     """A scenario that cannot be used: file or built-in name, key path or line, what, remedy."""
 
 
+class Refused(BadInput):
+    """A key or a value that cannot be used, of which the caller knows the place: what, and what to write instead."""
+
+    def __init__(self, what: str, remedy: str = "") -> None:
+        super().__init__("", "", what, remedy)
+
+
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
     """What msgspec found, in the words of the file: path without `$`, and a remedy."""
     match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)

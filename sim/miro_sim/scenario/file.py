@@ -15,11 +15,11 @@ from miro_exact.bad_input import did_you_mean, one_line
 from miro_exact.inputs import InputError, read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables, without_none
 from miro_sim.scenario.base import is_path, with_base
-from miro_sim.scenario.errors import ScenarioError, value_error
+from miro_sim.scenario.errors import Refused, ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
-from miro_sim.scenario.profiles import Refused, with_profiles
+from miro_sim.scenario.profiles import with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.variants import with_variant
 

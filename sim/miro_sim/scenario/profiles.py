@@ -6,19 +6,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import did_you_mean
+from miro_sim.scenario.errors import Refused
 
 ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
 """Two ways to say one thing: a table that has one of them takes the other one away."""
 
 Table = dict[str, Any]
-
-
-class Refused(BadInput):
-    """A key or a value that cannot be used, of which the caller knows the place: what, and what to write instead."""
-
-    def __init__(self, what: str, remedy: str = "") -> None:
-        super().__init__("", "", what, remedy)
 
 
 @cache

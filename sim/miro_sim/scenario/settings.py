@@ -13,10 +13,10 @@ import msgspec
 
 from miro_host.registries import LAWS
 from miro_protocol.toml_text import TomlError, value_of
-from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.errors import Refused, ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec
 from miro_sim.scenario.plugins import REGISTRIES
-from miro_sim.scenario.profiles import ERROR_KEYS, Refused
+from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.variants import impose
 
 Table = dict[str, Any]

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from miro_exact.bad_input import did_you_mean
-from miro_sim.scenario.profiles import Refused, overridden
+from miro_sim.scenario.errors import Refused
+from miro_sim.scenario.profiles import overridden
 
 Table = dict[str, Any]
 
