@@ -39,14 +39,21 @@ def problems(engine, folder):
         yield f"the digest of {GOLDEN} is {summary['digest']}, not {golden}"
     if summary["engine"] != engine:
         yield f"the run had the engine {summary['engine']}, not {engine}"
+    dissector = (ROOT / "protocol" / "miro.lua").read_text(encoding="utf-8")
+    if _output(folder, sys.executable, "-m", "miro_protocol.dissector") != dissector:
+        yield "miro_protocol.dissector does not print protocol/miro.lua"
 
 
 def _mirotwin(folder, *arguments):
     """What the installed program prints. Raises SystemExit where it fails."""
     program = Path(sysconfig.get_path("scripts")) / ("mirotwin.exe" if os.name == "nt" else "mirotwin")
+    return _output(folder, str(program), *arguments)
+
+
+def _output(folder, *command):
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        [str(program), *arguments],
+        command,
         cwd=folder,
         env={**environment, "COLUMNS": "200", "PYTHONUTF8": "1"},
         capture_output=True,
@@ -54,7 +61,7 @@ def _mirotwin(folder, *arguments):
         encoding="utf-8",
     )
     if done.returncode:
-        raise SystemExit(f"mirotwin {' '.join(arguments)}: exit code {done.returncode}\n{done.stderr}")
+        raise SystemExit(f"{' '.join(command)}: exit code {done.returncode}\n{done.stderr}")
     return done.stdout
 
 
