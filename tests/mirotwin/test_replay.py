@@ -1,5 +1,8 @@
 """Replay without a world: scripts, the comparison of periods, and streams as scenarios."""
 
+import re
+from types import SimpleNamespace
+
 import msgspec
 import pytest
 from hypothesis import given
@@ -14,7 +17,7 @@ from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
-from mirotwin.replay.differences import frame_text
+from mirotwin.replay.differences import frame_text, print_frames
 from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
@@ -163,3 +166,19 @@ def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place):
     (row,) = rows([Transmission(0, "<", answer, 0, (place,))], {0: 3}.__getitem__)
     assert (row.event.start_tick, row.message) == (0, None)
     assert frame_text(row).startswith("19 bytes, bad stop bit: 55 55")
+
+
+@pytest.mark.parametrize("networks", [1, 2])
+def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(capsys, networks):
+    answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
+    sent = (
+        Transmission(0, ">", team(3)),
+        Transmission(900_000, "<", answer),
+        Transmission(2_000_000, "<", answer, bad_stop=(5,)),
+    )
+    recorded = [msgspec.structs.replace(PERIOD, wire=sent)]
+    scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3)] * networks)
+    print_frames(SimpleNamespace(scenario=scenario, recorded=recorded), [], True, None)
+    lines = [re.split("  +", line.strip()) for line in capsys.readouterr().out.splitlines()[1:]]
+    network = "net0 " if networks > 1 else ""
+    assert [line[3] for line in lines] == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]
