@@ -21,7 +21,7 @@ from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.fuzz_summary import CampaignEnd, FuzzProgress, report
+from mirotwin.fuzz.fuzz_output import CampaignEnd, FuzzProgress, report
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.spec import TargetSpec

@@ -21,8 +21,8 @@ MISTAKE = "takes frames with a bad CRC"
 def started(tmp_path, *arguments):
     """The command in a process of its own, with the engine of the tests and a line of progress each second."""
     program = (
-        "import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_summary as progress\n"
-        "progress.LINE_S = 1.0\n"
+        "import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_output as output\n"
+        "output.LINE_S = 1.0\n"
         "from tests.mirotwin.fuzz.random_engine import RandomEngine\n"
         "fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (\n"
         "    RandomEngine(target, list(inputs), folder.folder('engine'), seed), [])\n"
