@@ -68,7 +68,7 @@ cdef class Camera:
     @cython.locals(middle=int, reach=int, length='long long', number=int, place=int, way='long long', turn='long long',
                    drift='long long')
     cdef void _bound(self, int body) noexcept
-    @cython.locals(out=bytearray)
+    @cython.locals(is_any=bint, out=bytearray)
     cpdef bytearray window(self, long long left, long long top, long long width, long long height)
     @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, bytearray out)

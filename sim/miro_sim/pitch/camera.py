@@ -264,7 +264,8 @@ class Camera:
 
     def window(self, left: int, top: int, width: int, height: int) -> bytearray:
         """A window's pixels: see `miro_host.eye.grabber`. Raises ValueError for one that is not inside the picture."""
-        if min(left, top, width - 1, height - 1) < 0 or left + width > _WIDTH or top + height > _HEIGHT:
+        is_any = left >= 0 and top >= 0 and width > 0 and height > 0
+        if not is_any or left > _WIDTH - width or top > _HEIGHT - height:  # no sum, which may overflow
             raise ValueError(
                 f"window {width} x {height} at ({left}, {top}) is not inside {_WIDTH} x {_HEIGHT}"
             )

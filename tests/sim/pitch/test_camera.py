@@ -194,7 +194,16 @@ def test_a_grabber_of_few_bits_has_few_levels():
 
 def test_what_cannot_be_is_refused():
     one = camera()
-    for bad in ((-1, 0, 4, 4), (0, 0, 0, 4), (300, 0, 21, 1), (0, 239, 1, 2)):
+    most, least = (1 << 63) - 1, -1 << 63
+    beside = (-1, 0, 4, 4), (0, 0, 0, 4), (300, 0, 21, 1), (0, 239, 1, 2)
+    for bad in (
+        *beside,
+        (most, 0, 1, 1),
+        (1, most, 1, 1),
+        (1, 0, most, 1),
+        (0, 1, 1, most),
+        (0, 0, least, least),
+    ):
         with pytest.raises(ValueError, match="is not inside 320 x 240"):
             one.window(*bad)
     with pytest.raises(ValueError, match="no robot 5 of team 0 has colours"):
