@@ -4,7 +4,7 @@ from miro_exact.dmath cimport sincos
 from miro_sim.pitch cimport rays, scene, sensor
 from miro_sim.pitch.rays cimport enters, entry
 
-cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _FIELD, _BAND
+cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM, _ROUNDED_UM, _LINE, _FIELD, _BAND, _PLACES
 cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _NEAR, _LOW_U, _HIGH_U, _LOW_V, _HIGH_V, _LIFT, _FAST_UM
 cdef long long _HALF_UM, _TOP_UM
 
@@ -22,7 +22,12 @@ cdef class Camera:
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
     cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, upper, lower, above, below
-    cdef int covered_first, covered_end, lanes, times
+    cdef int lanes, times, place
+    cdef list stood, covers
+    cdef long long changes, scene_changed
+    cdef long long changed[10]
+    cdef int covered_first[4]
+    cdef int covered_end[4]
     cdef int instants[6]
     cdef double after_s[6]
     cdef int team_paint[10]
@@ -51,14 +56,14 @@ cdef class Camera:
     cdef int high_u[4]
     cdef int low_v[4]
     cdef int high_v[4]
-    cdef unsigned char covered[4096]
-    cdef long long total[4096]
+    cdef unsigned char covered[16384]
+    cdef long long total[16384]
     cdef int u[16]
     cdef int v[16]
     cdef int seen[128]
     cdef int height_um[128]
 
-    @cython.locals(body=int, number=int, place=int, after_s=double, way_m=double, sine=double, cosine=double,
+    @cython.locals(stood=tuple, body=int, number=int, place=int, after_s=double, way_m=double, sine=double, cosine=double,
                    least_u=int, most_u=int, least_v=int, most_v=int)
     cpdef robot(self, int team, int identity, double x_m, double y_m, double theta_rad, double v_m_s=*, double w_rad_s=*)
     @cython.locals(cosine='long long', sine='long long', drop='long long', x='long long', y='long long')
@@ -72,11 +77,12 @@ cdef class Camera:
     cpdef bytearray window(self, long long left, long long top, long long width, long long height)
     @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, bytearray out)
-    @cython.locals(column=int, sure=bint, total='long long')
+    @cython.locals(column=int)
     cdef void _put_robots(self, int row, int at) noexcept
-    @cython.locals(width=int, height=int, at=int, pixel=int, most='long long', body=int)
-    cdef void _cover(self, int top, int bottom, int first, int end) noexcept
-    @cython.locals(at=int, row=int, left=int, right=int, column=int)
+    @cython.locals(width=int, height=int, at=int, pixel=int, most='long long', body=int, near=int, newest='long long',
+                   place=int, cover=tuple)
+    cdef void _cover(self, int top, int bottom, int first, int end) except *
+    @cython.locals(at=int, row=int, left=int, right=int, column=int, place=int)
     cdef void _cover_with(self, int body, int top, int bottom, int first, int end) noexcept
     @cython.locals(step=int, left=int, right=int, beside='long long')
     cdef void _find_span(self, int body, int row, int first, int end) noexcept

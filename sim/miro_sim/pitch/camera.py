@@ -37,12 +37,8 @@ _TOP_UM = 75_000
 _ROUNDED_UM = 8  # what rounding adds
 _TOP, _TEAM, _IDENTITY = 0, 1, 2  # rectangles in the axes of any robot
 _REACH, _BASE, _NEAR = 3, 4, 5  # and those of one robot, three for each
-_LOW_U, _HIGH_U, _LOW_V, _HIGH_V = (
-    0,
-    1,
-    2,
-    3,
-)  # edges: the last u before a rectangle, the last u in it, then v
+_LOW_U, _HIGH_U = 0, 1  # edges: the last u before a rectangle, the last u in it, then v
+_LOW_V, _HIGH_V = 2, 3
 _OUT = -1
 _FAR_UM = 1 << 29
 _MIXED = 255
@@ -54,6 +50,7 @@ _FIELD = 704  # two lines: the corners above and below a line of pixels
 _LIFT = 1 << 30  # makes lengths positive, so that what is cut off is rounded down
 _FAST_UM = 1 << 23  # who drifts further is drawn sample by sample
 _BAND = 4096  # pixels that are worked on at once
+_PLACES = 4  # bands that are kept: a window of each robot of a team
 _SURE, _UNSURE = 1, 2  # whether the samples of a pixel in which robots may be seen are known
 
 
@@ -66,22 +63,12 @@ class Camera:
 
     NOT_STATE = (
         *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
-        *(
-            "field_sets",
-            "fields",
-            "instants",
-            "after_s",
-            "side",
-            "black",
-            "robots",
-            "team_paint",
-            "identity_paint",
-            "x",
-            "y",
-        ),
-        *("cos", "sin", "shift_u", "shift_v", "edges", "drift_um", "span_first", "span_end"),
+        *("field_sets", "fields", "instants", "after_s", "side", "black"),
+        *("robots", "team_paint", "identity_paint"),
+        *("x", "y", "cos", "sin", "shift_u", "shift_v", "edges", "drift_um", "span_first", "span_end"),
         *("corner_u", "corner_v", "line_least_u", "line_most_u", "line_least_v", "line_most_v"),
         *("least_u", "most_u", "least_v", "most_v"),
+        *("stood", "changes", "changed", "scene_changed", "place", "covers"),
         *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
         *("lanes", "times", "above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
         *("u", "v", "seen", "height_um"),
@@ -93,8 +80,7 @@ class Camera:
         self.parameters = parameters
         self.settings = settings
         self.pattern = pattern
-        self.width = WIDTH
-        self.height = HEIGHT
+        self.width, self.height = WIDTH, HEIGHT
         self.rays: Rays = rays_of(parameters)
         self.scene: Scene = scene_of(parameters, settings, None)
         self.sensor = Sensor(settings, stream)
@@ -117,48 +103,36 @@ class Camera:
             self.edges[4 * box + _LOW_U], self.edges[4 * box + _HIGH_U] = u - half - 1, u + half
             self.edges[4 * box + _LOW_V], self.edges[4 * box + _HIGH_V] = v - half - 1, v + half
         self.robots = 0
-        self.team_paint = [0] * 10
-        self.identity_paint = [0] * 10
-        self.x = [0] * 80
-        self.y = [0] * 80
-        self.cos = [0] * 84
-        self.sin = [0] * 84
-        self.shift_u = [0] * 80
-        self.shift_v = [0] * 80
+        self.team_paint, self.identity_paint = [0] * 10, [0] * 10
+        self.x, self.y = [0] * 80, [0] * 80
+        self.cos, self.sin = [0] * 84, [0] * 84
+        self.shift_u, self.shift_v = [0] * 80, [0] * 80
         self.drift_um = [0] * 10
-        self.span_first = 0
-        self.span_end = 0
-        self.corner_u = [0] * 5632
-        self.corner_v = [0] * 5632
+        self.span_first, self.span_end = 0, 0
+        self.corner_u, self.corner_v = [0] * 5632, [0] * 5632
         self.line_least_u = [0] * 704  # of corners above and below a line of pixels, over all instants
         self.line_most_u = [0] * 704
-        self.line_least_v = [0] * 704
-        self.line_most_v = [0] * 704
-        self.least_u = [0] * 352  # of pixels: between their corners
-        self.most_u = [0] * 352
-        self.least_v = [0] * 352
-        self.most_v = [0] * 352
-        self.covered = [0] * 4096
-        self.covered_first = 0
-        self.covered_end = 0
-        self.total = [0] * 4096
-        self.first = 0
-        self.samples = 16
+        self.line_least_v, self.line_most_v = [0] * 704, [0] * 704
+        self.least_u, self.most_u = [0] * 352, [0] * 352  # of pixels: between their corners
+        self.least_v, self.most_v = [0] * 352, [0] * 352
+        self.stood: list[object] = [()] * 10  # how each robot was put on the pitch
+        self.changes = 0  # of robots and of the scene, so far
+        self.changed = [0] * 10  # the last one of each robot
+        self.scene_changed = 0
+        self.place = 0  # of the band that is worked on
+        self.covers: list[object] = [()] * 4  # of what `covered` and `total` tell in each place
+        self.covered = [0] * 16384
+        self.covered_first, self.covered_end = [0] * 4, [0] * 4
+        self.total = [0] * 16384
+        self.first, self.samples = 0, 16
         self.lanes = self.times = 1  # instants of a field that are worked out, and how often each one counts
-        self.upper = -1
-        self.lower = -1
-        self.above = 0
-        self.below = 0
-        self.fall_u = [0] * 4
-        self.fall_v = [0] * 4
-        self.low_u = [0] * 4
-        self.high_u = [0] * 4
-        self.low_v = [0] * 4
-        self.high_v = [0] * 4
-        self.u = [0] * 16
-        self.v = [0] * 16
-        self.seen = [0] * 128
-        self.height_um = [0] * 128
+        self.upper, self.lower = -1, -1
+        self.above, self.below = 0, 0
+        self.fall_u, self.fall_v = [0] * 4, [0] * 4
+        self.low_u, self.high_u = [0] * 4, [0] * 4
+        self.low_v, self.high_v = [0] * 4, [0] * 4
+        self.u, self.v = [0] * 16, [0] * 16
+        self.seen, self.height_um = [0] * 128, [0] * 128
 
     def __repr__(self) -> str:
         return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
@@ -166,7 +140,7 @@ class Camera:
     def clear(self) -> None:
         """Takes all robots and the ball off the pitch."""
         self.clear_robots()
-        self.scene = scene_of(self.parameters, self.settings, None)
+        self._look_at(None)
 
     def clear_robots(self) -> None:
         """Takes all robots off the pitch; the ball stays."""
@@ -174,7 +148,12 @@ class Camera:
 
     def ball(self, x_m: float, y_m: float) -> None:
         """Puts the ball on the floor, its centre above this place."""
-        self.scene = scene_of(self.parameters, self.settings, (_um(x_m), _um(y_m)))
+        self._look_at((_um(x_m), _um(y_m)))
+
+    def _look_at(self, ball: tuple[int, int] | None) -> None:
+        self.scene = scene_of(self.parameters, self.settings, ball)
+        self.changes += 1
+        self.scene_changed = self.changes
 
     def robot(
         self,
@@ -195,6 +174,11 @@ class Camera:
             raise ValueError(f"there is room for {MOST_ROBOTS} robots on the pitch")
         if not (0 <= team < len(TEAMS) and 0 <= identity < len(IDENTITIES)):
             raise ValueError(f"no robot {identity} of team {team} has colours")
+        stood = (team, identity, x_m, y_m, theta_rad, v_m_s, w_rad_s)
+        if stood == self.stood[body]:
+            self.robots = body + 1
+            return
+        self.stood[body] = ()
         self.team_paint[body] = NUMBERS[TEAMS[team]]
         self.identity_paint[body] = NUMBERS[IDENTITIES[identity]]
         least_u, most_u, least_v, most_v = _FAR_UM, -_FAR_UM, _FAR_UM, -_FAR_UM
@@ -214,6 +198,9 @@ class Camera:
         self._surround(12 * body + _LOW_U, least_u, most_u)
         self._surround(12 * body + _LOW_V, least_v, most_v)
         self._bound(body)
+        self.changes += 1
+        self.changed[body] = self.changes
+        self.stood[body] = stood
         self.robots = body + 1
 
     def _stand(self, place: int) -> None:
@@ -261,6 +248,7 @@ class Camera:
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
         self.sensor.begin(frame, tick, 16 * self.field_sets)
+        self.place = -1
 
     def window(self, left: int, top: int, width: int, height: int) -> bytearray:
         """A window's pixels: see `miro_host.eye.grabber`. Raises ValueError for one that is not inside the picture."""
@@ -282,40 +270,55 @@ class Camera:
             self._cover(above, below, first, end)
             for row in range(above, below):
                 self.scene.show(self.sensor, row, first, end, self.field_sets)
-                self._put_robots(row, (row - above) * (end - first) - first)
+                self._put_robots(row, self.place * _BAND + (row - above) * (end - first) - first)
                 self.sensor.write(row, left, width, out, 3 * width * (row - top))
 
     def _put_robots(self, row: int, at: int) -> None:
-        """Those pixels of a line in which a robot may be seen; `at`: where column 0 would be in the band."""
-        for column in range(self.covered_first, self.covered_end):
+        """Those pixels of a line in which a robot may be seen; `at`: where column 0 would be in the bands."""
+        for column in range(self.covered_first[self.place], self.covered_end[self.place]):
             if self.covered[at + column]:
-                sure = self.covered[at + column] == _SURE
-                total = self.total[at + column] if sure else self._samples(row, column)
-                self.sensor.put(column, total, self.scene.light[row * _WIDTH + column])
+                if self.covered[at + column] == _UNSURE:
+                    self.total[at + column] = self._samples(row, column)
+                    self.covered[at + column] = _SURE
+                self.sensor.put(column, self.total[at + column], self.scene.light[row * _WIDTH + column])
 
     # ---- one robot
 
     def _cover(self, top: int, bottom: int, first: int, end: int) -> None:
-        """Finds the pixels of a band in which robots may be seen, and their paints where it is one robot."""
+        """Finds the pixels of a band in which robots may be seen, and their paints where it is one robot.
+
+        They are kept where all robots nearby stand as in the band that was in its place before.
+        """
         width, height = end - first, bottom - top
-        for at in range(width * height):
-            self.covered[at] = 0
-        self.covered_first, self.covered_end = _WIDTH, 0
         pixel = (top + height // 2) * _WIDTH + first + width // 2
         most = (width // 2 + height // 2 + 3) * self.rays.stride_um
+        near, newest = 0, self.scene_changed
         for body in range(self.robots):
             if self._beside(body, pixel) <= most:
+                near |= 1 << body
+                newest = max(newest, self.changed[body])
+        place = self.place = (self.place + 1) % _PLACES
+        cover = (top, bottom, first, end, near, newest)
+        if cover == self.covers[place]:
+            return
+        self.covers[place] = cover
+        for at in range(place * _BAND, place * _BAND + width * height):
+            self.covered[at] = 0
+        self.covered_first[place], self.covered_end[place] = _WIDTH, 0
+        for body in range(self.robots):
+            if near >> body & 1:
                 self._cover_with(body, top, bottom, first, end)
 
     def _cover_with(self, body: int, top: int, bottom: int, first: int, end: int) -> None:
         """The same for one robot: line by line, between the corners above and below."""
         self._find_span(body, top, first, end)
         self._find_corners(body, top, self.span_first, self.span_end)
-        at = 0 - first
+        place = self.place
+        at = place * _BAND - first
         for row in range(top, bottom):
             left, right = self.span_first, self.span_end
-            self.covered_first = min(self.covered_first, left)
-            self.covered_end = max(self.covered_end, right)
+            self.covered_first[place] = min(self.covered_first[place], left)
+            self.covered_end[place] = max(self.covered_end[place], right)
             self._find_span(body, row + 1, first, end if row + 1 < bottom else first)
             self._find_corners(body, row + 1, min(left, self.span_first), max(right, self.span_end))
             self._bound_pixels(left, right)

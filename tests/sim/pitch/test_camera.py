@@ -47,6 +47,41 @@ def test_a_window_is_that_part_of_the_picture_and_the_slow_twins(seed):
     assert check_rig(random.Random(seed), windows=40) == 205
 
 
+@RUNS_COMPILED
+@pytest.mark.parametrize("seed", range(4))
+def test_robots_that_stand_as_in_the_frame_before_are_drawn_as_by_a_camera_that_is_new(seed):
+    """From frame to frame at most one thing changes: a robot's posture, speed or colour, the ball, who is there."""
+    draw, kept = random.Random(seed), camera(PictureSettings())
+    places = ((0.30, 0.20), (0.38, 0.21), (0.90, 0.60), (0.95, 0.69), (0.60, 0.45))
+    bodies = [Body(at & 1, at, x_m, y_m, 0.3 * at, 0.0, 0.0) for at, (x_m, y_m) in enumerate(places)]
+    corners = [Lens(LENS).pixel(x_m, y_m, 0.075) for x_m, y_m in places[::2]]
+    windows = [(int(u) - 20, int(v) - 20, 40, 40) for u, v in corners]
+    changes = ("none", "x_m", "theta_rad", "v_m_s", "identity", "ball", "there")
+    there, ball = len(bodies), []
+    for frame in range(60):
+        change, at = draw.choice(changes), draw.randrange(5)
+        if change == "ball":
+            ball = [metres + draw.uniform(0.0, 0.08) for metres in places[at]]
+            kept.ball(*ball)
+        elif change == "there":
+            there = draw.randint(3, 5)
+        elif change == "identity":
+            bodies[at] = bodies[at]._replace(identity=draw.randrange(5))
+        elif change != "none":
+            moved = getattr(bodies[at], change) + draw.uniform(-0.01, 0.01)
+            bodies[at] = bodies[at]._replace(**{change: moved})
+        new = camera(PictureSettings())
+        if ball:
+            new.ball(*ball)
+        for one in (kept, new):
+            one.clear_robots()
+            for body in bodies[:there]:
+                one.robot(*body)
+            one.begin(frame, 0)
+        for window in draw.choice((windows, windows[::-1])):
+            assert kept.window(*window) == new.window(*window), (frame, change, at, window)
+
+
 @pytest.mark.slow
 @RUNS_COMPILED
 def test_both_engines_draw_the_same_bytes():
