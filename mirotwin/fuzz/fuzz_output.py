@@ -111,7 +111,8 @@ def report(campaign: Campaign, ended: CampaignEnd, quiet: bool) -> int:
         if never:
             show_line(f"never reached: {', '.join(never)}")
     if ended.left:
-        complain(f"{amount(ended.left, 'input')} of the engine were not looked at; a longer --time does")
+        left = amount(ended.left, "input of the engine was", "inputs of the engine were")
+        complain(f"{left} not looked at; a longer --time does")
     if campaign.expected and not quiet:
         show_line(f"{', '.join(campaign.expected)}: judged {amount(campaign.judged or 'no', 'input')}")
     if triage.unrepeated:
