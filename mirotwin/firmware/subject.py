@@ -83,15 +83,19 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
 
 
 def open_window(options: WindowOptions) -> Run:
-    """The run that was asked for, at its first tick. Raises BadInput where the window is not in it."""
+    """The run that was asked for, at its first tick. Raises BadInput where the window is not in it.
+
+    An empty window is refused before anything is read.
+    """
+    from_tick, to_tick = options.from_tick, options.to_tick
     run = open_run(options)
     begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
-    if options.to_tick is not None and options.to_tick <= begin_tick:
+    if to_tick is not None and to_tick <= begin_tick:
         what = f"the run begins at tick {begin_tick}"
-        raise BadInput(options.subject, f"--to {options.to_tick}t", what, "look later")
-    if run.end_tick is not None and options.from_tick >= run.end_tick:
+        raise BadInput(options.subject, f"--to {to_tick}t", what, "look later")
+    if run.end_tick is not None and from_tick >= run.end_tick:
         what = f"the run ends at tick {run.end_tick}"
-        raise BadInput(options.subject, f"--from {options.from_tick}t", what, "look earlier")
+        raise BadInput(options.subject, f"--from {from_tick}t", what, "look earlier")
     return run
 
 
