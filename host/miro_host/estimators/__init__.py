@@ -1,1 +1,1 @@
-"""Posture estimators: names (`registry`), the interface, and ours: `none` (the paper's loop), `predict`, `ekf`."""
+"""Posture estimators: the interface, and ours: `none` (the paper's loop), `predict`, `ekf`."""

@@ -1,1 +1,1 @@
-"""Tracking laws: their names (`registry`), the interface (`interface`), and the laws themselves, one in each module."""
+"""Tracking laws: the interface (`interface`), and the laws themselves, one in each module."""

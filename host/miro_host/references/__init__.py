@@ -1,1 +1,1 @@
-"""Reference trajectories: their names (`registry`), the interface (`interface`), and the paths, one in each module."""
+"""Reference trajectories: the interface (`interface`), and the paths, one in each module."""
