@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -72,8 +73,9 @@ def main():
     try:
         engine.select(options.engine)
         wanted = list(names())
-        with ProcessPoolExecutor(initializer=_begin, initargs=(options.engine,)) as pool:
-            found = dict(zip(wanted, pool.map(digest, wanted), strict=True))
+        with ProcessPoolExecutor(initializer=children.reset_signals) as pool:
+            digests = pool.map(partial(_digest, options.engine), wanted)
+            found = dict(zip(wanted, digests, strict=True))
     except engine.EngineError as error:
         print(error, file=sys.stderr)
         return REFUSED
@@ -85,10 +87,10 @@ def main():
     return 1 if differing and not options.write else 0
 
 
-def _begin(name):
-    """In each process of the pool."""
-    children.reset_signals()
-    engine.select(name)
+def _digest(engine_name, name):
+    """In a process of the pool."""
+    engine.select(engine_name)
+    return digest(name)
 
 
 if __name__ == "__main__":
