@@ -119,8 +119,8 @@ class Monitor(Generic[C_co]):
     """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
     LATER = False
-    """Whether it may be told of several control periods at once. If so, it must not read the robot except in
-    `period_over` and `end`."""
+    """Whether it may be told of several control periods at once, which it is if no check hears events of the board. If
+    so, it must not read the robot except in `period_over` and `end`."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         self.check = check

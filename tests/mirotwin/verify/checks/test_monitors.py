@@ -15,6 +15,8 @@ from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
 from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
 from tests.mirotwin.verify.conform.images import BABBLES, HANGS, image_of
+from tests.robot.board.rig import RESET, START
+from tests.robot.board.rig import image_of as assembled
 
 EVERYTHING = ALL + "tracks_within_cm = 0.1\nsettles_within_s = 0.2\ninside_pitch = true\n"
 TWO = f"""
@@ -95,6 +97,33 @@ def test_periods_that_are_told_together_are_judged_as_one_by_one(image, profile)
         return checks.verdicts(), checks.failures, [repr(one) for one in checks.monitors]
 
     assert found(asking=False) == found(asking=True)
+
+
+class Counting(Check, frozen=True, kw_only=True, tag="counting"):
+    KIND = "safety"
+
+    def monitor(self, subject):
+        return CountingMonitor(self, subject)
+
+
+class CountingMonitor(Monitor[Counting]):
+    EVENTS = ("command",)
+    LATER = True
+    commands = 0
+
+    def event(self, event):
+        self.commands += 1
+
+
+def test_who_may_be_told_later_hears_all_of_a_board_that_fills_its_log():
+    often = "MOV P2,#0E6h\nMOV P0,#01h\nagain:\nCPL P2.2\nMOV R7,#50\nDJNZ R7,$\nSJMP again\n"
+    world = World(parse(LATER.format(profile="weaker"), "later"), 2, assembled(START + RESET + often))
+    checks = Checks(world, {(0, 0): [Counting()]})
+    for _ in range(12):
+        world.step()
+    log = world.networks[0].robots[0].log
+    assert log.first > 0
+    assert [monitor.commands for monitor in checks.monitors] == [log.end]  # all are commands
 
 
 @pytest.mark.parametrize("seed", range(3))
