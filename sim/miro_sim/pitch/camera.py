@@ -24,7 +24,7 @@ from miro_exact.rng import Stream
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
 from miro_sim.pitch.paints import NUMBERS
-from miro_sim.pitch.picture_settings import PictureSettings
+from miro_sim.pitch.picture_settings import PictureSettings, checked
 from miro_sim.pitch.rays import Rays, enters, entry, rays_of
 from miro_sim.pitch.scene import Scene, scene_of
 from miro_sim.pitch.sensor import Sensor
@@ -78,7 +78,7 @@ class Camera:
         self, parameters: CameraParameters, settings: PictureSettings, pattern: Pattern, stream: Stream
     ) -> None:
         self.parameters = parameters
-        self.settings = settings
+        self.settings = settings = checked(settings)
         self.pattern = pattern
         self.width, self.height = WIDTH, HEIGHT
         self.rays: Rays = rays_of(parameters)

@@ -44,3 +44,8 @@ class PictureSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
                 f"chroma_bandwidth_hz: {self.chroma_bandwidth_hz} is out of range;"
                 f" must be 0 (not limited) or >= {LEAST_BANDWIDTH_HZ:.0f} in hertz"
             )
+
+
+def checked(settings: PictureSettings) -> PictureSettings:
+    """The same settings. Raises ValueError where one is out of its range, as a program can make it."""
+    return msgspec.convert(msgspec.to_builtins(settings), PictureSettings)

@@ -71,13 +71,9 @@ def _taps(bandwidth_hz: float) -> list[int]:
 def _tables(gamma: float, luma_noise: float, chroma_noise: float) -> tuple[list[int], list[int], list[int]]:
     """By brightness what is shown, and by draw the noise of Y and of Cb and Cr; all with four fraction bits."""
     shown = [0] + [math.floor(4080.0 * exp(gamma * log(value / 4095.0)) + 0.5) for value in range(1, 4096)]
-    return shown, _noise(luma_noise), _noise(chroma_noise)
-
-
-def _noise(levels: float) -> list[int]:
-    """By draw, no further than all levels: more makes no difference, and `_levels` has no place for it."""
-    found = (math.floor(normal * levels / 4096.0 + 0.5) for normal in _normals())
-    return [min(max(noise, 1 - _ABOVE), _ABOVE - 1) for noise in found]
+    normals = _normals()
+    luma = [math.floor(normal * luma_noise / 4096.0 + 0.5) for normal in normals]
+    return shown, luma, [math.floor(normal * chroma_noise / 4096.0 + 0.5) for normal in normals]
 
 
 @lru_cache(maxsize=8)

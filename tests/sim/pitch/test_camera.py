@@ -270,14 +270,10 @@ def test_robots_that_are_far_or_leave_within_an_exposure_are_drawn_as_the_slow_t
     assert eye.window(*one.window) == one.drawn_by(drawn.naive())
 
 
-@pytest.mark.parametrize("noise", [65.0, 500.0, 3000.0])
-def test_noise_beyond_all_levels_is_cut_off_as_the_slow_twin_cuts_it_off(noise):
-    noisy = replace(QUIET, luma_noise=noise, chroma_noise=noise)
-    drawn = Rig(LENS, noisy, PATTERNS["diagonal"], Stream(3, "test"))
-    one = Scene([Body(0, 0, 0.55, 0.35, 0.4, 0.0, 0.0)], None, 5, 4711, (140, 110, 64, 32))
-    eye = drawn.camera()
-    one.put(eye)
-    assert eye.window(*one.window) == one.drawn_by(drawn.naive())
+@pytest.mark.parametrize("wrong", [{"luma_noise": 65.0}, {"fields": 3}, {"sub_exposures": 4}, {"bits": 0}])
+def test_settings_out_of_their_range_are_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        camera(replace(QUIET, **wrong))
 
 
 def test_an_exposure_of_no_time_shows_the_lamps_as_they_are_then():
