@@ -269,6 +269,7 @@ def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_pat
         "port = serial.serial_for_url(sys.argv[1], timeout=30)\n"
         "try:\n"
         "    port.read(1)\n"
+        "    port.close()\n"  # all of a quick run may be written here
         "except serial.SerialException as error:\n"
         "    print(error)\n"
         "port.close()\n"
