@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import msgspec
@@ -37,7 +38,7 @@ class TargetFailure(msgspec.Struct, frozen=True):
     what: str
 
 
-class Target:
+class Target(ABC):
     """`image` in `harness`, fed with what `program` reads. Edges are counted in the map of `use_map`, a writable buffer
     of `map_size` bytes. `slot`: of the robot in its network.
 
@@ -68,16 +69,17 @@ class Target:
         self.cpu.watch_edges(memoryview(edges))
 
     @property
+    @abstractmethod
     def failure(self) -> TargetFailure | None:
         """Of the last run."""
-        raise NotImplementedError
 
+    @abstractmethod
     def run(self, data: Any) -> int:
-        raise NotImplementedError
+        """See the class."""
 
+    @abstractmethod
     def seeds(self) -> list[bytes]:
         """Inputs to begin with."""
-        raise NotImplementedError
 
     def play(self, data: Any) -> int:
         """Puts the machine back and plays an input; how that ended, as of `Harness.play`."""
