@@ -15,7 +15,7 @@ cdef struct Place:
 
 
 cdef class Layout:
-    cdef Place *places  # their addresses count from the begin of a part
+    cdef Place *places  # their addresses count from the start of a part
     cdef Py_ssize_t number
     cdef tuple names
 

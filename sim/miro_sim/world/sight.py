@@ -175,9 +175,9 @@ class SeeingSight:
 
 
 class StaticField:
-    """What a calibration alone gets wrong: a posture as somebody reads it who sees the patches without any error.
+    """The error of a calibration alone: postures are read from patches that are seen without error.
 
-    The error is the same at the same place, every time.
+    It depends on the posture and nothing else.
     """
 
     NOT_STATE = ("lens", "top")
