@@ -63,7 +63,7 @@ _FROM_RECEIVED = ("frame", "damaged")
 _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
-TOGETHER = 10
+TOGETHER = 30
 """Control periods at most that are told together, to monitors that hear nothing of a board: its log is full sooner."""
 
 
@@ -121,9 +121,8 @@ class Checks:
     def _tell(self) -> None:
         """Tells of the control periods that were not told of."""
         untold, self.untold = self.untold, []
-        for period, tick in untold:
-            for watched, record in zip(self.robots, period.robots, strict=True):
-                watched.look(record, period.tick, tick)
+        for index, watched in enumerate(self.robots):
+            watched.look([(period.robots[index], period.tick, tick) for period, tick in untold])
 
     def finish(self) -> None:
         """The run is over, by itself or because it was broken off."""
@@ -206,15 +205,17 @@ class _RobotMonitors:
             except (Exception, SystemExit) as error:
                 raise self._cannot_judge(monitor.check, error) from error
 
-    def look(self, record: Any, begun_tick: int, tick: int) -> None:
-        """Tells the monitors of the control period that began at `begun_tick` and of events before `tick`."""
+    def look(self, periods: Sequence[tuple[Any, int, int]]) -> None:
+        """Tells the monitors of control periods: the record of each, its first tick, and the first one after it."""
         self._tell_faults()
-        for monitor in self.of_periods:
-            try:
-                monitor.period(record, begun_tick)
-            except (Exception, SystemExit) as error:
-                raise self._cannot_judge(monitor.check, error) from error
-        self._tell_events(tick)
+        self._gather()
+        for record, begun_tick, tick in periods:
+            for monitor in self.of_periods:
+                try:
+                    monitor.period(record, begun_tick)
+                except (Exception, SystemExit) as error:
+                    raise self._cannot_judge(monitor.check, error) from error
+            self._tell(tick)
 
     def _tell_faults(self) -> None:
         faults = self.robot.board.faults
@@ -224,13 +225,10 @@ class _RobotMonitors:
                     self._guarded(monitor.check, partial(monitor.fault, fault))
             self.faults = len(faults)
 
-    def _tell_events(self, tick: int) -> None:
-        if self.of_events:
-            self._gather()
-            self._tell(tick)
-
     def _gather(self) -> None:
         """What is new in the logs."""
+        if not self.of_events:
+            return
         self.lost += self.of_pc.lost
         for _, event in self.of_pc.read(self.heard_of_pc):
             if event.what not in _RESTARTS or event.slot == self.robot.slot:
@@ -238,9 +236,10 @@ class _RobotMonitors:
         if self.heard_of_board:
             self.lost += self.of_board.lost
             self.waiting += [event for _, event in self.of_board.read(self.heard_of_board)]
+        self.waiting.sort(key=_BY_TICK)
 
     def _tell(self, tick: int) -> None:
-        self.waiting.sort(key=_BY_TICK)
+        """Tells of the events before `tick`, in the order of time."""
         told = 0
         for event in self.waiting:
             if event.tick >= tick:
@@ -272,7 +271,8 @@ class _RobotMonitors:
     def end(self, tick: int) -> None:
         """The run is over, perhaps within a control period."""
         self._tell_faults()
-        self._tell_events(tick + 1)
+        self._gather()
+        self._tell(tick + 1)
         for monitor in self.monitors:
             self._guarded(monitor.check, partial(monitor.end, tick))
 
