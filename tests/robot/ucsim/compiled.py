@@ -11,7 +11,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
 from tests import children
 from tests.robot.ucsim import s51
-from tests.robot.ucsim.exclusions import COMPARED, P0
+from tests.robot.ucsim.exclusions import ALIKE_AFTER_MOVX
 
 SOURCE = Path(__file__).with_name("programs") / "mix.c"
 MODELS = ("--model-small", "--model-large")
@@ -40,26 +40,14 @@ def differences(code, checkpoints, stride=STRIDE):
         for _ in range(stride):
             cpu.step()
         seen = reader.observed(step)
-        found = list(_compared(cpu, cpu.cycles - begin, seen))
+        found = list(s51.cpu_differences(seen, cpu, ALIKE_AFTER_MOVX))
+        if 12 * (cpu.cycles - begin) != seen.ticks:
+            found.append(f"ticks ours {12 * (cpu.cycles - begin)} ucsim {seen.ticks}")
         if bus.content()[:FAR_BYTES] != reader.raw(dump, FAR_BYTES):
             found.append("external RAM")
         if found:
             yield f"checkpoint {number}: " + ", ".join(found)
             return
-
-
-def _compared(cpu, cycles, seen):
-    if cpu.pc != seen.pc:
-        yield f"PC ours {cpu.pc:04X}h ucsim {seen.pc:04X}h"
-    if 12 * cycles != seen.ticks:
-        yield f"ticks ours {12 * cycles} ucsim {seen.ticks}"
-    for address in range(256):
-        if cpu.peek_iram(address) != seen.iram[address]:
-            yield f"internal RAM {address:02X}h ours {cpu.peek_iram(address):02X}h ucsim {seen.iram[address]:02X}h"
-    for address in COMPARED:
-        ours, theirs = cpu.sfr(address), seen.sfr[address - 0x80]
-        if address != P0 and ours != theirs:  # p0-after-movx
-            yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
 
 
 def main():

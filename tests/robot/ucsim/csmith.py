@@ -18,24 +18,16 @@ from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.image import load_hex
 from tests import children
 from tests.robot.ucsim import s51
-from tests.robot.ucsim.exclusions import COMPARED, P0
+from tests.robot.ucsim.exclusions import ALIKE_AFTER_MOVX
 
 HEADER = Path(__file__).with_name("programs")
 MOST_CYCLES = 4_000_000
 XRAM_BYTES = 0x2000
 SHAPE = (
-    *(
-        "--no-safe-math",
-        "--no-argc",
-        "--no-longlong",
-        "--no-math64",
-        "--no-packed-struct",
-        "--no-volatiles",
-        "--no-bitfields",
-    ),
-    *("--no-structs", "--no-unions"),  # SDCC passes none to functions
-    *("--max-funcs", "3", "--max-block-depth", "2", "--max-expr-complexity", "5"),
-    *("--max-array-len-per-dim", "5", "--max-array-dim", "2", "--quiet", "--concise"),
+    "--no-safe-math --no-argc --no-longlong --no-math64 --no-packed-struct --no-volatiles --no-bitfields "
+    "--no-structs --no-unions "  # SDCC passes none to functions
+    "--max-funcs 3 --max-block-depth 2 --max-expr-complexity 5 "
+    "--max-array-len-per-dim 5 --max-array-dim 2 --quiet --concise"
 )
 EQUAL, LEFT_OUT = "equal", "left out"
 
@@ -43,14 +35,10 @@ EQUAL, LEFT_OUT = "equal", "left out"
 def build(seed, folder):
     """The image of the program with this seed; None where SDCC does not make one."""
     source = folder / "program.c"
-    make = ["csmith", "--seed", f"{seed}", *SHAPE, "-o", str(source)]
-    children.run(
-        make, check=True, capture_output=True, cwd=folder
-    )  # it leaves a platform.info where it works
+    make = ["csmith", "--seed", f"{seed}", *SHAPE.split(), "-o", str(source)]
+    children.run(make, check=True, capture_output=True, cwd=folder)  # which leaves a platform.info there
     command = ["sdcc", "-mmcs51", "--model-large", "--xram-size", f"{XRAM_BYTES}", f"-I{HEADER}"]
-    done = children.run(
-        [*command, str(source), "-o", str(folder / "program.ihx")], cwd=folder, capture_output=True
-    )
+    done = children.run([*command, str(source)], cwd=folder, capture_output=True)
     return None if done.returncode else load_hex(folder / "program.ihx", limit=0x10000)
 
 
@@ -68,26 +56,12 @@ def differences(image):
         heard = Path(folder, "uart")
         reader = s51.Reader(s51.run(image.code[: image.used[-1][1]], commands, heard))
         characters = heard.read_bytes()
-    return list(
-        _compared(machine, reader.observed(step), reader.raw(dump, XRAM_BYTES), b"".join(sent), characters)
-    )
-
-
-def _compared(machine, seen, xram, sent, characters):
-    cpu = machine.cpu
-    if cpu.pc != seen.pc:
-        yield f"PC ours {cpu.pc:04X}h ucsim {seen.pc:04X}h"
-    for address in range(256):
-        if cpu.peek_iram(address) != seen.iram[address]:
-            yield f"internal RAM {address:02X}h ours {cpu.peek_iram(address):02X}h ucsim {seen.iram[address]:02X}h"
-    for address in COMPARED:
-        ours, theirs = cpu.sfr(address), seen.sfr[address - 0x80]
-        if address != P0 and ours != theirs:  # p0-after-movx
-            yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
-    if machine.bus.content()[:XRAM_BYTES] != xram:
-        yield "external RAM"
-    if sent != characters:
-        yield f"UART ours {sent.hex(' ')} ucsim {characters.hex(' ')}"
+    found = list(s51.cpu_differences(reader.observed(step), machine.cpu, ALIKE_AFTER_MOVX))
+    if machine.bus.content()[:XRAM_BYTES] != reader.raw(dump, XRAM_BYTES):
+        found.append("external RAM")
+    if b"".join(sent) != characters:
+        found.append(f"UART ours {b''.join(sent).hex(' ')} ucsim {characters.hex(' ')}")
+    return found
 
 
 def tried(seed):

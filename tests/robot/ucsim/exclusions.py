@@ -1,30 +1,20 @@
 """What a random walk must not do, because ucsim is known to do it wrong.
 
-The names in the comments are those of `disagreements.py`.
+The names in the comments are those of the list in `tests/vectors/README.md`.
 """
 
+from functools import cache
+
+from miro_robot.mcs51.names import SFRS
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, TABLE
 
-# Registers of an AT89C52 that both machines have and that hold what is written.
-P0, SP, DPL, DPH, PCON, TCON, TMOD = 0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89
-TL0, TL1, TH0, TH1, P1, SCON, SBUF, P2, IE, P3, IP = (
-    0x8A,
-    0x8B,
-    0x8C,
-    0x8D,
-    0x90,
-    0x98,
-    0x99,
-    0xA0,
-    0xA8,
-    0xB0,
-    0xB8,
-)
-T2CON, T2MOD, RCAP2L, RCAP2H, TL2, TH2, PSW, ACC, B = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD, 0xD0, 0xE0, 0xF0
-COMPARED = (
-    *(P0, SP, DPL, DPH, PCON, TCON, TMOD, TL0, TL1, TH0, TH1, P1, SCON, P2, IE, P3, IP),
-    *(T2CON, RCAP2L, RCAP2H, TL2, TH2, PSW, ACC, B),
-)  # fmt: skip
+(
+    P0, SP, DPL, DPH, PCON, TCON, TMOD, TL0, TL1, TH0, TH1, P1, SCON, SBUF, P2, IE, P3, IP,
+    T2CON, T2MOD, RCAP2L, RCAP2H, TL2, TH2, PSW, ACC, B,
+) = SFRS.values()  # fmt: skip
+COMPARED = tuple(address for address in SFRS.values() if address not in (SBUF, T2MOD))
+"""Registers of an AT89C52 that both machines have and that hold what is written."""
+ALIKE_AFTER_MOVX = tuple(address for address in COMPARED if address != P0)  # p0-after-movx
 
 _FORBIDDEN = {
     T2CON: 0x08,  # t2ex-memory
@@ -36,10 +26,6 @@ _TIMER = (TCON, TMOD, TL0, TL1, TH0, TH1, T2CON, RCAP2L, RCAP2H, TL2, TH2)
 _TIMERS = tuple((register,) for register in _TIMER)
 _OPERANDS = {row[0]: row[4] for row in TABLE}
 OPERANDS = tuple(_OPERANDS[ROW[opcode]] for opcode in range(256))
-_FIRST_DIRECT = tuple(
-    any(part in ("dir", "dst") for part in text.split(",")) for text in OPERANDS
-)  # the second byte is a direct address
-_FIRST_BIT = tuple(any(part in ("bit", "/bit") for part in text.split(",")) for text in OPERANDS)
 _PUSH, _POP = 0xC0, 0xD0
 MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
 _LATE = (0x20, 0x30, 0xB5)  # JB, JNB, CJNE A,dir
@@ -47,18 +33,16 @@ _CALLS = (0x12, *range(0x11, 0x100, 0x20))
 _RETURNS = (0x22, 0x32)
 
 
+@cache
 def has_direct(opcode):
     """Whether the byte after the opcode is a direct address."""
-    return _FIRST_DIRECT[opcode]
+    return not {"dir", "dst"}.isdisjoint(OPERANDS[opcode].split(","))
 
 
+@cache
 def has_bit(opcode):
     """Whether the byte after the opcode is a bit address."""
-    return _FIRST_BIT[opcode]
-
-
-def parity(value):
-    return value.bit_count() & 1
+    return not {"bit", "/bit"}.isdisjoint(OPERANDS[opcode].split(","))
 
 
 def peek(cpu, address):
@@ -153,7 +137,7 @@ def _may_write(cpu, opcode, address, value, a):
     """Whether a register may be written, given ACC after the instruction."""
     if address == PSW:
         by_bit = has_bit(opcode) and (value ^ cpu.psw()) & 0x18  # bank-by-bit
-        return not by_bit and value & 1 == parity(a)  # parity-write
+        return not by_bit and value & 1 == a.bit_count() & 1  # parity-write
     if address == P3:
         listening = cpu.sfr(SCON) & 0x10  # serial-port
         return value & 0x0C == 0x0C and bool(value & 1 or not listening)  # level-interrupt

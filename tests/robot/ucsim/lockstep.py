@@ -21,7 +21,6 @@ from tests.robot.ucsim.walk import PROLOGUE, Walker
 
 _ALIGN_P0 = "set mem sfr 0x80 0xff"  # p0-after-movx
 _XRAM = "dump /b xram 0 65535"
-_P0_AT = COMPARED.index(P0)
 
 
 class Outcome(NamedTuple):
@@ -58,7 +57,12 @@ def _commands(walk):
 def _differences(walk, reader):
     for number, step in enumerate(walk.steps):
         seen = reader.observed()
-        found = list(_step_differences(step, seen))
+        registers = dict(zip(COMPARED, step.sfr, strict=True))
+        if step.movx_changed_p0:
+            del registers[P0]
+        found = list(s51.differences(seen, step.pc, step.iram, registers))
+        if 12 * step.cycles != seen.ticks:
+            found.append(f"ticks ours {12 * step.cycles} ucsim {seen.ticks}")
         if found:
             shown = disassemble(walk.code, step.pc_before)
             yield f"step {number}, {step.pc_before:04X}h {step.opcode:02X}h {shown}: " + ", ".join(found)
@@ -66,23 +70,6 @@ def _differences(walk, reader):
     for address in range(0x10000):
         if xram[address] != walk.xram[address]:
             yield f"external RAM {address:04X}h ours {walk.xram[address]:02X}h ucsim {xram[address]:02X}h"
-
-
-def _step_differences(step, seen):
-    if step.pc != seen.pc:
-        yield f"PC ours {step.pc:04X}h ucsim {seen.pc:04X}h"
-    if 12 * step.cycles != seen.ticks:
-        yield f"ticks ours {12 * step.cycles} ucsim {seen.ticks}"
-    registers = bytes([seen.sfr[address - 0x80] for address in COMPARED])
-    for place, address in enumerate(COMPARED):
-        ours, theirs = step.sfr[place], registers[place]
-        if ours != theirs and not (step.movx_changed_p0 and place == _P0_AT):
-            yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
-    if step.iram != seen.iram:
-        for address in range(256):
-            ours, theirs = step.iram[address], seen.iram[address]
-            if ours != theirs:
-                yield f"internal RAM {address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
 
 
 def main():

@@ -27,10 +27,6 @@ class Observed(NamedTuple):
     sfr: bytes  # 80h..FFh
 
 
-class OutputError(Exception):
-    """The simulator's output is not what its commands should print."""
-
-
 def installed():
     return shutil.which("s51") is not None
 
@@ -86,7 +82,7 @@ class Reader:
         text = echo.encode() + b"\n"
         found = self.output.find(text, self.at)
         if found < 0:
-            raise OutputError(f"no `{echo}` in {self.output[self.at : self.at + 400]!r}")
+            raise ValueError(f"no `{echo}` in {self.output[self.at : self.at + 400]!r}")
         self.at = found + len(text)
         return self.at
 
@@ -101,7 +97,26 @@ class Reader:
         first = self.after(step)
         stopped = _STOPPED.search(self.output, first, first + 2000)
         if stopped is None:
-            raise OutputError(f"`{step}` printed {self.output[first : first + 400]!r}")
+            raise ValueError(f"`{step}` printed {self.output[first : first + 400]!r}")
         iram = self.raw(OBSERVE[1], 256)
         sfr = self.raw(OBSERVE[2], 128)
         return Observed(int(stopped[1], 16), int(stopped[2]), iram, sfr)
+
+
+def differences(seen, pc, iram, registers, by="ours"):
+    """What the simulator holds otherwise than `by`, a text each; `registers` are values by address."""
+    if pc != seen.pc:
+        yield f"PC {by} {pc:04X}h ucsim {seen.pc:04X}h"
+    for address in range(256):
+        if iram[address] != seen.iram[address]:
+            yield f"internal RAM {address:02X}h {by} {iram[address]:02X}h ucsim {seen.iram[address]:02X}h"
+    for address, value in registers.items():
+        theirs = seen.sfr[address - 0x80]
+        if value != theirs:
+            yield f"{address:02X}h {by} {value:02X}h ucsim {theirs:02X}h"
+
+
+def cpu_differences(seen, cpu, addresses):
+    """The same of a CPU of ours and the registers at these addresses."""
+    iram = bytes(map(cpu.peek_iram, range(256)))
+    return differences(seen, cpu.pc, iram, {address: cpu.sfr(address) for address in addresses})

@@ -14,39 +14,30 @@ OFFSETS = range(TABLE, TABLE + TABLE_SIZE - 0x200)
 
 _QUIET = bytes.fromhex("C2AF C28C C28E C2CA 75D000")  # CLR EA, TR0, TR1, TR2; MOV PSW,#0
 _FILL = bytes.fromhex("78FF E8 93 F6 D8FB 0583")  # R0 counts down from FFh: MOV @R0,table[R0]; then INC DPH
-_REGISTERS = {  # register: (AND, OR); as after `exclusions.py`, with nothing running
-    sfr.P0: (0xFF, 0x00),
+_REST = bytes.fromhex("857C82 857D83 857ED0 E57F")  # MOV DPL,7Ch; MOV DPH,7Dh; MOV PSW,7Eh; MOV A,7Fh
+_SET_BY_REST = (sfr.DPL, sfr.DPH, sfr.PSW, sfr.ACC)
+_REGISTERS = (*(address for address in sfr.COMPARED if address not in _SET_BY_REST), 0x00)
+"""The last one is R0 of bank 0, which the filling used up."""
+_AND_OR = {  # as after `exclusions.py`, with nothing running
     sfr.P1: (0xFF, 0x03),
-    sfr.P2: (0xFF, 0x00),
     sfr.P3: (0xFF, 0x3D),
     sfr.PCON: (0x8C, 0x00),
     sfr.TCON: (0xAF, 0x05),
     sfr.TMOD: (0xFD, 0x00),
-    sfr.TL0: (0xFF, 0x00),
-    sfr.TL1: (0xFF, 0x00),
-    sfr.TH0: (0xFF, 0x00),
-    sfr.TH1: (0xFF, 0x00),
     sfr.SCON: (0xEF, 0x00),
     sfr.IE: (0x3F, 0x00),
     sfr.IP: (0x3F, 0x00),
     sfr.T2CON: (0xF3, 0x00),
-    sfr.RCAP2L: (0xFF, 0x00),
-    sfr.RCAP2H: (0xFF, 0x00),
-    sfr.TL2: (0xFF, 0x00),
-    sfr.TH2: (0xFF, 0x00),
-    sfr.B: (0xFF, 0x00),
-    sfr.SP: (0xFF, 0x00),
-    0x00: (0xFF, 0x00),  # R0 of bank 0, which the filling used up
 }
-RANDOM_BITS = {register: kept & ~high for register, (kept, high) in _REGISTERS.items()}
+RANDOM_BITS = {register: kept & ~high for register, (kept, high) in _AND_OR.items()}
 """Which bits a state draws; in registers not listed all of them."""
-_REST = bytes.fromhex("857C82 857D83 857ED0 E57F")  # MOV DPL,7Ch; MOV DPH,7Dh; MOV PSW,7Eh; MOV A,7Fh
 
 
 def _moves():
     """For each register MOV A,#place; MOVC A,@A+DPTR; ANL A,#kept; ORL A,#high; MOV register,A."""
     code = bytearray()
-    for place, (register, (kept, high)) in enumerate(_REGISTERS.items()):
+    for place, register in enumerate(_REGISTERS):
+        kept, high = _AND_OR.get(register, (0xFF, 0x00))
         code += bytes((0x74, place, 0x93, 0x54, kept, 0x44, high, 0xF5, register))
     return bytes(code)
 

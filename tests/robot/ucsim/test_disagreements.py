@@ -1,4 +1,4 @@
-"""Each entry of `disagreements.py` shown on both machines, so that the list cannot go stale."""
+"""Each entry of the list in `tests/vectors/README.md` shown on both machines, so that it cannot go stale."""
 
 import re
 from pathlib import Path
@@ -9,10 +9,13 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
 from tests.robot.mcs51.asm import assemble
 from tests.robot.ucsim import exclusions, lockstep, s51
-from tests.robot.ucsim.disagreements import DISAGREEMENTS, table
 from tests.vectors.paths import VECTORS
 
 CPU_TESTS = Path(__file__).parents[1] / "mcs51"
+LISTED = re.findall(
+    r"(?m)^\| ([a-z0-9-]+) \|.*\| `(\w+\.py)::(\w+)` \|$", (VECTORS / "README.md").read_text()
+)
+"""Name, file and test of each entry."""
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")
 
 ISRS = "LJMP 40h\nORG 0003h\nSJMP 0003h\nORG 000Bh\nSJMP 000Bh\nORG 0040h\n"
@@ -47,17 +50,11 @@ def steps_of(text):
 
 
 def test_every_disagreement_is_shown():
-    assert [case[0] for case in CASES] == [entry.name for entry in DISAGREEMENTS]
+    assert [case[0] for case in CASES] == [name for name, _, _ in LISTED]
 
 
-def test_the_readme_repeats_the_list():
-    readme = (VECTORS / "README.md").read_text()
-    assert table() in readme, "put there what `python -m tests.robot.ucsim.disagreements` prints"
-
-
-@pytest.mark.parametrize("entry", DISAGREEMENTS, ids=lambda entry: entry.name)
-def test_each_is_held_to_the_data_sheet_by_a_test_of_its_own(entry):
-    file, _, test = entry.held_by.partition("::")
+@pytest.mark.parametrize(("_", "file", "test"), LISTED, ids=[name for name, _, _ in LISTED])
+def test_each_is_held_to_the_data_sheet_by_a_test_of_its_own(_, file, test):
     assert f"\ndef {test}(" in (CPU_TESTS / file).read_text()
 
 
@@ -65,7 +62,7 @@ def test_each_says_where_it_is_kept_out_of_the_comparison():
     """The comments of `exclusions.py` and `lockstep.py` name the entry that a rule is there for."""
     rules = Path(exclusions.__file__).read_text() + Path(lockstep.__file__).read_text()
     comments = " ".join(re.findall(r"#(.*)", rules))
-    assert [entry.name for entry in DISAGREEMENTS if entry.name not in comments] == []
+    assert [name for name, _, _ in LISTED if name not in comments] == []
 
 
 @pytest.mark.parametrize(("name", "text", "place", "sheet", "_"), CASES, ids=[case[0] for case in CASES])

@@ -1,22 +1,31 @@
-"""The CPU beside ucsim's s51: the part of the comparison that takes seconds.
+"""The CPU beside ucsim's s51: the part of the comparisons that takes seconds.
 
-The long one is `python -m tests.robot.ucsim.lockstep --steps 2000000`.
+The long ones are the commands `python -m tests.robot.ucsim.lockstep`, `.compiled` and `.csmith`.
 """
 
+import shutil
 from random import Random
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from miro_exact import engine
 from miro_robot.mcs51.vectors import VectorRunner
-from tests.robot.ucsim import s51, states, timers, vector_check
+from tests.robot.ucsim import compiled, csmith, s51, states, timers, vector_check
 from tests.robot.ucsim.exclusions import COMPARED
 from tests.robot.ucsim.lockstep import compare
 from tests.robot.ucsim.walk import Walker
 from tests.vectors.paths import MCS51
 
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")
+needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs sdcc")
+needs_csmith = pytest.mark.skipif(
+    not (shutil.which("sdcc") and shutil.which("csmith")) or engine.active() == "python",
+    reason="needs sdcc, csmith, and a minute for each program where nothing is compiled",
+)
+CHECKPOINTS = 40 if engine.active() == "compiled" else 2
+SEEDS = range(1, 13)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -74,3 +83,39 @@ def test_one_published_vector_of_each_opcode_agrees():
             chosen.setdefault(vector.name[:2], vector)
     assert len(chosen) == 256
     assert list(vector_check.differences(list(chosen.values()))) == []
+
+
+@needs_sdcc
+@pytest.mark.parametrize("model", compiled.MODELS)
+def test_a_c_program_does_the_same_at_every_checkpoint(model, tmp_path):
+    assert list(compiled.differences(compiled.build(model, tmp_path), CHECKPOINTS)) == []
+
+
+def test_a_difference_at_a_checkpoint_is_named(monkeypatch):
+    run = s51.run
+    monkeypatch.setattr(s51, "run", lambda code, commands: run(code.replace(b"\x24", b"\x34"), commands))
+    adding = bytes.fromhex("2401 80FC")  # ADD A,#1 (ADDC on the other side), for ever
+    (found,) = compiled.differences(adding.ljust(64, b"\x00"), 2)
+    assert found.startswith("checkpoint 0: ")
+    assert "E0h ours 10h ucsim 37h" in found
+
+
+@pytest.mark.slow
+@needs_csmith
+def test_random_c_programs_end_with_the_same_memory_and_characters():
+    found = dict(map(csmith.tried, SEEDS))
+    assert set(found.values()) <= {csmith.EQUAL, csmith.LEFT_OUT}
+    assert csmith.EQUAL in found.values()
+
+
+@needs_csmith
+def test_a_difference_of_a_random_c_program_is_told(tmp_path, monkeypatch):
+    run = s51.run
+
+    def with_other_memory(code, commands, heard):
+        return run(code, [f"{one[:-1]}1" if one.startswith("fill xram") else one for one in commands], heard)
+
+    monkeypatch.setattr(s51, "run", with_other_memory)
+    images = filter(None, (csmith.build(seed, tmp_path) for seed in SEEDS))
+    found = (csmith.differences(image) for image in images)
+    assert next(told for told in found if told is not None) == ["external RAM"]

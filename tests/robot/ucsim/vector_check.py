@@ -8,7 +8,7 @@ from pathlib import Path
 
 from miro_robot.mcs51.vectors import RESET, VectorRunner, decode
 from tests.robot.ucsim import s51
-from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, PSW, allowed
+from tests.robot.ucsim.exclusions import ALIKE_AFTER_MOVX, COMPARED, MOVX, PSW, allowed
 
 _BATCH = 2000  # vectors per start of the simulator
 
@@ -61,21 +61,15 @@ def _xram(vector, reader):
 
 def _step_differences(vector, seen, xram):
     final = vector.final
+    iram, registers = dict(final.iram), {**RESET, **dict(final.sfr)}
     opcode = dict(vector.initial.code)[vector.initial.pc]
-    if seen.pc != final.pc:
-        yield f"PC vector {final.pc:04X}h ucsim {seen.pc:04X}h"
+    addresses = ALIKE_AFTER_MOVX if opcode in MOVX else COMPARED
+    expected = {address: registers.get(address, 0) for address in addresses}
+    yield from s51.differences(seen, final.pc, [iram.get(at, 0) for at in range(256)], expected, "vector")
     if seen.ticks != 12 * len(vector.cycles):
         yield f"cycles vector {len(vector.cycles)} ucsim {seen.ticks / 12:g}"
     if xram != final.xram:
         yield f"external RAM vector {final.xram} ucsim {xram}"
-    iram, registers = dict(final.iram), {**RESET, **dict(final.sfr)}
-    for address in range(256):
-        if seen.iram[address] != iram.get(address, 0):
-            yield f"internal RAM {address:02X}h vector {iram.get(address, 0):02X}h ucsim {seen.iram[address]:02X}h"
-    for address in COMPARED:
-        expected, found = registers.get(address, 0), seen.sfr[address - 0x80]
-        if expected != found and not (address == P0 and opcode in MOVX):
-            yield f"{address:02X}h vector {expected:02X}h ucsim {found:02X}h"
 
 
 def load(folder):
