@@ -1,23 +1,29 @@
-"""Robots of the theory on their way: laws as demands for `tests.host.theory.simulation`, and the paper's starts."""
+"""Robots of the theory on their way, in continuous time: laws, the paper's starts, and what comes of both.
+
+    demand z_r' + u ─► (14) tau = H z_r' + G + H u ─► (10) H z' + G + tau_d = tau ─► (8) q' = S z
+
+The law is asked in every stage of a step. Where a sign function switches, the method is of order 1, and a surface is
+held within what the law does in one step.
+"""
 
 import math
 import random
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
+import numpy as np
 
+from miro_host.integrator import clamp
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
 from miro_host.theory import across
-from tests.host.theory.matrices import times
-from tests.host.theory.simulation import BodySimulation
+from tests.host.driving import apart
+from tests.host.theory.mechanics import ROBOT, accelerated, cartesian_rates, inertia
 from tests.host.theory.stability import lyapunov
-from tests.host.theory.unicycle import UnicycleBody, inertia
 
-ROBOT = UnicycleBody(mass_kg=0.5, yaw_inertia_kg_m2=4.7e-4, wheel_radius_m=0.020, track_m=0.068)
 LITERAL = Gains()  # a set that draws Figs. 6 to 8, with boundary layers and guards
 PRINTED = Gains(p1_m_s2=0.35, p2_rad_s2=1.2, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)
 BODY = BodyFrameParameters()
@@ -26,6 +32,54 @@ STARTS = {  # path and initial errors of the paper's figures
     "Fig. 7": (StraightLine(), (0.5258, 0.1662, -3.09)),
     "Fig. 8": (Arc(), (0.1120, 0.2892, -1.31)),
 }
+
+
+class Row(NamedTuple):
+    """The robot at the beginning of a step, its heading unwrapped, and what was demanded and applied there."""
+
+    t_s: float
+    posture: Posture
+    v_m_s: float
+    w_rad_s: float
+    demand: tuple[float, float]
+    torque_nm: np.ndarray
+
+
+def simulated(demand, start, z, start_s, end_s, step_s, disturbance=lambda t_s: (0.0, 0.0), limits=None):
+    """Rows from `start_s` to `end_s`, both included, by Runge and Kutta; `disturbance` is tau_d in Nm at the wheels.
+
+    With `limits` demands are clamped as the host's integrator does it, and no speed is raised above its limit.
+    """
+    h = inertia(ROBOT)
+
+    def demanded(t, state):
+        x, y, theta, v, w = (float(value) for value in state)
+        v_dot, w_dot = demand(t, Posture(x, y, theta), v, w)
+        if limits is not None:
+            v_dot = _limited(v, clamp(v_dot, limits.max_v_dot_m_s2), limits.max_v_m_s)
+            w_dot = _limited(w, clamp(w_dot, limits.max_w_dot_rad_s2), limits.max_w_rad_s)
+        return v_dot, w_dot
+
+    def rates(t, state):
+        torque = h @ demanded(t, state)  # (14)
+        return np.array([*cartesian_rates(state, state[3:]), *accelerated(ROBOT, torque - disturbance(t))])
+
+    state = np.array([start.x_m, start.y_m, start.theta_rad, *z])
+    for index in range(round((end_s - start_s) / step_s) + 1):
+        t, half = start_s + index * step_s, 0.5 * step_s
+        x, y, theta, v, w = (float(value) for value in state)
+        now = demanded(t, state)
+        yield Row(t, Posture(x, y, theta), v, w, now, h @ now)
+        k1 = rates(t, state)
+        k2 = rates(t + half, state + half * k1)
+        k3 = rates(t + half, state + half * k2)
+        k4 = rates(t + step_s, state + step_s * k3)
+        state = state + step_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+def _limited(speed, rate, most):
+    """The rate, or 0 where it would raise a speed that is at its limit."""
+    return 0.0 if abs(speed) >= most and speed * rate > 0.0 else rate
 
 
 def paper_law(gains, path):
@@ -60,40 +114,29 @@ def beside(path, t, x_e, y_e, theta_e):
     return Posture(at.x_m + x_e, at.y_m + y_e, at.theta_rad + theta_e), (r.v_m_s, r.w_rad_s)
 
 
-def last(law, path, start, z, start_s, end_s, step_s, limited=True):
-    """The robot at `end_s`, and (t, distance in m, heading error in rad) of every step."""
+def driven(law, path, start, z, start_s, step_s):
+    """Rows of a robot within its limits until 6 s."""
     make, parameters = LAWS[law]
-    simulation = BodySimulation(ROBOT, make(parameters, path), limits=parameters if limited else None)
-    row, errors = None, []
-    for row in simulation.run(start, z, start_s, end_s, step_s):
-        there = path.at(row.t_s).posture
-        distance = math.hypot(row.posture.x_m - there.x_m, row.posture.y_m - there.y_m)
-        turn = math.remainder(row.posture.theta_rad - there.theta_rad, math.tau)
-        errors.append((row.t_s, distance, turn))
-    return row, errors
+    return list(simulated(make(parameters, path), start, z, start_s, 6.0, step_s, limits=parameters))
 
 
 def figure(law, name, step_s=0.002):
     """Final distance in m, final heading error in rad, and when it was last outside 3 cm or 0.15 rad."""
     path, error = STARTS[name]
     start, _ = beside(path, 0.0, *error)
-    _, errors = last(law, path, start, (0.0, 0.0), 0.0, 6.0, step_s)
-    outside = [t for t, distance, turn in errors if distance > 0.03 or abs(turn) > 0.15]
+    rows = driven(law, path, start, (0.0, 0.0), 0.0, step_s)
+    errors = [(row.t_s, *apart(row.posture, path.at(row.t_s))) for row in rows]
+    outside = [t for t, distance, turn in errors if distance > 0.03 or turn > 0.15]
     return errors[-1][1], errors[-1][2], outside[-1] if outside else 0.0
 
 
 def lateral_slope(law, offsets=(-0.04, -0.02, 0.0, 0.02, 0.04), step_s=0.002):
     """Slope of final against initial lateral error on the line, by least squares, from 0.3 m on with a small turn."""
-    path = StraightLine()
-    ends = []
+    path, ends = StraightLine(), []
     for offset in offsets:
         start, z = beside(path, 1.5, 0.0, offset, 0.05)
-        row, _ = last(law, path, start, z, 1.5, 6.0, step_s)
-        ends.append(row.posture.y_m)
-    middle = math.fsum(offsets) / len(offsets)
-    mean = math.fsum(ends) / len(ends)
-    rise = math.fsum((x - middle) * (y - mean) for x, y in zip(offsets, ends, strict=True))
-    return rise / math.fsum((x - middle) ** 2 for x in offsets)
+        ends.append(driven(law, path, start, z, 1.5, step_s)[-1].posture.y_m)
+    return np.polyfit(offsets, ends, 1)[0]
 
 
 def random_starts(count, seed=1):
@@ -108,13 +151,19 @@ def random_starts(count, seed=1):
 def final_place(law, error, step_s=0.002):
     """Where a robot that starts at rest, off the line by `error`, is after 6 s: along, across (m), heading (rad)."""
     path = StraightLine()
-    start, _ = beside(path, 0.0, *error)
-    row, errors = last(law, path, start, (0.0, 0.0), 0.0, 6.0, step_s)
-    return row.posture.x_m - path.at(6.0).posture.x_m, row.posture.y_m, errors[-1][2]
+    end = driven(law, path, beside(path, 0.0, *error)[0], (0.0, 0.0), 0.0, step_s)[-1].posture
+    return end.x_m - path.at(6.0).posture.x_m, end.y_m, math.remainder(end.theta_rad, math.tau)
 
 
-@dataclass
-class Seen:
+def run_parallel_to_the_line():
+    """Theta_e = 0, 4 cm beside the line, on rho_e = 0."""
+    path = StraightLine()
+    start = Posture(math.sqrt(path.at(0.75).rho_m ** 2 - 0.04**2), 0.04, 0.0)
+    _, z = beside(path, 0.75, 0.0, 0.0, 0.0)
+    return list(simulated(paper_law(PRINTED, path), start, z, 0.75, 6.0, 0.001))
+
+
+class Seen(NamedTuple):
     """V and what it is made of at one step."""
 
     v: float
@@ -134,29 +183,30 @@ class Seen:
         return min(abs(self.s1) / PRINTED.p1_m_s2, abs(self.s2) / PRINTED.p2_rad_s2) < 8.0 * self.step_s
 
 
-def lyapunov_run(path, error, start_s, end_s, f, worst, gamma2=None, turn=0.0, step_s=1e-3):
+def lyapunov_run(path, error, start_s, end_s, f, worst, gamma2=PRINTED.gamma2_per_s, turn=0.0, step_s=1e-3):
     """The law as printed, with f_i = f times a sine or, `worst`, against V at each moment; V at each step."""
-    gains = PRINTED if gamma2 is None else msgspec.structs.replace(PRINTED, gamma2_per_s=gamma2)
-    law, demand = YangKim(gains), paper_law(gains, path)
-    latest = [0.0, 0.0]
+    gains = msgspec.structs.replace(PRINTED, gamma2_per_s=gamma2)
+    law, demand, h, latest = YangKim(gains), paper_law(gains, path), inertia(ROBOT), [0.0, 0.0]
 
     def watching(t, posture, v, w):
         c = law.control(path.at(t), posture, v, w)
-        r = path.at(t)
-        cosine = math.sin(across(posture))
-        latest[:] = [-math.copysign(f[0], c.s1 * cosine), -math.copysign(f[1], c.s2)]
-        return r.v_dot_m_s2 + c.u1, r.w_dot_rad_s2 + c.u2
+        latest[:] = [-math.copysign(f[0], c.s1 * across(posture)), -math.copysign(f[1], c.s2)]
+        return demand(t, posture, v, w)
 
     def torques(t):
-        parts = latest if worst else [f[0] * math.sin(7.0 * t), f[1] * math.sin(11.0 * t)]
-        return times(inertia(ROBOT), parts)
+        return h @ (latest if worst else [f[0] * math.sin(7.0 * t), f[1] * math.sin(11.0 * t)])
 
     start, (v, w) = beside(path, start_s, *error)
-    simulation = BodySimulation(ROBOT, watching if worst else demand, disturbance=torques)
     seen = []
-    for row in simulation.run(start, (v, w + turn), start_s, end_s, step_s):
+    for row in simulated(watching, start, (v, w + turn), start_s, end_s, step_s, torques):
         c = law.control(path.at(row.t_s), row.posture, row.v_m_s, row.w_rad_s)
         rate = row.w_rad_s - path.at(row.t_s).w_rad_s
         v_now = lyapunov(c.s1, c.s2)
         seen.append(Seen(v_now, c.s1, c.s2, c.rho_e_m, c.phi_e_rad, c.theta_e_rad, rate, step_s))
     return seen
+
+
+def run_across_theta_e_0():
+    """A run in which theta_e crosses 0 far from the line."""
+    far = (0.07, 0.30, -0.2)
+    return lyapunov_run(StraightLine(), far, 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4)

@@ -7,13 +7,22 @@ s2' has the term (theta_e' / layer) |phi_e| there, which is in neither u2 of equ
 """
 
 import math
+import random
+from typing import NamedTuple
 
 import msgspec
 
-from miro_exact.dmath import atan2, sincos, wrap_pi
+from miro_exact.dmath import wrap_pi
+from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
+from miro_host.posture import Posture
+from miro_host.references.line import StraightLine
+from miro_host.theory import across, radius
+
+NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
+SLOPED = msgspec.structs.replace(NO_GUARD, layer_derivative=True)
 
 
-class PolarErrors(msgspec.Struct, frozen=True):
+class PolarErrors(NamedTuple):
     """Errors c - r (m, rad, wrapped), their rates by equation (9), cos(phi_c - theta_c), and R(q, z) in m/s2."""
 
     rho_e_m: float
@@ -28,9 +37,8 @@ class PolarErrors(msgspec.Struct, frozen=True):
 
 def polar_errors(reference, robot, v, w):
     """The errors of a robot that moves with z = (v, w). ZeroDivisionError in the origin."""
-    rho = math.sqrt(robot.x_m * robot.x_m + robot.y_m * robot.y_m)
-    phi = atan2(robot.y_m, robot.x_m)
-    sin, cos = sincos(phi - robot.theta_rad)
+    rho, phi = radius(robot), math.atan2(robot.y_m, robot.x_m)
+    sin, cos = math.sin(phi - robot.theta_rad), math.cos(phi - robot.theta_rad)
     return PolarErrors(
         rho_e_m=rho - reference.rho_m,
         phi_e_rad=wrap_pi(phi - reference.phi_rad),
@@ -39,27 +47,19 @@ def polar_errors(reference, robot, v, w):
         phi_e_rate=-(v / rho) * sin - reference.phi_rate_rad_s,
         theta_e_rate=w - reference.w_rad_s,
         cosine=cos,
-        curvature_term=v * v / rho * sin * sin + v * w * sin,
+        curvature_term=curvature_term(v, w, rho, sin),
     )
 
 
-def surfaces(e, gamma1, gamma2, side):
-    """s1 in m/s and s2 in rad/s of equation (13); `side` is sgn(theta_e), or what stands for it."""
-    return e.rho_e_rate + gamma1 * e.rho_e_m, e.theta_e_rate + gamma2 * e.theta_e_rad + side * abs(
-        e.phi_e_rad
-    )
+def side_of(e, layer_rad):
+    """sgn(theta_e), or the saturation that stands for it in a boundary layer."""
+    return saturation(e.theta_e_rad, layer_rad) if layer_rad > 0.0 else sign(e.theta_e_rad)
 
 
-def rho_error_acceleration(e, reference, v_dot):
-    """rho_e'' in m/s2 by equation (18)."""
-    return v_dot * e.cosine + e.curvature_term - reference.rho_accel_m_s2
-
-
-def absolute_rate(e):
-    """d|phi_e|/dt in rad/s: sgn(phi_e) phi_e'."""
-    if e.phi_e_rad == 0.0:
-        return 0.0
-    return e.phi_e_rate if e.phi_e_rad > 0.0 else -e.phi_e_rate
+def surfaces(e, gammas, layer_rad=0.0):
+    """s1 in m/s and s2 in rad/s of equation (13)."""
+    s2 = e.theta_e_rate + gammas[1] * e.theta_e_rad + side_of(e, layer_rad) * abs(e.phi_e_rad)
+    return e.rho_e_rate + gammas[0] * e.rho_e_m, s2
 
 
 def layer_term(e, layer_rad):
@@ -69,14 +69,14 @@ def layer_term(e, layer_rad):
     return e.theta_e_rate / layer_rad * abs(e.phi_e_rad)
 
 
-def surface_rates(e, reference, accelerations, gammas, side, layer_rad=0.0):
+def surface_rates(e, reference, accelerations, gammas, layer_rad=0.0):
     """s1' and s2' of a robot with z' = `accelerations`, nothing left out. `layer_rad` 0: a sign, away from 0."""
     v_dot, w_dot = accelerations
-    s1_rate = rho_error_acceleration(e, reference, v_dot) + gammas[0] * e.rho_e_rate
-    s2_rate = w_dot - reference.w_dot_rad_s2 + gammas[1] * e.theta_e_rate + side * absolute_rate(e)
-    if layer_rad > 0.0:
-        s2_rate += layer_term(e, layer_rad)
-    return s1_rate, s2_rate
+    rho_e_accel = v_dot * e.cosine + e.curvature_term - reference.rho_accel_m_s2  # (18)
+    absolute_rate = sign(e.phi_e_rad) * e.phi_e_rate  # d|phi_e|/dt
+    s2_rate = w_dot - reference.w_dot_rad_s2 + gammas[1] * e.theta_e_rate
+    s2_rate += side_of(e, layer_rad) * absolute_rate + layer_term(e, layer_rad)
+    return rho_e_accel + gammas[0] * e.rho_e_rate, s2_rate
 
 
 def lyapunov(s1, s2):
@@ -102,13 +102,8 @@ def jump(theta_e_rate, phi_e_rad):
 
 
 def reach(p, q, f):
-    """The |s_i| above which V still falls by (23) under |f_i| = f, whatever P_i is: (f - P_i) / Q_i, at least 0.
-
-    Condition (17) makes it 0. Infinite for Q_i = 0 and P_i < f.
-    """
-    if p >= f:
-        return 0.0
-    return (f - p) / q if q > 0.0 else math.inf
+    """The |s_i| above which V still falls by (23) under |f_i| = f: (f - P_i) / Q_i; condition (17) makes it 0."""
+    return max(0.0, (f - p) / q)
 
 
 def phi_error_rate_on_surfaces(reference, phi_e_rad):
@@ -119,6 +114,43 @@ def phi_error_rate_on_surfaces(reference, phi_e_rad):
     runs parallel to it. Nothing in u reacts to that, because sgn(0) |phi_e| = 0. ZeroDivisionError at rho_r = 0.
     """
     a = reference.phi_rad - reference.posture.theta_rad
-    sin_a, cos_a = sincos(a)
-    sin, cos = sincos(a + phi_e_rad)
-    return -(reference.v_m_s * cos_a / reference.rho_m) * (sin / cos - sin_a / cos_a)
+    away = math.tan(a + phi_e_rad) - math.tan(a)
+    return -(reference.v_m_s * math.cos(a) / reference.rho_m) * away
+
+
+def rates(gains, path, t, posture, v, w, f=(0.0, 0.0)):
+    """(s, s', e, proof's V') of a robot under the law with a disturbance f, all from the theory's formulas."""
+    r = path.at(t)
+    c = YangKim(gains).control(r, posture, v, w)
+    z_dot = (r.v_dot_m_s2 + c.u1 - f[0], r.w_dot_rad_s2 + c.u2 - f[1])  # (15)
+    e, layer, signs = polar_errors(r, posture, v, w), 0.0, (sign(c.s1), sign(c.s2))
+    if gains.switching == "saturation":
+        layer = gains.layer_theta_rad
+        signs = saturation(c.s1, gains.layer_s1_m_s), saturation(c.s2, gains.layer_s2_rad_s)
+    gammas = (gains.gamma1_per_s, gains.gamma2_per_s)
+    s = surfaces(e, gammas, layer)
+    q, p = (gains.q1_per_s, gains.q2_per_s), (gains.p1_m_s2, gains.p2_rad_s2)
+    return s, surface_rates(e, r, z_dot, gammas, layer), e, proof_rate(s, signs, q, p, f, e.cosine)
+
+
+def states(count, spread, seed=3):
+    """(path, t, posture, v, w) with theta_e within `spread`, evenly drawn, away from the origin and assumption 3."""
+    chance = random.Random(seed)
+    for _ in range(count):
+        path, t = StraightLine(), chance.uniform(0.6, 5.8)
+        r = path.at(t).posture
+        x, y = r.x_m + chance.uniform(-0.2, 0.2), r.y_m + chance.uniform(-0.2, 0.2)
+        posture = Posture(x, y, r.theta_rad + chance.uniform(-spread, spread))
+        v, w = chance.uniform(0.05, 0.4), chance.uniform(-2.0, 2.0)
+        if radius(posture) >= 0.05 and abs(across(posture)) >= 0.5:
+            yield path, t, posture, v, w
+
+
+def rising(gains):
+    """The share of states inside the layer in which V rises though f = 0."""
+    rises = []
+    for state in states(2000, 0.9 * gains.layer_theta_rad):
+        s, s_rate, _, _ = rates(gains, *state)
+        rises.append(lyapunov_rate(s, s_rate) > 1e-9)
+    assert len(rises) > 1000
+    return sum(rises) / len(rises)

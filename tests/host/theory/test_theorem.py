@@ -8,22 +8,29 @@ from itertools import pairwise
 
 import pytest
 
+from miro_host.integrator import Limits
+from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
 from tests.host.theory import stability
 from tests.host.theory.ideal import (
+    LITERAL,
     PRINTED,
     ROBOT,
     beside,
     figure,
     final_place,
+    inertia,
     lateral_slope,
     lyapunov_run,
     paper_law,
     random_starts,
+    run_across_theta_e_0,
+    run_parallel_to_the_line,
+    simulated,
 )
-from tests.host.theory.simulation import BodySimulation
+from tests.naive.host_ideal_loop import drive
 
 ERRORS = [(StraightLine(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
 
@@ -48,10 +55,7 @@ def test_with_gains_above_f_v_falls_in_every_step_away_from_crossings_of_theta_e
 def test_where_theta_e_crosses_0_v_jumps_by_twice_the_product_of_the_rate_and_phi_e():
     """The proof drops the derivative of sgn(theta_e). In a run, within 5 %."""
     jumps = 0
-    run = lyapunov_run(
-        StraightLine(), (0.07, 0.30, -0.2), 2.0, 2.5, (0.0, 0.0), False, gamma2=0.3, turn=1.0, step_s=1e-4
-    )
-    for one, two in pairwise(run):
+    for one, two in pairwise(run_across_theta_e_0()):
         expected = stability.jump(one.turn, one.phi_e)
         if one.crossed_before(two) and expected > 0.01:
             assert two.v - one.v == pytest.approx(expected, rel=0.05)
@@ -82,10 +86,7 @@ def test_both_surfaces_and_the_heading_error_go_to_zero(path, error):
 
 def test_with_the_heading_right_the_robot_runs_parallel_to_the_line_for_ever():
     """Theta_e = 0, 4 cm beside the line: the law answers with no turn at all, and rho sin(phi_e) stays."""
-    path = StraightLine()
-    start, z = beside(path, 0.75, 0.0, 0.04, 0.0)
-    start = Posture(math.sqrt(path.at(0.75).rho_m ** 2 - 0.04**2), 0.04, 0.0)  # on rho_e = 0
-    rows = list(BodySimulation(ROBOT, paper_law(PRINTED, path)).run(start, z, 0.75, 6.0, 0.001))
+    path, rows = StraightLine(), run_parallel_to_the_line()
     assert {row.demand[1] for row in rows} == {0.0}
     assert abs(rows[-1].posture.y_m - 0.04) < 0.0002
     for row in rows[:: len(rows) // 10]:
@@ -94,9 +95,7 @@ def test_with_the_heading_right_the_robot_runs_parallel_to_the_line_for_ever():
         assert math.sin(e.phi_e_rad) * (rho_r + e.rho_e_m) == pytest.approx(0.04, rel=1e-9)
         assert rho_r * math.sin(e.phi_e_rad) == pytest.approx(0.04, rel=0.03)
     first, last = (math.atan2(row.posture.y_m, row.posture.x_m) for row in (rows[0], rows[-1]))
-    assert (
-        last < 0.1 * first
-    )  # it falls like 1 / rho, because the line gets longer: no convergence of the position
+    assert last < 0.1 * first  # like 1 / rho, because the line gets longer: the position does not converge
 
 
 @pytest.mark.parametrize("path", [StraightLine(), Arc()])
@@ -110,7 +109,7 @@ def test_the_zero_dynamics_of_the_surfaces_are_those_of_the_formula(path, phi_e)
     v = r.v_m_s * math.cos(a) / math.cos(a + phi_e)  # rho_e' = 0
     e = stability.polar_errors(r, robot, v, r.w_rad_s)
     assert (e.rho_e_m, e.rho_e_rate, e.theta_e_rate) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
-    assert stability.surfaces(e, 1.7, 3.0, 0.0) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert stability.surfaces(e, (1.7, 3.0)) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert e.phi_e_rate == pytest.approx(stability.phi_error_rate_on_surfaces(r, phi_e), rel=1e-9)
 
 
@@ -126,7 +125,7 @@ def test_the_final_lateral_error_follows_the_initial_one_with_slope_one_and_with
 def test_errors_in_the_robots_own_axes_go_to_nothing_from_the_papers_starts(name, settled_s):
     distance, turn, settled = figure("body", name)
     assert distance < 0.001
-    assert abs(math.degrees(turn)) < 0.5
+    assert math.degrees(turn) < 0.5
     assert settled < settled_s
 
 
@@ -135,7 +134,7 @@ def test_the_papers_figures_can_be_drawn_with_the_papers_law(name):
     """One set of gains ends all three within the paper's own measurement error of 2.40 cm."""
     distance, turn, _ = figure("literal", name)
     assert distance < 0.024
-    assert abs(math.degrees(turn)) < 0.5
+    assert math.degrees(turn) < 0.5
 
 
 def test_from_random_starts_few_reach_the_line_under_the_papers_law_and_all_with_a_signed_error():
@@ -144,3 +143,61 @@ def test_from_random_starts_few_reach_the_line_under_the_papers_law_and_all_with
     assert sum(math.hypot(x, y) < 0.03 for x, y, _ in literal) <= 6
     assert sum(abs(theta) < 0.05 for _, _, theta in literal) >= 16  # parallel to it, as the zero dynamics say
     assert all(math.hypot(x, y) < 0.03 for x, y, _ in body)
+
+
+# The simulation itself.
+
+
+def swaying(t, posture, v, w):
+    """Demands that do not depend on the robot."""
+    return 0.3 * math.cos(3.0 * t), 4.0 * math.sin(2.0 * t)
+
+
+def swayed(end_s, step_s, **options):
+    start = Posture(0.1, 0.0, 0.2)
+    return list(simulated(swaying, start, (0.0, 0.0), 0.0, end_s, step_s, **options))
+
+
+@pytest.mark.parametrize("path", [StraightLine(), Arc()])
+def test_the_simulation_agrees_with_the_slow_twin_that_knows_no_torque(path):
+    """The twin adds up equation (15) in steps of 0.1 ms; f is what tau_d comes to."""
+
+    def f(t):
+        return 0.1 * math.sin(7.0 * t), 0.5 * math.sin(7.0 * t)
+
+    start, z = beside(path, 1.0, 0.05, 0.03, 0.3)
+    place = (start.x_m, start.y_m, start.theta_rad)
+    twin = drive(YangKim(LITERAL), path, place, z, 1.0, 3.0 + 1e-4, 1e-4, f)[-1].posture
+    *_, row = simulated(paper_law(LITERAL, path), start, z, 1.0, 3.0, 0.002, lambda t: inertia(ROBOT) @ f(t))
+    ended = (row.posture.x_m, row.posture.y_m, row.posture.theta_rad)
+    assert ended == pytest.approx((twin.x_m, twin.y_m, twin.theta_rad), abs=2e-5)
+
+
+def test_half_the_step_leaves_a_sixteenth_of_the_error():
+    def end(steps):
+        last = swayed(2.0, 2.0 / steps)[-1].posture
+        return last.x_m, last.y_m, last.theta_rad
+
+    exact = end(800)
+    errors = [math.dist(end(steps), exact) for steps in (20, 40)]
+    assert 12.0 < errors[0] / errors[1] < 20.0
+
+
+def test_the_work_of_the_torques_is_the_energy_that_the_body_has():
+    powers, rows = [], swayed(2.0, 1e-3)
+    for row in rows:
+        half = 0.5 * ROBOT.track_m * row.w_rad_s
+        rims = (row.v_m_s - half, row.v_m_s + half)
+        powers.append(row.torque_nm @ rims / ROBOT.wheel_radius_m)
+    work = sum(0.5 * 1e-3 * (one + other) for one, other in pairwise(powers))
+    held = 0.5 * (ROBOT.mass_kg * rows[-1].v_m_s ** 2 + ROBOT.yaw_inertia_kg_m2 * rows[-1].w_rad_s ** 2)
+    assert held > 1e-3
+    assert work == pytest.approx(held, rel=1e-5)
+
+
+def test_limits_hold_for_demands_and_speeds():
+    limits = Limits(max_v_m_s=0.05, max_w_rad_s=0.5, max_v_dot_m_s2=0.2, max_w_dot_rad_s2=2.0)
+    rows = swayed(1.0, 1e-3, limits=limits)
+    assert max(abs(row.demand[0]) for row in rows) == 0.2
+    assert 0.05 <= max(row.v_m_s for row in rows) < 0.0503
+    assert 0.5 <= max(row.w_rad_s for row in rows) < 0.503
