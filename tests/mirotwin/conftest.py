@@ -1,7 +1,10 @@
 """What the tests of the commands share: a short scenario, and a way to call the program in this process."""
 
+import io
+
 import pytest
 from click.testing import CliRunner
+from intelhex import IntelHex
 
 from mirotwin.commands import main
 
@@ -55,9 +58,14 @@ def finished(mirotwin, short):
     return folder
 
 
+def hex_text(code):
+    """Intel HEX of `code`, from address 0 on."""
+    file, text = IntelHex(), io.StringIO()
+    file.frombytes(code)
+    file.write_hex_file(text)
+    return text.getvalue()
+
+
 def hex_file(path, code):
-    """An Intel HEX file with `code` (at most 16 bytes) at address 0."""
-    record = bytes([len(code), 0, 0, 0]) + code
-    checksum = -sum(record) & 0xFF
-    path.write_text(f":{record.hex().upper()}{checksum:02X}\n:00000001FF\n")
+    path.write_text(hex_text(code))
     return path

@@ -82,7 +82,6 @@ def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance():
         period(HERE, (v, 0.0), commanded(after)) for v, after in zip(speeds, [*speeds[1:], 0.0], strict=True)
     ]
     found = theory(run, SlidingGains(0.05, 1.0)).disturbance
-    assert found is not None
     assert found.f1_largest_m_s2 == pytest.approx(0.0, abs=1e-9)
     assert (found.f1_above_p1, found.f2_above_p2) == (0.0, 0.0)
 
@@ -94,8 +93,6 @@ def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturba
     track = track_of(run)
     assert list(track.f1_m_s2) == pytest.approx([0.1 / PERIOD_S, -0.1 / PERIOD_S, 0.0], abs=1e-9)
     found = theory_of(track, SlidingGains(0.05, None))
-    assert found is not None
-    assert found.disturbance is not None
     assert found.disturbance.f1_above_p1 == pytest.approx(2 / 3)
     assert found.disturbance.f2_above_p2 is None
 
@@ -111,12 +108,10 @@ SURFACES = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(told, p1, layer):
     run = [period(HERE, (0.0, 0.0), commanded(v, s1=s1, s2=s2)) for v, (s1, s2) in told]
     found = theory(run, SlidingGains(p1, None, layer, None)).disturbance
-    assert found is not None
     f1 = naive.disturbances(run)[:, 0]
     left = [p1 * min(abs(s1) / layer, 1.0) for _, (s1, _) in told[:-1]]
     sure = [abs(f) > bound for f, bound in zip(f1, left, strict=True) if abs(abs(f) - bound) > 1e-6]
     unsure = len(left) - len(sure)
-    assert found.f1_above_authority is not None
     assert sum(sure) <= round(found.f1_above_authority * len(left)) <= sum(sure) + unsure
     assert found.f1_above_p1 is not None
     assert found.f1_above_authority >= found.f1_above_p1
@@ -126,7 +121,6 @@ def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(told, p
 def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero():
     run = [period(HERE, (0.0, 0.0), commanded(0.001, s1=s1, s2=0.0)) for s1 in (0.01, -0.01, 0.0, 0.0)]
     found = theory(run, SlidingGains(0.05, None)).disturbance
-    assert found is not None
     assert (found.f1_above_p1, found.f1_above_authority) == (0.0, 0.0)
     assert authority(0.01, 0.05, None) == 0.05
     assert authority(0.0, 0.05, None) == 0.0
@@ -135,7 +129,6 @@ def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero():
 def test_of_a_law_that_does_not_say_its_surfaces_no_authority_is_known():
     run = [period(HERE, (0.0, 0.0), commanded(0.1)) for _ in range(3)]
     found = theory(run, SlidingGains(0.05, 1.0, 0.1, 0.1)).disturbance
-    assert found is not None
     assert (found.f1_above_authority, found.f2_above_authority) == (None, None)
 
 
@@ -143,7 +136,6 @@ def test_a_period_without_a_command_has_no_f():
     run = [period(HERE, (0.0, 0.0), commanded(0.1)), period(HERE, (0.3, 0.0)), period(HERE, (0.3, 0.0))]
     track = track_of(run)
     assert len(track.f1_m_s2) == 1
-    assert track.now is not None
     assert (track.now.f1_m_s2, track.now.f2_rad_s2) == (None, None)
 
 
@@ -311,7 +303,5 @@ def test_the_terms_of_a_whole_run_follow_from_its_recording():
     gains = gains_of(text.scenario)[0, 0]
     one, other = (theory_of(each.robots[0, 0].theory, gains) for each in (tracks, again))
     assert one == other
-    assert one is not None
-    assert one.disturbance is not None
     assert 0.1 < one.disturbance.f1_largest_m_s2 < 8.0
     assert one.assumption_3.frames == 0

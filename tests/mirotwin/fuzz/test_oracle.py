@@ -57,7 +57,6 @@ def test_a_find_is_minimised_confirmed_and_left_as_a_case_that_replays(tmp_path,
     data = damaged()
     assert triage.target.run(data)
     crash = triage.take(data)
-    assert crash is not None
     assert crash.confirmed
     assert crash.sizes[0] == len(data) > crash.sizes[1]
     left = {path.name for path in (tmp_path / "out" / "crashes").iterdir()}
@@ -127,7 +126,6 @@ def test_a_find_of_a_check_in_python_is_made_small_in_worlds(tmp_path):
     failure = triage.oracle.judged(data, expected).failure
     assert failure is not None
     crash = triage.take_judged(data, failure, expected)
-    assert crash is not None
     assert crash.confirmed
     assert crash.check == "wheels_within_m_s"
     assert crash.sizes[1] < len(data)

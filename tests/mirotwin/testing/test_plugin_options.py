@@ -135,7 +135,6 @@ def test_the_same_by_a_check(link, world):
     replay, debug = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
     assert debug == replay.replace("mirotwin replay", "mirotwin debug")
     left = re.search("left/[^/]+/firmware.ihx", replay)
-    assert left is not None
     assert replay.endswith(f"/case.stream --firmware {left[0]}")
     replayed = run(tmp_path, replay)
     assert replayed.returncode == 1

@@ -108,7 +108,6 @@ time.sleep({PATIENCE_S})
     owner = children.start(
         [sys.executable, "-c", program, tmp_path], stdout=children.subprocess.PIPE, cwd=ROOT, text=True
     )
-    assert owner.stdout is not None
     assert owner.stdout.readline() == "runs\n"
     assert len(processes_of(tmp_path)) == 3, "the owner, afl-fuzz and the target"
     owner.send_signal(signal.SIGKILL)

@@ -1,4 +1,6 @@
-"""Crashes on a bare processor as files: the same verdict again, on this firmware and on others."""
+"""Crashes on a bare processor as files: the same verdict again, here and elsewhere; and checks in Python for it."""
+
+import sys
 
 import pytest
 
@@ -10,8 +12,9 @@ from miro_robot.bare.pins import PinEvent
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
 from mirotwin.verify.bare.case import case_text, rerun_bare_case
-from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.bare.run import BarePlayback
+from tests.host import distribution
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
@@ -127,24 +130,23 @@ def test_a_header_that_says_nothing_useful_is_refused(tmp_path, old, new, said):
     assert str(caught.value).startswith(str(path))
 
 
-def test_characters_that_overlap_are_refused(tmp_path):
-    line = BareTarget(image(SLEEPS), "bytes").line
+def stream_of(tmp_path, said, end_tick):
+    """A stream for a bare processor that expects nothing."""
     path = tmp_path / "x.stream"
-    path.write_text(
-        case_text(
-            image(SLEEPS), line, [Transmission(5000, DOWN, b"ab"), Transmission(5100, DOWN, b"c")], 9000
-        )
-    )
+    path.write_text(case_text(image(SLEEPS), BareTarget(image(SLEEPS), "bytes").line, said, end_tick))
+    return path
+
+
+def test_characters_that_overlap_are_refused(tmp_path):
+    path = stream_of(tmp_path, [Transmission(5000, DOWN, b"ab"), Transmission(5100, DOWN, b"c")], 9000)
     with pytest.raises(BadInput, match="the characters at tick 5100 begin before those before them end"):
         rerun_bare_case(path, image(SLEEPS))
 
 
-def test_a_stream_that_expects_nothing_is_judged_by_faults(tmp_path):
-    line = BareTarget(image(SLEEPS), "bytes").line
-    path = tmp_path / "x.stream"
-    for data, code in ((b"ab", 0), (b"a!", 3)):
-        path.write_text(case_text(image(SLEEPS), line, [Transmission(5000, DOWN, data)], 200_000))
-        assert rerun_bare_case(path, image(SLEEPS))[1].code == code
+@pytest.mark.parametrize(("data", "code"), [(b"ab", 0), (b"a!", 3)])
+def test_a_stream_that_expects_nothing_is_judged_by_faults(tmp_path, data, code):
+    path = stream_of(tmp_path, [Transmission(5000, DOWN, data)], 200_000)
+    assert rerun_bare_case(path, image(SLEEPS))[1].code == code
 
 
 def test_a_reset_starts_the_firmware_anew(tmp_path):
@@ -171,3 +173,90 @@ def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pi
     machine = BareMachine(image(SLEEPS), pins=tuple(events))
     machine.run(max_cycles=100_000)
     assert (machine.faults[0].tick, machine.faults[0].pc) == (target.failure.tick, target.failure.pc)
+
+
+# Checks in Python: finding them by name, and what they may say
+
+SOURCE = """
+limit = 3
+
+def quiet(run):
+    return None
+
+def loud(run):
+    return f"too\\n  {run}"
+
+def odd(run):
+    return 5
+
+def broken(run):
+    return run.nothing
+
+def leaves(run):
+    raise SystemExit(0)
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mycheck.py"
+    path.write_text(SOURCE)
+    return path
+
+
+def test_a_function_of_a_file(file):
+    found = check_named(f"{file}:loud")
+    assert (found.name, found.from_file) == ("loud", True)
+    assert found.judge("loud") == "too loud"
+    assert check_named(f"{file}:quiet").judge("anything") is None
+
+
+NO_ATTRIBUTE = "raised AttributeError: 'str' object has no attribute 'nothing'"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("odd", "returned 5 ({file}:10 in odd); return None, or what is wrong as text"),
+        ("leaves", "raised SystemExit: 0 ({file}:17 in leaves); repair the check"),
+        ("broken", f"{NO_ATTRIBUTE} ({{file}}:14 in broken); repair the check"),
+    ],
+)
+def test_a_check_that_fails_itself_says_where(file, name, said):
+    with pytest.raises(BadInput) as caught:
+        check_named(f"{file}:{name}").judge("text")
+    assert str(caught.value).endswith(said.format(file=file))
+    assert f"--check {file}:{name}" in str(caught.value)
+
+
+def test_what_is_no_check_is_refused(file, tmp_path):
+    for text, said in (
+        (f"{file}:nothing", "there is no function 'nothing'; it has quiet, loud, odd, broken"),
+        (f"{file}:limit", "there is no function 'limit'"),
+        (f"{tmp_path}/none.py:f", "there is no such file"),
+        ("nothing", "there is no check 'nothing' for a bare processor; give FILE.py:FUNCTION"),
+    ):
+        with pytest.raises(BadInput) as caught:
+            check_named(text)
+        assert said in str(caught.value)
+    file.write_text("raise RuntimeError('no')")
+    with pytest.raises(BadInput, match=r"cannot be run: RuntimeError: no \(.*mycheck.py:1\); repair it"):
+        check_named(f"{file}:quiet")
+
+
+def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
+    parts = {
+        "always_wrong": "their_check:wrong",
+        "no_function": "their_check:text",
+        "absent": "their_check:absent",
+    }
+    source = "text = 'x'\n\ndef wrong(run):\n    return 'wrong'\n"
+    distribution.install(tmp_path, "theirs", "1.0", parts, "bare_checks", their_check=source)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = check_named("always_wrong")
+    assert (found.judge(None), found.from_file, found.name) == ("wrong", False, "always_wrong")
+    with pytest.raises(BadInput, match="is no function"):
+        check_named("no_function")
+    with pytest.raises(BadInput, match="cannot be imported: AttributeError"):
+        check_named("absent")
+    sys.modules.pop("their_check")

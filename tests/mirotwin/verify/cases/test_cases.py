@@ -44,16 +44,8 @@ def failing(tmp_path, expect="failsafe_stop_ms = 100.0"):
 def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path, engine):
     path = failing(tmp_path)
     verdict = stream.read(path).header.verdict
-    command = [
-        sys.executable,
-        "-c",
-        "from mirotwin.entry import main; main()",
-        "replay",
-        str(path),
-        "-q",
-        "--engine",
-        engine,
-    ]
+    program = [sys.executable, "-c", "from mirotwin.entry import main; main()"]
+    command = [*program, "replay", str(path), "-q", "--engine", engine]
     found = children.run(command, capture_output=True, text=True)
     assert (found.returncode, found.stderr) == (1, f"mirotwin: fails as recorded: {verdict}\n")
 
@@ -112,13 +104,8 @@ def test_a_wait_that_was_in_vain_is_judged_again(mirotwin, tmp_path):
     with pytest.raises(WaitExpired) as caught:
         world.run_until(conditions.Answer(slot=1), within=50 * MS)
     expect = expect_of("happens", caught.value.conditions[0], 60 * MS, world.tick)
-    assert expect == {
-        "happens": {
-            "condition": {"event": "answer", "slot": 1},
-            "after_tick": 60 * MS,
-            "until_tick": 110 * MS,
-        }
-    }
+    given = {"condition": {"event": "answer", "slot": 1}, "after_tick": 60 * MS, "until_tick": 110 * MS}
+    assert expect == {"happens": given}
     line = "happens: net0/robot1: tick 2640000 (110.000 ms): wanted answer with slot = 1 within 50.000 ms, found none"
     write_case(tmp_path / "a.stream", case_text(world, trace, expect, line))
     code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q")
@@ -132,7 +119,6 @@ def test_an_event_that_must_not_come_is_judged_again(mirotwin, tmp_path):
     world.inject(encode(team(1, 900, 900, ask=True), 3))
     heard = world.run_until(conditions.Heard(), within=80 * MS)
     expect = expect_of("never_happens", conditions.Heard(), 60 * MS, 140 * MS)
-    assert expect is not None
     write_case(tmp_path / "a.stream", case_text(world, trace, expect, "never_happens: of old"))
     code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q")
     assert code == 1

@@ -3,7 +3,7 @@
 import pytest
 
 from miro_protocol.frames import ServiceFrame, encode
-from tests.mirotwin.verify.checks.rig import built, finish, needs_sdcc, planted, send, silent_world, team
+from tests.mirotwin.verify.checks.rig import MS, built, finish, needs_sdcc, planted, send, silent_world, team
 
 ALL = """
 failsafe_stop_ms = true
@@ -87,3 +87,22 @@ def test_what_firmware_must_not_do_fails_a_check_that_no_scenario_asks_for(mista
 def test_a_robot_may_count_the_silence_from_the_start_of_a_character():
     image = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 1)")
     assert verdicts(image)["failsafe_stop_ms"] == "passed"
+
+
+def verdicts_of_two_questions(image):
+    """The second question, without its preamble, ends 17.7 ms after the first: the answer takes 20 ms."""
+    world, checks = silent_world("answers_within_ms = true\nanswers_only_in_turn = true", image)
+    world.run_for(50 * MS)
+    world.inject(encode(team(1, 100, 100, ask=True), 3))
+    world.inject(encode(team(4, 200, 200, ask=True), 3)[6:])
+    return finish(world, checks)
+
+
+def test_a_question_while_the_robot_answers_need_not_be_answered():
+    found = verdicts_of_two_questions(None)
+    assert (found["answers_within_ms"], found["answers_only_in_turn"]) == ("passed", "passed")
+
+
+@needs_sdcc
+def test_the_first_of_two_questions_must_be_answered():
+    assert verdicts_of_two_questions(planted("never answers"))["answers_within_ms"] == "failed"

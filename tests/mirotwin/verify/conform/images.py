@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from miro_robot.image import parse_hex
+from tests.mirotwin.conftest import hex_text
 
 HANGS = bytes.fromhex("80 fe")  # SJMP $
 FAULTS = bytes.fromhex("a5 80 fd")  # the undefined opcode, again and again
@@ -15,16 +16,5 @@ POKES = bytes.fromhex("75 a0 e6 75 80 01 b2 a2 80 fc")  # writes to both LM629 w
 READS_BOTH = bytes.fromhex("75 a0 e4 b2 a1 80 fc")
 
 
-def hex_of(code):
-    """Intel HEX."""
-    records = [_record(at, 0, code[at : at + 16]) for at in range(0, len(code), 16)]
-    return "\n".join([*records, _record(0, 1, b"")]) + "\n"
-
-
-def _record(address, kind, data):
-    body = bytes([len(data), address >> 8, address & 0xFF, kind]) + data
-    return f":{body.hex().upper()}{-sum(body) & 0xFF:02X}"
-
-
 def image_of(code):
-    return parse_hex(hex_of(code).encode(), Path("program.ihx"))
+    return parse_hex(hex_text(code).encode(), Path("program.ihx"))

@@ -4,7 +4,6 @@ import shutil
 from functools import cache
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from miro_protocol.transmission import Transmission
@@ -36,7 +35,7 @@ def test_an_image_that_does_nothing_breaks_the_rule(id):
 
 
 @needs_sdcc
-@pytest.mark.parametrize("name", MISTAKES)
+@pytest.mark.parametrize("name", [name for name, mistake in MISTAKES.items() if mistake.fails])
 def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name):
     mistake = MISTAKES[name]
     image = built(mistake.file, mistake.right, mistake.wrong)
@@ -55,16 +54,13 @@ def test_each_rule_has_a_mistake_that_breaks_it():
     assert {id for mistake in MISTAKES.values() for id in mistake.fails.split()} == set(IDS)
 
 
-def test_rules_are_numbered_in_order_and_say_must_and_where_they_come_from():
+def test_rules_are_numbered_in_order_have_a_name_each_and_say_must_and_where_they_come_from():
     assert [f"P{number:02d}" for number in range(1, len(IDS) + 1)] == IDS
+    assert len({rule.name for rule in ALL}) == len(ALL)
     for rule in ALL:
         assert "MUST" in rule.text
         page, _, section = rule.source.partition(", ")
         assert f"# {section}\n" in (Path(__file__).parents[4] / page).read_text()
-
-
-def test_names_of_rules_differ():
-    assert len({rule.name for rule in ALL}) == len(ALL)
 
 
 @cache
@@ -116,8 +112,3 @@ def test_a_trial_of_which_a_network_says_less_is_not_judged_there():
         world.step()
     checks.finish()
     assert [one.verdict for one in checks.verdicts()] == ["not judged"]
-
-
-def test_a_rule_that_is_not_there_is_refused_with_the_nearest():
-    with pytest.raises(msgspec.ValidationError, match="there is no rule 'P99'; did you mean P"):
-        msgspec.convert({"check": "conforms_to", "rule": "P99"}, ConformsTo)

@@ -1,19 +1,18 @@
 """Steps are done in virtual time: actions take none, waits end at their event and lose nothing."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import msgspec
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.decoder import Decoder, Received
-from miro_protocol.transmission import DOWN, Transmission
+from miro_protocol.transmission import Transmission
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.world.world import World
-from mirotwin.verify.cases.case import Trace
-from mirotwin.verify.steps.player import Player
-from mirotwin.verify.steps.reading import steps_of
-from tests.mirotwin.verify.steps.rig import MS, own_image, play, scenario_of, without_steps
+from mirotwin.verify.steps.running import run_test
+from tests.mirotwin.verify.checks.rig import MS, built, needs_sdcc, own_image, planted
+from tests.mirotwin.verify.steps.rig import digest_without_steps, play
 
 BOOTED = "{ pause_ms = 5 }"
 DRIVE = '{ send = "team", left_m_s = 0.2, right_m_s = 0.2 }'
@@ -28,19 +27,7 @@ network = [{{ host = "silent", robot = [
 
 
 def sent_by(player):
-    """What the hosts had sent when the run was over: the run is made again, and looked at."""
-    found = []
-    scenario = player.world.scenario
-    world = World(scenario, player.world.seed, player.world.image)
-
-    def look(period):
-        found.extend(one for one in period.wire if one.direction == DOWN)
-
-    world.observers.append(look)
-    again = Player(world, steps_of(scenario, ""), "")
-    again.play()
-    again.finish()
-    return found
+    return [one for one in player.trace.script() if isinstance(one, Transmission)]
 
 
 def frames_of(sent):
@@ -83,7 +70,6 @@ def test_from_now_passes_over_what_has_happened():
     steps = BOOTED + ', { send = "bytes", hex = "31 32" }, { pause_ms = 50 }, '
     assert play(steps + '{ wait_for = "received", within_ms = 5 }').failure is None
     failure = play(steps + '{ wait_for = "received", within_ms = 5, from_now = true }').failure
-    assert failure is not None
     assert (failure.number, failure.tick) == (4, 60 * MS)
     assert failure.found == "nothing happened meanwhile"
 
@@ -92,7 +78,6 @@ def test_wait_for_passes_over_what_does_not_fit_and_expect_fails_there():
     steps = BOOTED + ', { send = "bytes", hex = "31 32 33" }, '
     assert play(steps + '{ wait_for = "received", byte = 0x33, within_ms = 9 }').failure is None
     failure = play(steps + '{ expect = "received", byte = 0x33, within_ms = 9 }').failure
-    assert failure is not None
     assert f"{failure}".startswith("step 3: expect received: tick ")
     assert failure.found == "net0/robot0: received 31h"
     assert failure.wanted == "received with byte = 51 within 9 ms"
@@ -101,7 +86,6 @@ def test_wait_for_passes_over_what_does_not_fit_and_expect_fails_there():
 def test_a_step_that_is_not_reached_in_time_says_when_what_was_wanted_and_what_was_seen():
     asked = '{ note = "never asked", wait_for = "answer", from_now = true, within_ms = 100 }'
     failure = play(f"{BOOTED}, {DRIVE}, {asked}").failure
-    assert failure is not None
     assert (failure.number, failure.begun_tick, failure.tick) == (3, 5 * MS, 105 * MS)
     assert failure.step == "step 3 (never asked): wait_for answer"
     assert failure.wanted == "answer within 100 ms"
@@ -114,7 +98,6 @@ def test_never_looks_from_now_on_and_fails_at_the_event():
     steps = f'{DRIVE}, {{ pause_ms = 50 }}, {{ never = "command", for_ms = 50 }}'
     assert play(steps).failure is None
     failure = play(f'{DRIVE}, {{ never = "command", name = "STT", for_ms = 50 }}').failure
-    assert failure is not None
     assert 24 * MS < failure.tick < 30 * MS
     assert failure.wanted == 'no command with name = "STT" for 50 ms'
     assert failure.found == "net0/robot0: command left STT"
@@ -123,7 +106,6 @@ def test_never_looks_from_now_on_and_fails_at_the_event():
 def test_silence_is_of_the_robots_of_a_network():
     assert play(f"{DRIVE}, {{ silence_for_ms = 60 }}").failure is None
     failure = play('{ send = "poll" }, { silence_for_ms = 60 }').failure
-    assert failure is not None
     assert failure.found == "net0/pc: heard 55h"
 
 
@@ -137,14 +119,12 @@ def test_wheels_are_waited_for_and_hold_their_speed():
     """
     player = play(steps)
     assert player.done == 4
-    assert player.failure is not None
     assert player.failure.wanted == "wheels with left_m_s = 0.3, tolerance_m_s = 0.01 for 200 ms"
     found = float(player.failure.found.removeprefix("left_m_s = ").partition(",")[0])
     assert 0.285 < found < 0.29
     failure = play(
         f'{BOOTED}, {{ wait_for = "wheels", left_m_s = 0.1, from_now = true, within_ms = 20 }}'
     ).failure
-    assert failure is not None
     assert failure.found == "left_m_s = 0.0000, right_m_s = 0.0000; nothing happened meanwhile"
 
 
@@ -206,7 +186,6 @@ def test_two_robots_are_told_and_asked_apart():
         { expect = "answer", slot = 2, within_ms = 60 },
     """
     failure = play(steps, TWO_ROBOTS).failure
-    assert failure is not None
     assert failure.number == 7
     assert "1 answer" in failure.found  # that of the other robot
 
@@ -268,16 +247,7 @@ def test_a_check_of_a_step_judges_from_there_on():
 
 def test_what_a_step_saves_is_loaded_and_goes_on_to_the_same_digest():
     player = play(f'{DRIVE}, {{ pause_ms = 12.34 }}, {{ save = "driving.world" }}', finish=True)
-    world = World(without_steps(player.world.scenario), 0, own_image())
-    world.load(player.saved["driving.world"])
-    assert world.tick == ticks_of(12.34)
-    while not world.finished:
-        world.step()
-    assert world.digest == player.world.digest
-
-
-def ticks_of(time_ms):
-    return round(time_ms * MS)
+    assert digest_without_steps(player, saved=player.saved["driving.world"]) == player.world.digest
 
 
 def test_a_run_with_steps_is_the_run_in_which_the_same_is_sent_at_the_same_ticks():
@@ -292,22 +262,15 @@ def test_a_run_with_steps_is_the_run_in_which_the_same_is_sent_at_the_same_ticks
     """
     player = play(steps, finish=True)
     assert player.failure is None
-    world = World(without_steps(player.world.scenario), 0, own_image(), sent_by(player))
-    while not world.finished:
-        world.step()
-    assert world.digest == player.world.digest
+    assert digest_without_steps(player, player.trace.script()) == player.world.digest
 
 
 def test_a_firmware_fault_that_stops_the_run_fails_the_step_that_waits():
-    scenario = scenario_of('{ wait_for = "answer", within_ms = 500 }, { pause_ms = 1 }')
-    image = msgspec.structs.replace(own_image(), code=bytes([0xA5]) + own_image().code[1:])
-    world = World(scenario, 0, image)
-    player = Player(world, steps_of(scenario, ""), "")
-    player.play()
-    player.finish()
-    assert player.failure is not None
-    assert player.failure.number == 1
-    assert "a firmware fault has stopped the run" in player.failure.found
+    faulty = msgspec.structs.replace(own_image(), code=bytes([0xA5]) + own_image().code[1:])
+    steps = '{ wait_for = "answer", within_ms = 500 }, { pause_ms = 1 }'
+    failure = play(steps, image=faulty, finish=True).failure
+    assert failure.number == 1
+    assert "a firmware fault has stopped the run" in failure.found
 
 
 def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_order():
@@ -340,18 +303,61 @@ def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_or
     """
     player = play(steps + rest, "duration_s = 1.5", finish=True)
     assert player.failure is None
-    trace = [*sent_by(player), *actions_of(player)]
-    world = World(without_steps(player.world.scenario), 0, own_image(), trace)
-    while not world.finished:
-        world.step()
-    assert world.digest == player.world.digest
+    assert digest_without_steps(player, player.trace.script()) == player.world.digest
 
 
-def actions_of(player):
-    """What was done in the run, which is made again."""
-    world = World(player.world.scenario, player.world.seed, player.world.image)
-    trace = Trace(world)
-    again = Player(world, steps_of(world.scenario, ""), "")
-    again.play()
-    again.finish()
-    return [one for one in trace.script() if not isinstance(one, Transmission)]
+# Mistakes that are planted in the firmware's source
+
+EXAMPLES = Path(__file__).parents[4] / "examples" / "hil-steps"
+ALONE = """
+scenario = "silent"
+duration_s = 0.5
+step = [
+    { pause_ms = 5 },
+    { send = "team", left_m_s = 0.2, right_m_s = 0.2 },
+    { wait_for = "frame", within_ms = 30 },
+    { wait_for = "command", name = "STT", side = "right", within_ms = 5 },
+    { never = "command", for_ms = 105 },
+    { note = "110 ms", wait_for = "command", name = "STT", within_ms = 6 },
+]
+"""
+
+
+@pytest.fixture
+def alone(tmp_path):
+    """A file with steps for the failsafe, and no check."""
+    path = tmp_path / "alone.scenario.toml"
+    path.write_text(ALONE)
+    return path
+
+
+def test_the_shipped_firmware_passes_steps_alone(alone):
+    assert run_test(str(alone), own_image()).verdict == "passed"
+
+
+@needs_sdcc
+@pytest.mark.parametrize("mistake", ["stops 15 ms late", "never stops"])
+def test_steps_alone_find_a_failsafe_that_comes_late_or_never(mistake, alone):
+    outcome = run_test(str(alone), planted(mistake))
+    assert outcome.lines[0].startswith("step failed: step 6 (110 ms): wait_for command: tick ")
+
+
+@needs_sdcc
+def test_steps_alone_find_a_failsafe_that_comes_early(alone):
+    early = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 15)")
+    assert run_test(str(alone), early).lines[0].startswith("step failed: step 5: never command: tick ")
+
+
+@needs_sdcc
+def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example():
+    outcome = run_test(str(EXAMPLES / "failsafe.scenario.toml"), planted("stops 15 ms late"))
+    step, check = outcome.lines[:2]
+    assert step.startswith("step failed: step 9 (smooth stop): wait_for command: tick ")
+    assert 'wanted command with name = "STT" within 6 ms, found nothing happened meanwhile' in step
+    assert check.startswith("expectation failed: failsafe_stop_ms: net0/robot0: tick ")
+
+
+@needs_sdcc
+def test_firmware_that_takes_damaged_frames_fails_the_other_example():
+    outcome = run_test(str(EXAMPLES / "damage.scenario.toml"), planted("takes frames with a bad CRC"))
+    assert outcome.lines[0].startswith("step failed: step 3: never command: tick ")
