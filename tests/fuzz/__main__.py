@@ -57,7 +57,7 @@ def main():
     except campaign.MissingError as error:
         print(error, file=sys.stderr)
         return 2
-    print(engine.describe(), flush=True)
+    print(engine.about, flush=True)
     bad = 0
     for name in names:
         result = engine.run(name, options.time, options.seed)

@@ -56,26 +56,17 @@ class Engine(NamedTuple):
     about: str
     fixed: str = ""
 
-    def describe(self):
-        return self.about
-
     def run(self, name, limit_s, seed):
         findings, found = (WORK / part / name for part in ("findings", "found"))
         for path in (findings, found):
             path.mkdir(parents=True, exist_ok=True)
-        seeds = WORK / "seeds" / name
-        _write_seeds(name, seeds)
-        engine = self.fixed or TARGETS[name].engine
-        module = "guided" if self.guided else "chance"
-        command = [sys.executable, "-m", f"tests.fuzz.{module}", name, engine]
+        kept = corpus.FOLDER / name
+        task = ["chance", limit_s, seed, findings, kept]
         if self.guided:
             hangs_s = HANGS_SANITIZED_S if self.fixed else HANGS_S
-            command += _words(name, limit_s, seed, findings, hangs_s)
-            command += [str(found), str(seeds)]
-        else:
-            command += [str(limit_s), str(seed), str(findings), str(seeds)]
+            task = ["guided", *_words(name, limit_s, seed, findings, hangs_s), found, kept]
         child = children.run(
-            command,
+            _command(name, self.fixed or TARGETS[name].engine, *task),
             cwd=ROOT,
             env=child_environment(self.environment),
             stdout=subprocess.PIPE,
@@ -99,6 +90,10 @@ def prepared(plain, sanitize):
     return Engine(atheris, build.environment, f"{about}; {build.about}", "compiled")
 
 
+def _command(name, engine, *task):
+    return [sys.executable, "-m", "tests.fuzz.process", name, engine, *map(str, task)]
+
+
 def child_environment(more):
     """Of this process, with our packages from this checkout unless `more` says from where."""
     own = os.pathsep.join(str(ROOT / part) for part in _LIBRARY)
@@ -107,23 +102,12 @@ def child_environment(more):
     return {**named, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
 
 
-def _write_seeds(name, folder):
-    """Kept inputs, and the target's own seeds: these are made by a process of ours, which is quicker uninstrumented."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in folder.glob("*"):
-        path.unlink()
-    for data in [*(data for _, data in corpus.kept(name)), *TARGETS[name].seeds()]:
-        (folder / corpus.file_name(data)).write_bytes(data)
-
-
 def _words(name, limit_s, seed, findings, hangs_s):
     target = TARGETS[name]
     words = [
         f"-max_total_time={max(1, int(limit_s))}",
         f"-max_len={target.most_bytes}",
         f"-timeout={hangs_s}",
-    ]
-    words += [
         f"-rss_limit_mb={MEMORY_MB}",
         "-print_final_stats=1",
         f"-artifact_prefix={findings}/",
@@ -141,9 +125,9 @@ def _result(child, limit_s, findings):
     text = child.stdout
     executed = _EXECUTED.search(text)
     coverage = _COVERAGE.findall(text)
-    reached = "{} edges, {} features".format(*coverage[-1]) if coverage else ""
     if said := re.search(r"^outcomes: ([0-9]+), inputs: ([0-9]+)$", text, re.M):
         return Result(int(said[2]), int(said[2]) / limit_s, f"{said[1]} outcomes")
+    reached = "{} edges, {} features".format(*coverage[-1]) if coverage else ""
     executions = int(executed[1]) if executed else 0
     rate = _RATE.search(text)
     per_s = float(rate[1]) if rate else 0.0
@@ -160,13 +144,12 @@ def once(name, path, sanitize):
     """One input in this process, or in one with the sanitizers; its exit code."""
     environment = prepared(False, True).environment if sanitize else {}
     engine = "compiled" if sanitize else TARGETS[name].engine
-    command = [sys.executable, "-m", "tests.fuzz.once", name, engine, str(path)]
-    return children.run(command, cwd=Path.cwd(), env=child_environment(environment)).returncode
+    command = _command(name, engine, "once", path)
+    return children.run(command, env=child_environment(environment)).returncode
 
 
 def keep(name):
-    """Chooses the kept inputs again from those kept, seeds and found ones, in a process of its own; how many."""
-    folders = [str(WORK / part / name) for part in ("found", "seeds")]
-    command = [sys.executable, "-m", "tests.fuzz.choose", name, TARGETS[name].engine, *folders]
+    """Chooses the kept inputs again from those kept and found ones, in a process of its own; how many."""
+    command = _command(name, TARGETS[name].engine, "choose", WORK / "found" / name)
     children.run(command, cwd=ROOT, env=child_environment({}), check=True)
     return len(corpus.kept(name))

@@ -10,17 +10,17 @@ import time
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "corpus"
-MOST_FILES = 20
+MOST_FILES = 24
 MOST_BYTES = 4096
 MOST_S = 0.4
 """So long the kept inputs of a target may take together: they are run by each run of the tests."""
-ROOT = str(Path(__file__).parents[2])
-_OURS = ("/exact/", "/protocol/", "/robot_fw/", "/host/", "/sim/")
+ROOT = Path(__file__).parents[2]
+_OURS = tuple(f"{ROOT / part}/" for part in ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin"))
 
 
 def kept(name):
-    """Names and contents, in the order of names."""
-    return [(path.name, path.read_bytes()) for path in sorted((FOLDER / name).glob("*"))]
+    """In the order of their names."""
+    return [path.read_bytes() for path in sorted((FOLDER / name).glob("*"))]
 
 
 def file_name(data):
@@ -33,7 +33,7 @@ def reached(run, data):
 
     def trace(frame, event, argument):
         path = frame.f_code.co_filename
-        if event != "call" or not any(part in path for part in _OURS):
+        if event != "call" or not path.startswith(_OURS):
             return None
         last = 0
 
@@ -70,18 +70,11 @@ def chosen(run, inputs, most_bytes=MOST_BYTES):
             break
         covered |= features
         found.append(data)
-    return _within(run, found)
-
-
-def _within(run, inputs):
-    """As many of the inputs, from the front, as can be run in `MOST_S`."""
     end_s = time.process_time() + MOST_S
-    found = []
-    for data in inputs:
+    for count, data in enumerate(found, 1):
         run(data)
-        found.append(data)
         if time.process_time() > end_s:
-            break
+            return found[:count]
     return found
 
 

@@ -15,18 +15,8 @@ from typing import NamedTuple
 from tests import children
 
 ROOT = Path(__file__).parents[2]
-_COPIED = (
-    "exact",
-    "protocol",
-    "robot_fw",
-    "host",
-    "sim",
-    "setup.py",
-    "pyproject.toml",
-    "README.md",
-    "LICENSE",
-)
 _PACKAGES = ("exact", "protocol", "robot_fw", "host", "sim")
+_COPIED = (*_PACKAGES, "setup.py", "pyproject.toml", "README.md", "LICENSE")
 _SOURCES = (".py", ".pxd", ".pyx")
 _CHECKS = "address,undefined"
 _FLAGS = "-fno-sanitize=shift-base -fno-omit-frame-pointer -g1"

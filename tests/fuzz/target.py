@@ -10,7 +10,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +25,7 @@ _VALUES = re.compile(r"""['"`].*['"`]|[0-9]+""")
 
 
 class Target(NamedTuple):
-    """`make` imports what is fuzzed and returns the function that takes the bytes; `seeds` are good inputs.
+    """`make` imports what is fuzzed and returns the function that takes the bytes.
 
     `engine`: which twin of hot modules runs without the sanitizers: coverage sees into `python` ones, and `compiled`
     ones are what people use. `words`: what a file of the kind is made of. `most_bytes`: longer inputs tell no more.
@@ -33,10 +33,9 @@ class Target(NamedTuple):
 
     what: str
     make: Callable[[], Run]
-    seeds: Callable[[], list[bytes]]
     engine: str = "compiled"
     most_bytes: int = 4096
-    words: tuple[bytes, ...] = ()
+    words: Sequence[bytes] = ()
 
 
 def refused(error):

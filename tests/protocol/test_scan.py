@@ -1,8 +1,6 @@
 """The hot scanner: the source it was compiled from gives the same events and states, by any way of feeding it."""
 
-import importlib.util
 from array import array
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -13,17 +11,9 @@ from miro_protocol import decoder, table
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.hypothesis_frames import damaged_streams
 from miro_protocol.scan import TICK_LIMIT, Scanner
+from tests.uncompiled import uncompiled
 
-
-def uncompiled():
-    source = Path(decoder.__file__).with_name("scan.py")
-    spec = importlib.util.spec_from_file_location("scan_from_source", source)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Scanner
-
-
-Twin = uncompiled()
+Twin = uncompiled("miro_protocol.scan").Scanner
 FORMATS = (*table.DOWNLINK.values(), table.TELEMETRY)
 streams = st.booleans().flatmap(lambda up: st.tuples(damaged_streams(telemetry=up), st.just(up)))
 

@@ -126,90 +126,14 @@ def _capture():
     return run
 
 
-def stream_seeds():
-    frame = "55 55 55 55 55 ff 2d d4 fc e0 11 22 33"
-    bad = frame.replace("fc", "fc!")
-    return [
-        f"# mirotwin stream 1\n96000 > {frame}  # team seq=3\n\n400000 < {frame}\n".encode(),
-        f"\ufeff# mirotwin stream 2\r\n96000 > {bad}\r\n400000 <@1 {frame} # more\r\n900000 >@1 55 55!".encode(),
-        b"# mirotwin stream 2\n5 *@0/1 reset 1\n6 *@0 radio noise\n7 *@65535/4 power 0\n7 * P1.0 0 # pin\n",
-        b'# mirotwin stream 2\n#: version = "0.1.0"\n#: seed = 7\n#: end_tick = 6000000\n#: verdict = "no_fault: x"\n'
-        b'#: scenario = "fig6"\n#: set = {duration_s = 0.5}\n#:\n#: [expect]\n#: no_fault = true\n1 > 55\n',
-        b"# mirotwin stream 2\n#: firmware_sha256 = '"
-        + b"0a" * 32
-        + b"'\n#: [scenario]\n#: duration_s = 1.0\n",
-    ]
-
-
-def _pcapng_seeds():
-    import struct
-
-    from miro_protocol import pcapng
-    from miro_protocol.transmission import Transmission
-
-    sent = [Transmission(96000, ">", b"\x55\x55\xff"), Transmission(120000, "<", b"answer", 1)]
-    ours = pcapng.render(sent)
-
-    def block(kind, body):
-        size = struct.pack(">I", len(body) + 12)
-        return struct.pack(">I", kind) + size + body + size
-
-    section = block(0x0A0D0D0A, struct.pack(">IHHq", 0x1A2B3C4D, 1, 0, -1))
-    options = struct.pack(">HHBxxx", 9, 1, 0x8A) + struct.pack(">HHq", 14, 8, 2) + bytes(4)
-    interface = block(1, struct.pack(">HHI", 250, 0, 0) + options)
-    packets = b"".join(
-        block(
-            6,
-            struct.pack(">IIIII", 0, 0, 9 + at, 16, 16) + struct.pack(">IIBBH", 1, 2, event, 0, 0) + b"data",
-        )
-        for at, event in enumerate((1, 4, 7))
-    )
-    return [ours, section + interface + packets, ours + section + interface + packets]
-
-
-def _hex_seeds():
-    return [
-        b"\x03" + b"55 55 ff 2d d4 # end\n0x55,0xFF;2d:d4\n",
-        b"\x00\xef\xbb\xbf5555ff2dd4\n#only\nff f",
-        b"\x05zz",
-    ]
-
-
-def _capture_seeds():
-    found = [
-        b"\xff" + seed for seed in (*stream_seeds(), *_pcapng_seeds(), b"55 55 ff 2d d4\n", b"\x89MCAP0\r\n")
-    ]
-    return [*found, b"\x01" + bytes.fromhex("5555555555ff2dd4fc") * 5]
-
-
 STREAM_WORDS = (
-    b"# mirotwin stream 2",
-    b"#: ",
-    b" > ",
-    b" <@1 ",
-    b"*@0/1 ",
-    b"reset 1",
-    b"power 0",
-    b"radio down",
-)
-STREAM_WORDS += (
-    b"P1.0",
-    b"[scenario]",
-    b"[expect]",
-    b"end_tick = ",
-    b"seed = ",
-    b"set = {",
-    b"verdict = ",
-    b"55!",
-)
+    b"# mirotwin stream 2|#: | > | <@1 |*@0/1 |reset 1|power 0|radio down|P1.0|[scenario]|[expect]|end_tick = |"
+    b"seed = |set = {|verdict = |55!"
+).split(b"|")
 
 TARGETS = {
-    "stream": Target(
-        "stream files and their headers, written again", _stream, stream_seeds, words=STREAM_WORDS
-    ),
-    "pcapng": Target("captures, also from a pipe, written again", _pcapng, _pcapng_seeds, most_bytes=2048),
-    "hextext": Target("hexadecimal text, cut anywhere", _hex_text, _hex_seeds, most_bytes=256),
-    "capture": Target(
-        "any file as `decode` and `export` read it", _capture, _capture_seeds, words=STREAM_WORDS
-    ),
+    "stream": Target("stream files and their headers, written again", _stream, words=STREAM_WORDS),
+    "pcapng": Target("captures, also from a pipe, written again", _pcapng, most_bytes=2048),
+    "hextext": Target("hexadecimal text, cut anywhere", _hex_text, most_bytes=256),
+    "capture": Target("any file as `decode` and `export` read it", _capture, words=STREAM_WORDS),
 }

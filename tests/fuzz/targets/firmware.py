@@ -91,27 +91,6 @@ def _beside(suffix):
 
 
 _TEXTS = {".map": ECHO_MAP, ".cdb": ECHO_CDB, ".rst": ECHO_RST}
-_VARIABLES = """\
-M:main
-T:Fmain$point[({0}S:S$x$0_0$0({2}SI:S),Z,0,0)({2}S:S$bits$0_0$0({1}SB0$3:U),Z,0,0)({3}S:S$f$0_0$0({4}SF:S),Z,0,0)]
-S:G$total$0_0$0({1}SC:U),E,0,0
-S:G$flag$0_0$0({1}SX:U),H,0,0
-S:Fmain$table$0_0$0({6}DA3d,SI:S),E,0,0
-S:Fmain$place$0_0$0({7}STpoint:S),E,0,0
-S:G$rate$0_0$0({4}SF:S),E,0,0
-S:G$next$0_0$0({3}DG,SC:U),E,0,0
-S:G$P1$0_0$0({1}SC:U),I,0,0
-S:Lmain.main$count$1_0$1({2}SI:U),C,0,0
-L:G$total$0$0:8
-L:G$total$0_0$0:9
-L:G$flag$0_0$0:2
-L:Fmain$table$0_0$0:10
-L:Fmain$place$0_0$0:20
-L:G$rate$0_0$0:30
-L:G$next$0_0$0:34
-L:G$P1$0_0$0:90
-L:Lmain.main$count$1_0$1:2
-"""
 
 
 def _lcov():
@@ -133,64 +112,20 @@ def _lcov():
     return run
 
 
-def _hex_seeds():
-    linear = b":020000040000FA\n:0400000500000000F7\n:020000021000EC\n"
-    return [hex_records(ECHO), linear + hex_at(0x8000, b"ab") + b":00000001FF\r\n"]
-
-
-def _lcov_seeds():
-    old = (
-        b"TN:\nSF:main.c\nFN:3,main\nFN:9,12,go\nFNDA:2,main\nBRDA:4,0,0,1\nBRDA:4,0,1,-\nDA:3,2\nDA:4,0,x\n"
-    )
-    new = b"TN:t\nVER:1\nSF:a.c\nFNL:0,7,9\nFNA:0,3,main\nDA:7,3\nFNF:1\nLH:1\nend_of_record\n# said\n"
-    return [old + b"LF:2\nend_of_record\n", new, old + b"end_of_record\n" + old]
-
-
-_MAP_WORDS = (
-    b"C:   ",
-    b"00000000",
-    b"0000000C",
-    b"  _main  ",
-    b" bytes (REL,CON,CODE)",
-    b" = ",
-    b"CSEG",
-    b"A$",
-)
-_CDB_WORDS = (b"S:G$", b"L:G$", b"L:A$", b"L:C$", b"L:XG$", b"S:Fmain$", b"S:Lmain.main$", b"({1}SC:U),E,0,0")
-_CDB_WORDS += (
-    b"T:Fmain$",
-    b"({0}S:S$",
-    b"DA3d,",
-    b"STpoint",
-    b"SB0$3",
-    b"SX",
-    b"SF",
-    b"DF,SV",
-    b"DG,",
-    b"$0_0$0",
-    b"M:",
-)
+_MAP_WORDS = b"C:   |00000000|0000000C|  _main  | bytes (REL,CON,CODE)| = |CSEG|A$".split(b"|")
+_CDB_WORDS = (
+    b"S:G$|L:G$|L:A$|L:C$|L:XG$|S:Fmain$|S:Lmain.main$|({1}SC:U),E,0,0|T:Fmain$|({0}S:S$|DA3d,|STpoint|SB0$3|SX|SF|"
+    b"DF,SV|DG,|$0_0$0|M:"
+).split(b"|")
 
 TARGETS = {
-    "hex": Target(
-        "Intel HEX, also with its sums put right", _hex, _hex_seeds, words=(b":00000001FF\n", b"\n:")
-    ),
-    "map": Target(
-        "a linker's map beside an image",
-        lambda: _beside(".map"),
-        lambda: [ECHO_MAP.encode()],
-        words=_MAP_WORDS,
-    ),
+    "hex": Target("Intel HEX, also with its sums put right", _hex, words=(b":00000001FF\n", b"\n:")),
+    "map": Target("a linker's map beside an image", lambda: _beside(".map"), words=_MAP_WORDS),
     "cdb": Target(
         "a debug file beside an image; its variables are read and written",
         lambda: _beside(".cdb"),
-        lambda: [ECHO_CDB.encode(), _VARIABLES.encode()],
         words=_CDB_WORDS,
     ),
-    "rst": Target(
-        "a listing beside an image", lambda: _beside(".rst"), lambda: [ECHO_RST.encode()], most_bytes=1024
-    ),
-    "lcov": Target(
-        "tracefiles, written again", _lcov, _lcov_seeds, words=(b"SF:", b"FNA:", b"BRDA:", b"DA:", b"FNL:")
-    ),
+    "rst": Target("a listing beside an image", lambda: _beside(".rst"), most_bytes=1024),
+    "lcov": Target("tracefiles, written again", _lcov, words=b"SF: FNA: BRDA: DA: FNL:".split()),
 }

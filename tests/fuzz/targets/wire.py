@@ -1,27 +1,14 @@
 """The wire: the window decoder by each way of feeding it, frames, the PC's receiver of telemetry."""
 
-import importlib.util
 from array import array
-from pathlib import Path
 
 from tests.fuzz.target import Draws, Target, pieces, refused
+from tests.uncompiled import uncompiled
 
 _LIMITS = (1, 7, 64, 4096)
+_SEEN = "python"  # the decoder is a hot module: coverage sees the source
 _SPACINGS = (0, 0, 0, 480, 1200, 1920, -480, -1200, -1920, 100_000, -100_000, 1 << 40)
 """Ticks that a character comes late."""
-
-
-def _uncompiled():
-    """The scanner's source as a module of its own: the twin, whichever engine runs."""
-    from miro_protocol import decoder
-
-    source = Path(decoder.__file__).with_name("scan.py")
-    spec = importlib.util.spec_from_file_location("scan_from_source", source)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Scanner
 
 
 def _feed():
@@ -93,7 +80,7 @@ def _columns():
     from miro_protocol.table import TELEMETRY, downlink
 
     forms = (downlink(3), downlink(5), TELEMETRY)
-    Twin = _uncompiled()
+    Twin = uncompiled("miro_protocol.scan").Scanner
 
     def rows(draw, form):
         found, tick = [], 0
@@ -205,81 +192,9 @@ def _telemetry():
     return run
 
 
-def _frame_seeds():
-    from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
-    from miro_protocol.whitening import whiten
-
-    sent = [
-        (TeamFrame(0, 3, ((100, -100),) * 3), 3),
-        (TeamFrame(3, 60, ((-32767, 32767),) * 5), 5),
-        (ServiceFrame.filter(5, 1, 100, 20, 300, 4), 3),
-        (ServiceFrame.acceleration(6, 2, 5973), 5),
-        (ServiceFrame.ping(7, 0), 3),
-        (TelemetryFrame(9, 2, 0, 0x80, 0x84, 1000, 65000, 9, 1), 3),
-    ]
-    found = []
-    for message, n in sent:
-        up = isinstance(message, TelemetryFrame)
-        wire = encode(message, n)
-        found.append(bytes([n == 5, up]) + whiten(wire[8 - up :])[:-2])
-    return found
-
-
-def _feed_seeds():
-    bodies = [seed[2:] for seed in _frame_seeds()]
-    program = [b"\x00\x03\x05"]
-    for body in bodies[:1] + bodies[2:3] * 2:
-        program += [
-            b"\x06" + body[:13].ljust(13, b"\0"),
-            b"\x04\x08noise.+U",
-            b"\x00",
-            b"\x03\x10\x00\x04abcd",
-        ]
-    return [
-        b"".join(program) + b"\x01",
-        b"\x01\x01\x02\x07" + bodies[1] + b"\x02" + b"\xff" * 8 + b"ab\x01",
-        b"\x02\x03\x07\x06" + bodies[5] + b"\x05\x12" + b"\x55\x55\x55\x55\xff\x2d\xd4" + b"x" * 12 + b"\x01",
-    ]
-
-
-def _column_seeds():
-    bodies = [seed[2:] for seed in _frame_seeds()]
-    return [
-        b"\x00\x03\x05\xfe" + bodies[0] + b"\x00U\x00U\xd1\xff\x02-\x03\xd4\xfe" + bodies[2],
-        b"\x01\x02\x09\xfe" + bodies[1] + b"\x09a\x0ab\x0bc\xff" + b"\xff" * 7 + b"\x3f\x00a\x00b",
-        b"\x02\x00\x01\xfe" + bodies[5] + b"\x00U\x01U\x00\xff\x00-\x00\xd4" + b"\x00x" * 12,
-    ]
-
-
-def _telemetry_seeds():
-    body = _frame_seeds()[5][2:]
-    return [
-        b"\x00\x05" + b"".join(bytes([kind]) + body + b"\x10\x20" for kind in (0, 3, 1)),
-        b"\x01\x00\x00" + body,
-    ]
-
-
-_SEEN = "python"  # the decoder is a hot module: coverage sees the source
-
 TARGETS = {
-    "feed": Target(
-        "the decoder: bytes cut anywhere, with ticks, gaps and flushes",
-        _feed,
-        _feed_seeds,
-        _SEEN,
-        most_bytes=160,
-    ),
-    "columns": Target(
-        "the decoder: symbols, by row and by column, both twins",
-        _columns,
-        _column_seeds,
-        _SEEN,
-        most_bytes=160,
-    ),
-    "frames": Target(
-        "bodies of frames, sealed: what they say, and back", _frames, _frame_seeds, _SEEN, most_bytes=32
-    ),
-    "telemetry": Target(
-        "the PC's receiver, cut anywhere", _telemetry, _telemetry_seeds, _SEEN, most_bytes=256
-    ),
+    "feed": Target("the decoder: bytes cut anywhere, with ticks, gaps and flushes", _feed, _SEEN, 160),
+    "columns": Target("the decoder: symbols, by row and by column, both twins", _columns, _SEEN, 160),
+    "frames": Target("bodies of frames, sealed: what they say, and back", _frames, _SEEN, 32),
+    "telemetry": Target("the PC's receiver, cut anywhere", _telemetry, _SEEN, 256),
 }
