@@ -1,17 +1,20 @@
 """What a campaign finds beside its results: a stranger's journal, clocks that jump."""
 
 import os
-import random
 import sys
 import time
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
 from mirotwin.campaign import journal, workers
 from mirotwin.campaign.journal import journal_path
-from tests.attacks import times
+from tests.example_count import examples
+from tests.fuzz.mutation import changed
+from tests.fuzz.target import Target
 from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
@@ -46,46 +49,30 @@ def unfinished(tmp_path_factory):
     return journal_path(path).read_bytes()
 
 
-def changed(data, chance):
-    """The journal with a few bytes, lines or pieces of it changed."""
-    data = bytearray(data)
-    for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(data) + 1)
-        kind = chance.randrange(5)
-        if kind == 0 and at < len(data):
-            data[at] ^= 1 << chance.randrange(8)
-        elif kind == 1:
-            del data[at : at + chance.randint(1, 200)]
-        elif kind == 2:
-            data[at:at] = chance.choice(
-                [b"\n", b"\xff", b"\0", b"9" * 400, b"[" * 9000, b"-", b'"', b"1e999"]
-            )
-        elif kind == 3:
-            lines = bytes(data).splitlines(keepends=True)
-            chance.shuffle(lines)
-            data = bytearray(b"".join(lines))
-        else:
-            data += data[at:]
-    return bytes(data)
+JUNK = Target(
+    "a journal", None, most_bytes=1 << 20, words=(b"\n", b"\0", b"9" * 400, b"[" * 9000, b'"', b"1e999")
+)
 
 
 @pytest.mark.slow
-def test_a_journal_that_was_changed_is_refused_or_gives_results_of_these_runs(whole, unfinished, tmp_path):
-    chance, names = random.Random(3), set(rows(whole)[0])
-    for number in range(times(20)):
-        path = tmp_path / f"{number}.parquet"
-        journal_path(path).write_bytes(changed(unfinished, chance))
-        refusal = ""
-        try:
-            campaign.run(plan_of(), path, InThisProcess())
-        except BadInput as error:
-            refusal = str(error)
-        if refusal:
-            assert refusal.startswith(f"{journal_path(path)}")
-        else:
-            found = rows(path)
-            assert [row["seed"] for row in found] == [row["seed"] for row in rows(whole)]
-            assert set(found[0]) == names
+@examples(20)
+@given(chance=st.randoms(use_true_random=True))
+def test_a_journal_that_was_changed_is_refused_or_gives_results_of_these_runs(
+    whole, unfinished, tmp_path_factory, chance
+):
+    path = tmp_path_factory.mktemp("changed") / "short.parquet"
+    journal_path(path).write_bytes(changed(unfinished, JUNK, [unfinished], chance))
+    refusal = ""
+    try:
+        campaign.run(plan_of(), path, InThisProcess())
+    except BadInput as error:
+        refusal = str(error)
+    if refusal:
+        assert refusal.startswith(f"{journal_path(path)}")
+    else:
+        found, wanted = rows(path), rows(whole)
+        assert [row["seed"] for row in found] == [row["seed"] for row in wanted]
+        assert set(found[0]) == set(wanted[0])
 
 
 def test_a_line_without_end_in_a_journal_is_refused(unfinished, tmp_path):
