@@ -3,10 +3,17 @@
     python -m tests.mutants.score [--count 180] [--seed 1997] [--jobs 2] [--planted | --alive | --only ID ..]
     python -m tests.mutants.score --rules P37 P55
 
+`survivors.toml` says why mutants are alive that no rule kills: `because` is a sentence or two, `verdict` one of these.
+
+    equivalent   nothing that anybody can do to a robot tells it from the right one
+    allowed      it does something else, which the pages that bind a robot leave open
+    unreachable  it does what they forbid, but only on a board that no world has (with a broken LM629, for example)
+    missing      it does what they forbid, and no rule notices
+
 The score is the share of killed ones among those that were drawn, without those that do not compile, those whose image
-has the bytes of the shipped one, and those that conform as `survivors.toml` has it: they are equivalent, or do what the
-pages allow. Planted mistakes are counted apart. `build/mutants/score.json` has what came of each. `--rules` tries those
-that are new or changed on all mutants of the last score, and leaves in it what other rules made of them.
+has the bytes of the shipped one, and those that are equivalent or allowed. Planted mistakes are counted apart.
+`build/mutants/score.json` has what came of each. `--rules` tries those that are new or changed on all mutants of the
+last score, and leaves in it what other rules made of them.
 
 Exit code 1 if the score is below 95 %, if a planted mistake lives, if somebody alive has no explanation, or if a rule
 kills nobody.
@@ -15,6 +22,9 @@ kills nobody.
 import argparse
 import os
 import sys
+import time
+from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -22,10 +32,25 @@ from mirotwin.campaign.workers import cores, processes
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED
-from tests.mutants.survivors import survivors
 
+SURVIVORS = Path(__file__).parent / "survivors.toml"
 SCORE = CACHE / "score.json"
 LEAST_SHARE = 0.95
+
+
+class Survivor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    verdict: Literal["equivalent", "allowed", "unreachable", "missing"]
+    because: str
+
+    @property
+    def conforms(self):
+        """Whether no right rule can kill it."""
+        return self.verdict in ("equivalent", "allowed")
+
+
+def survivors():
+    """By id."""
+    return msgspec.toml.decode(SURVIVORS.read_bytes(), type=dict[str, Survivor])
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -74,19 +99,29 @@ def jobs_of(count, seed, tried=()):
     return found
 
 
+def judged(image, tried=()):
+    """Rules that an image breaks, each tried by itself, and the processor time; `tried`: () is all of them."""
+    from miro_robot.image import load_hex  # a new process gets its engine first
+    from mirotwin.verify.conform.run import try_rule, with_faults
+    from mirotwin.verify.conform.table import RULES
+
+    rules = [rule for rule in RULES if not tried or rule.id in tried]
+    begun = time.process_time()
+    loaded = load_hex(image)
+    outcomes = with_faults([try_rule(rule, loaded) for rule in rules], rules)
+    return tuple(one.rule for one in outcomes if one.failures), time.process_time() - begun
+
+
 def fate(job):
     """Builds and judges one mutant in this process."""
-    from tests.mutants.judge import judged  # a new process gets its engine first
-
     built = build({job.file: job.text})
     found = Fate(job.id, job.diff, job.planted, "does not compile", error=built.error)
     if built.error:
         return found
     if built.is_shipped:
         return msgspec.structs.replace(found, what="same bytes")
-    what = judged(built.image, job.tried)
-    named = "killed" if what.rules else "alive"
-    return msgspec.structs.replace(found, what=named, rules=what.rules, seconds=what.seconds)
+    rules, seconds = judged(built.image, job.tried)
+    return msgspec.structs.replace(found, what="killed" if rules else "alive", rules=rules, seconds=seconds)
 
 
 def fates(jobs, count):
@@ -167,23 +202,26 @@ def main():
 
 
 def _score(jobs, asked, whole):
-    from tests.mutants.judge import all_rules, judged
+    from mirotwin.verify.conform.table import RULES
 
-    right = judged(shipped().image)
-    if right.rules:
-        sys.exit(f"the shipped firmware breaks {', '.join(right.rules)}")
+    all_rules = tuple(rule.id for rule in RULES)
+    broken, conform_seconds = judged(shipped().image)
+    if broken:
+        sys.exit(f"the shipped firmware breaks {', '.join(broken)}")
     before = {one.id: one for one in last_score().fates} if asked.rules else {}
     jobs = [job if job.id in before else msgspec.structs.replace(job, tried=()) for job in jobs]
     found = []
-    for one in fates(jobs, asked.jobs):
-        found.append(
-            merged(before[one.id], one, tuple(asked.rules), all_rules()) if one.id in before else one
-        )
-        said = " ".join(found[-1].rules) if found[-1].rules else found[-1].what
+    for job, one in zip(jobs, fates(jobs, asked.jobs), strict=True):
+        found.append(merged(before[one.id], one, tuple(asked.rules), all_rules) if one.id in before else one)
+        said = " ".join(found[-1].rules) or found[-1].what
+        if said == "alive":
+            said += f", {os.path.relpath(build({job.file: job.text}).image)}"
         print(f"{len(found)}/{len(jobs)} {one.id}: {said} ({one.seconds:.1f} s)", file=sys.stderr, flush=True)
-    score = Score(asked.seed, all_rules(), right.seconds, tuple(found))
+    score = Score(asked.seed, all_rules, conform_seconds, tuple(found))
     if whole:
-        _write(SCORE, msgspec.json.format(msgspec.json.encode(score)))
+        part = SCORE.with_suffix(".part")
+        part.write_bytes(msgspec.json.format(msgspec.json.encode(score)))
+        os.replace(part, SCORE)
     killed, could = share(found, survivors())
     print(f"killed {killed} of {could} drawn mutants that could be killed")
     planted = [one for one in found if one.planted]
@@ -194,12 +232,6 @@ def _score(jobs, asked, whole):
     for line in against:
         print(line)
     return 1 if against else 0
-
-
-def _write(path, data):
-    part = path.with_suffix(".part")
-    part.write_bytes(data)
-    os.replace(part, path)
 
 
 if __name__ == "__main__":
