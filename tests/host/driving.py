@@ -1,11 +1,30 @@
-"""A robot that does at once what the pilot commands, period by period: limits, but no delay, noise or quantum."""
+"""What laws are driven with: drawn states, and a robot that does at once what the pilot commands, period by period.
+
+It has limits, but no delay, noise or quantum.
+"""
 
 import math
 import random
 
+from hypothesis import strategies as st
+
 from miro_host.estimators.predict import moved
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
+from miro_host.references.arc import Arc
+from miro_host.references.line import StraightLine
+
+PATHS = [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
+ANY_PATH = st.sampled_from(PATHS)
+POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
+TIMES = st.floats(0.02, 5.9)
+SPEEDS = st.floats(-0.9, 0.9)
+TURNS = st.floats(-4.0, 4.0)
+
+
+def later(posture, v, w, h, v_dot=0.0, w_dot=0.0):
+    """Where a robot is after `h` seconds, or was before."""
+    return moved(posture, h * (v + 0.5 * h * v_dot), h * (w + 0.5 * h * w_dot))
 
 
 def drive(law, path, start, periods):

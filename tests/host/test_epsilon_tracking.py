@@ -14,7 +14,6 @@ from miro_host.laws.epsilon_tracking import (
     RETUNED,
     THEORY,
     EpsilonTracking,
-    EpsilonTrackingParameters,
     point,
 )
 from miro_host.laws.interface import LawInput
@@ -22,18 +21,12 @@ from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.registries import LAWS
-from tests.host.driving import apart, drive
+from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TIMES, TURNS, apart, drive, later
 from tests.naive import host_laws as naive
 from tests.naive.host_ideal_loop import drive_at_velocities
 
 SETS = [THEORY, ILLUSTRATIVE, RETUNED]
 NAMES = ["theory", "illustrative", "retuned"]
-PATHS = st.sampled_from(
-    [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
-)
-POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
-TIMES = st.floats(0.02, 5.9)
 
 
 def asked(law, path, t, posture):
@@ -51,7 +44,7 @@ def beside(path, x_m, y_m, theta_rad):
 
 @pytest.mark.parametrize("gains", SETS, ids=NAMES)
 @settings(max_examples=60)
-@given(PATHS, TIMES, POSTURES)
+@given(ANY_PATH, TIMES, POSTURES)
 def test_velocities_equal_those_of_the_formula_in_complex_numbers(gains, path, t, posture):
     r, law = path.at(t), EpsilonTracking(gains)
     answer = asked(law, path, t, posture)
@@ -66,16 +59,14 @@ def test_velocities_equal_those_of_the_formula_in_complex_numbers(gains, path, t
     assert (answer.v_m_s, answer.w_rad_s) == pytest.approx((float(v), float(w)), rel=1e-9, abs=1e-9)
 
 
-@given(POSTURES, st.floats(-0.9, 0.9), st.floats(-4.0, 4.0))
+@given(POSTURES, SPEEDS, TURNS)
 def test_the_transformed_unicycle_is_the_nonholonomic_integrator(posture, v, w):
     """x1' = u1, x2' = u2, x3' = x1 u2 - x2 u1 with u1 = w, u2 = v / L - z3 w, by central differences."""
     length, h = 0.2, 1e-5
 
     def at(dt):
-        middle = posture.theta_rad + 0.5 * dt * w
-        x, y = posture.x_m + dt * v * math.cos(middle), posture.y_m + dt * v * math.sin(middle)
-        theta = posture.theta_rad + dt * w
-        return point(Posture(x, y, theta), theta, length)
+        there = later(posture, v, w, dt)
+        return point(there, posture.theta_rad + dt * w, length)
 
     here, before, after = at(0.0), at(-h), at(h)
     u1, u2 = w, v / length - here.z3 * w
@@ -83,7 +74,7 @@ def test_the_transformed_unicycle_is_the_nonholonomic_integrator(posture, v, w):
     assert rates == pytest.approx([u1, u2, here.x1 * u2 - here.x2 * u1], abs=1e-6)
 
 
-@given(PATHS, st.floats(0.6, 5.8), POSTURES)
+@given(ANY_PATH, st.floats(0.6, 5.8), POSTURES)
 def test_the_invariant_sigma_falls_as_the_docstring_says(path, t, posture):
     g = msgspec.structs.replace(THEORY, max_v_m_s=1e6, max_w_rad_s=1e6)
     law = EpsilonTracking(g)
@@ -93,13 +84,7 @@ def test_the_invariant_sigma_falls_as_the_docstring_says(path, t, posture):
     assume(abs(sigma) > 1e-2)
 
     def sigma_at(dt):
-        turn, length = dt * answer.w_rad_s, dt * answer.v_m_s
-        middle = posture.theta_rad + 0.5 * turn
-        there = Posture(
-            posture.x_m + length * math.cos(middle),
-            posture.y_m + length * math.sin(middle),
-            posture.theta_rad + turn,
-        )
+        there = later(posture, answer.v_m_s, answer.w_rad_s, dt)
         other = EpsilonTracking(g)
         other.begun, other.theta_rad, other.reference_rad = True, law.theta_rad, law.reference_rad
         return asked(other, path, t + dt, there).inner["sigma_rad2"]
@@ -201,32 +186,6 @@ def test_its_memory_is_saved_and_makes_the_same_commands():
     assert cut.law.theta_rad > 6.0
     mine = [name for name in values(cut) if name.startswith("law.")]
     assert mine == ["law.begun", "law.theta_rad", "law.reference_rad"]
-
-
-# The door.
-
-
-def test_the_law_is_found_by_its_name():
-    assert LAWS.find("epsilon_tracking") is EpsilonTrackingParameters
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("epsilon_rad", 0.0),
-        ("alpha_per_s", 0.0),
-        ("beta_per_s", -1.0),
-        ("beta_per_s", math.nan),
-        ("length_m", 0.0),
-        ("sigma", "exact"),
-        ("switching", "relay"),
-        ("layer_sigma_rad2", 0.0),
-        ("max_v_m_s", 0.0),
-    ],
-)
-def test_a_parameter_out_of_range_is_refused_by_name(key, value):
-    with pytest.raises(msgspec.ValidationError, match=key):
-        msgspec.convert({"law": "epsilon_tracking", key: value}, EpsilonTrackingParameters)
 
 
 @given(st.sampled_from(SETS), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-3.14, 3.14))

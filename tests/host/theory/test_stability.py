@@ -12,31 +12,13 @@ from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
 from miro_host.theory import HALF_PI, across, radius
+from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TURNS, later
 from tests.host.theory import stability
 from tests.host.theory.ideal import PRINTED
 from tests.host.theory.stability import NO_GUARD, SLOPED, rates, rising, states
 
-PATHS = st.sampled_from(
-    [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
-)
-POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
 TIMES = st.floats(0.1, 0.4) | st.floats(0.6, 5.8)  # not on the corner of the ramp
-SPEEDS = st.floats(-0.9, 0.9)
-TURNS = st.floats(-4.0, 4.0)
 F1, F2 = st.floats(-0.35, 0.35), st.floats(-1.2, 1.2)
-
-
-def moved(path, t, posture, z, z_dot, h):
-    """Reference, posture and velocities a moment later, accelerations held."""
-    v, w = z
-    turn, length = h * (w + 0.5 * h * z_dot[1]), h * (v + 0.5 * h * z_dot[0])
-    middle = posture.theta_rad + 0.5 * turn
-    there = Posture(
-        posture.x_m + length * math.cos(middle),
-        posture.y_m + length * math.sin(middle),
-        posture.theta_rad + turn,
-    )
-    return path.at(t + h), there, v + h * z_dot[0], w + h * z_dot[1]
 
 
 def near_no_seam(e):
@@ -44,7 +26,7 @@ def near_no_seam(e):
 
 
 @given(
-    PATHS,
+    ANY_PATH,
     TIMES,
     POSTURES,
     SPEEDS,
@@ -63,7 +45,10 @@ def test_the_rates_of_the_errors_and_surfaces_are_their_differences_along_the_mo
     assume(abs(abs(e.theta_e_rad) - layer_rad) > 1e-2)
     dt, gammas = 1e-5, (1.7, 3.0)
     before, after = (
-        stability.polar_errors(*moved(path, t, posture, (v, w), (v_dot, w_dot), h)) for h in (-dt, dt)
+        stability.polar_errors(
+            path.at(t + h), later(posture, v, w, h, v_dot, w_dot), v + h * v_dot, w + h * w_dot
+        )
+        for h in (-dt, dt)
     )
     scale = (1.0 + abs(v) / radius(posture) + abs(w)) ** 3 * (1.0 + abs(v_dot) + abs(w_dot))
     rates_of_errors = np.subtract(after[:3], before[:3]) / (2 * dt)
@@ -73,7 +58,7 @@ def test_the_rates_of_the_errors_and_surfaces_are_their_differences_along_the_mo
     assert np.subtract(two, one) / (2 * dt) == pytest.approx(np.array(found), abs=1e-5 * scale)
 
 
-@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1, F2)
+@given(ANY_PATH, TIMES, POSTURES, SPEEDS, TURNS, F1, F2)
 def test_as_printed_v_falls_exactly_as_equation_23_says_wherever_theta_e_is_not_0(
     path, t, posture, v, w, f1, f2
 ):
@@ -109,7 +94,7 @@ def test_where_theta_e_crosses_0_v_jumps_by_the_product_that_the_proof_drops(rho
 # The boundary layer of remark 2.
 
 
-@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, st.sampled_from((NO_GUARD, SLOPED)))
+@given(ANY_PATH, TIMES, POSTURES, SPEEDS, TURNS, st.sampled_from((NO_GUARD, SLOPED)))
 def test_inside_the_layer_v_has_one_term_more_than_equation_23_unless_u2_has_its_derivative(
     path, t, posture, v, w, gains
 ):
@@ -173,7 +158,7 @@ def test_u1_grows_like_one_over_the_sine_of_alpha(alpha, rho):
 
 
 @pytest.mark.slow
-@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1)
+@given(ANY_PATH, TIMES, POSTURES, SPEEDS, TURNS, F1)
 def test_f1_moves_s1_by_its_part_along_the_line_of_sight_only(path, t, posture, v, w, f1):
     """What remark 1 sets against that: near the limit f1 counts as little as u1."""
     assume(radius(posture) > 0.02)
