@@ -33,6 +33,18 @@ class Leaky(Law[LeakyParameters]):
         return Velocities(v_m_s, self.headings_rad[0] - self.headings_rad[1], {"error_m": self.error_m})
 
 
+NAN = float("nan")
+ANSWERS = {
+    "nan": Velocities(NAN, 0.0, {"a": 1.0}),
+    "infinite": Accelerations(0.0, float("-inf"), {"a": 1.0}),
+    "inner nan": Velocities(0.1, 0.0, {"a": NAN}),
+    "inner names": Velocities(0.1, 0.0, {"b": 1.0}),
+    "int": Velocities(1, 0.0, {"a": 1.0}),
+    "nothing": None,
+}
+MEMORIES = {"memory nan": NAN, "memory type": "text"}
+
+
 class WrongParameters(LawParameters, frozen=True, kw_only=True, tag="wrong"):
     how: str = "nan"
 
@@ -53,27 +65,13 @@ class Wrong(Law[WrongParameters]):
 
     def step(self, given):
         self.periods += 1
+        good = Velocities(0.1, 0.0, {"a": 1.0})
         if self.periods == 1:
-            return Velocities(0.1, 0.0, {"a": 1.0})
+            return good
         how = self.parameters.how
-        if how == "nan":
-            return Velocities(float("nan"), 0.0, {"a": 1.0})
-        if how == "infinite":
-            return Accelerations(0.0, float("-inf"), {"a": 1.0})
-        if how == "inner nan":
-            return Velocities(0.1, 0.0, {"a": float("nan")})
-        if how == "inner names":
-            return Velocities(0.1, 0.0, {"b": 1.0})
-        if how == "int":
-            return Velocities(1, 0.0, {"a": 1.0})
-        if how == "nothing":
-            return None
         if how == "raises":
             raise ZeroDivisionError("division by zero")
-        if how == "memory nan":
-            self.memory = float("nan")
-        if how == "memory type":
-            self.memory = "text"
         if how == "undeclared":
             self.hidden = 1.0
-        return Velocities(0.1, 0.0, {"a": 1.0})
+        self.memory = MEMORIES.get(how, 0.0)
+        return ANSWERS.get(how, good)

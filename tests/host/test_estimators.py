@@ -16,7 +16,6 @@ from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.line import StraightLine
-from miro_host.registries import ESTIMATORS
 from miro_host.wheels import Wheels
 
 HERE = Posture(0.07, 0.02, -0.38)
@@ -37,10 +36,6 @@ def test_an_arc_ends_where_many_small_steps_end(length_m, turn_rad, theta_rad):
         y += length_m / steps * math.sin(middle)
     ended = moved(Posture(0.1, -0.2, theta_rad), length_m, turn_rad)
     assert near(ended, Posture(x, y, theta_rad + turn_rad), 1e-6)
-
-
-def test_our_own_estimators_have_names():
-    assert ESTIMATORS.names() == ["none", "ekf", "ekf+telemetry", "predict"]
 
 
 def test_without_an_estimator_a_measurement_is_the_posture_at_its_arrival():
@@ -81,19 +76,6 @@ def test_the_law_is_given_the_reference_of_the_time_that_was_predicted():
     assert one.update(HERE, 1.0) == led.update(HERE, 1.0)  # at rest nothing moves, only the time differs
 
 
-def test_what_was_sent_is_remembered_over_a_save():
-    def pilot():
-        return Pilot(StraightLine(), Gains().law(), estimator=PredictParameters().estimator())
-
-    whole, cut = pilot(), pilot()
-    for k in range(6):
-        again = pilot()
-        restore(again, snapshot(cut))
-        cut = again
-        assert cut.update(HERE, k * PERIOD_S) == whole.update(HERE, k * PERIOD_S)
-    assert snapshot(cut) == snapshot(whole)
-
-
 class Odd(EstimatorParameters, frozen=True, tag="odd"):
     answer: object = None
 
@@ -124,12 +106,6 @@ def test_an_estimator_that_fails_is_named(answer, reason):
         match=rf"estimator 'odd' failed: .*{reason} \(.*:\d+ in Answering.step\); mend the estimator",
     ):
         one.update(HERE, 0.0)
-
-
-@pytest.mark.parametrize("name", ["age_s", "ahead_s"])
-def test_a_delay_out_of_range_is_refused(name):
-    with pytest.raises(ValueError, match=f"{name}: 0.3 is out of range"):
-        PredictParameters(**{name: 0.3})
 
 
 class KnowingParameters(EstimatorParameters, frozen=True, kw_only=True, tag="knowing"):

@@ -169,16 +169,6 @@ def test_numbers_far_from_any_robots_are_not_called_a_mistake_of_the_law():
         one.update(Posture(0.0, 0.0, 1e300), 1.0)
 
 
-@pytest.mark.parametrize("error_m", [math.nan, math.inf])
-def test_a_memory_that_no_law_leaves_is_refused_and_changes_nothing(error_m):
-    law = Leaky(LeakyParameters())
-    before = snapshot(law)
-    assert before.startswith(struct.pack("<d", law.error_m))
-    with pytest.raises(ValueError, match="error_m"):
-        restore(law, struct.pack("<d", error_m) + before[8:])
-    assert snapshot(law) == before
-
-
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [

@@ -82,19 +82,6 @@ def test_the_pilot_is_told_the_delay_of_its_network(robots, expected_s):
     assert world.networks[0].robots[0].pilot.dead_s == dead_s(scenario, scenario.networks[0])
 
 
-def test_a_world_whose_robot_counts_is_saved_and_goes_on_with_the_same_bits():
-    sets = ('network.robot.estimator={kind="ekf+telemetry"}',)
-    whole = run_world(*sets)
-    scenario = scenario_file.load("fig6", (*SHORT, *sets)).scenario
-    first, second = (World(scenario, 1, load_hex(image_path())) for _ in range(2))
-    for _ in range(30):
-        first.step()
-    second.load(first.save())
-    while not second.finished:
-        second.step()
-    assert second.digest == whole.digest
-
-
 def test_the_cost_is_that_of_both_loops_over_all_periods():
     image = load_hex(image_path())
     plain, ours = (
