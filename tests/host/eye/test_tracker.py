@@ -26,9 +26,7 @@ def picture(*robots, noise=7):
 
 def sight(one, true, slot=0, tick=0):
     """Gives a tracker a sighting."""
-    track = one.tracks[slot]
-    track.seen, track.tick = 1, tick
-    track.x_m, track.y_m, track.theta_rad = true.x_m, true.y_m, true.theta_rad
+    one.tracks[slot].remember(Sighting(true.x_m, true.y_m, true.theta_rad, tick, 1.0))
 
 
 # ---- how well it measures
