@@ -25,7 +25,7 @@ from mirotwin.verify.steps.keys import (
     NeverStep,
     PauseStep,
     SaveStep,
-    SendStep,
+    Send,
     Step,
     StreamStep,
     WaitStep,
@@ -44,8 +44,8 @@ _PASSED_OVER = (*_CAN_FAIL, HoldStep, CheckStep, SaveStep)
 
 def unseen(step: Step) -> str:
     """Why a PC cannot do or see a step, "" if it can."""
-    if isinstance(step, SendStep):
-        bad = getattr(step.what, "bad_stop", ()) or "!" in getattr(step.what, "hex", "")
+    if isinstance(step, Send):
+        bad = getattr(step, "bad_stop", ()) or "!" in getattr(step, "hex", "")
         return "no serial port sends a bad stop bit" if bad else ""
     if isinstance(step, StreamStep | PauseStep):
         return ""

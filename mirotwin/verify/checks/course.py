@@ -19,10 +19,28 @@ LONGEST_S = 86_400.0
 LimitCm = Annotated[float, Meta(gt=0.0, le=1000.0)]
 
 
-class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
-    """The robot is never further than so from its reference, from `from_s` on; default: in the run's last second."""
+class CourseCheck(Check, frozen=True, kw_only=True):
+    """Looks at where the robot is, from `first_tick` of the run on."""
 
     KIND: ClassVar[Kind] = "safety"
+
+    def first_tick(self, end_tick: int) -> int:
+        return 0
+
+    def wanted(self) -> str:
+        raise NotImplementedError
+
+    def found(self, error: ErrorSample) -> str:
+        """What is wrong with where the robot is, or the empty string."""
+        raise NotImplementedError
+
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return CourseMonitor(self, subject)
+
+
+class TracksWithin(CourseCheck, frozen=True, kw_only=True, tag="tracks_within_cm"):
+    """The robot is never further than so from its reference, from `from_s` on; default: in the run's last second."""
+
     MAIN: ClassVar[str] = "limit_cm"
 
     limit_cm: LimitCm
@@ -33,11 +51,17 @@ class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
             return f"from_s: {self.from_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""
 
-    def monitor(self, subject: Subject) -> Monitor[Check]:
-        return TracksMonitor(self, subject)
+    def first_tick(self, end_tick: int) -> int:
+        return max(0, end_tick - TICKS_PER_SECOND) if self.from_s is None else ticks(self.from_s)
+
+    def wanted(self) -> str:
+        return f"at most {self.limit_cm:g} cm from the reference"
+
+    def found(self, error: ErrorSample) -> str:
+        return f"{error.position_cm:.3f} cm" if error.position_cm > self.limit_cm else ""
 
 
-class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
+class SettlesWithin(CourseCheck, frozen=True, kw_only=True, tag="settles_within_s"):
     """From so long after the start of the run on the robot stays within `position_cm` and `heading_rad` of its
     reference.
     """
@@ -54,81 +78,45 @@ class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
             return f"{self.within_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""
 
-    def monitor(self, subject: Subject) -> Monitor[Check]:
-        return SettlesMonitor(self, subject)
-
-
-class InsidePitch(Check, frozen=True, kw_only=True, tag="inside_pitch"):
-    """All corners of the robot's square stay on the pitch."""
-
-    KIND: ClassVar[Kind] = "safety"
-
-    def monitor(self, subject: Subject) -> Monitor[Check]:
-        return PitchMonitor(self, subject)
-
-
-class _CourseMonitor(Monitor[Check]):
-    """Notes when the robot begins to be wrong. `first_tick`: from then on it is judged."""
-
-    LATER = True
-
-    def __init__(self, check: Check, subject: Subject, first_tick: int) -> None:
-        super().__init__(check, subject)
-        self.first_tick = first_tick
-        self.wrong = False
-
-    def period(self, record: RobotPeriod, tick: int) -> None:
-        if tick < self.first_tick:
-            return
-        self.judged += 1
-        before, found = self.wrong, self.found(error_of(record.truth, record.reference, tick))
-        self.wrong = bool(found)
-        if found and not before:
-            self.fail(tick, self.wanted(), found)
+    def first_tick(self, end_tick: int) -> int:
+        return ticks(self.within_s)
 
     def wanted(self) -> str:
-        raise NotImplementedError
-
-    def found(self, error: ErrorSample) -> str:
-        """What is wrong with where the robot is, or the empty string."""
-        raise NotImplementedError
-
-
-class TracksMonitor(_CourseMonitor):
-    def __init__(self, check: TracksWithin, subject: Subject) -> None:
-        last_second = max(0, subject.end_tick - TICKS_PER_SECOND)
-        super().__init__(check, subject, last_second if check.from_s is None else ticks(check.from_s))
-        self.limit_cm = check.limit_cm
-
-    def wanted(self) -> str:
-        return f"at most {self.limit_cm:g} cm from the reference"
-
-    def found(self, error: ErrorSample) -> str:
-        return f"{error.position_cm:.3f} cm" if error.position_cm > self.limit_cm else ""
-
-
-class SettlesMonitor(_CourseMonitor):
-    def __init__(self, check: SettlesWithin, subject: Subject) -> None:
-        super().__init__(check, subject, ticks(check.within_s))
-        self.limits = check
-
-    def wanted(self) -> str:
-        position_cm, heading_rad = self.limits.position_cm, self.limits.heading_rad
-        return f"within {position_cm:g} cm and {heading_rad:g} rad of the reference after {self.limits.within_s:g} s"
+        limits = f"{self.position_cm:g} cm and {self.heading_rad:g} rad"
+        return f"within {limits} of the reference after {self.within_s:g} s"
 
     def found(self, error: ErrorSample) -> str:
         position_cm, heading_rad = error.position_cm, abs(error.theta_rad)
-        if position_cm <= self.limits.position_cm and heading_rad <= self.limits.heading_rad:
+        if position_cm <= self.position_cm and heading_rad <= self.heading_rad:
             return ""
         return f"{position_cm:.3f} cm and {heading_rad:.4f} rad"
 
 
-class PitchMonitor(_CourseMonitor):
-    def __init__(self, check: InsidePitch, subject: Subject) -> None:
-        super().__init__(check, subject, 0)
+class InsidePitch(CourseCheck, frozen=True, kw_only=True, tag="inside_pitch"):
+    """All corners of the robot's square stay on the pitch."""
 
     def wanted(self) -> str:
         return "all corners on the pitch"
 
     def found(self, error: ErrorSample) -> str:
         return "a corner beyond its edge" if error.off_pitch else ""
+
+
+class CourseMonitor(Monitor[CourseCheck]):
+    """Notes when the robot begins to be wrong."""
+
+    LATER = True
+
+    def __init__(self, check: CourseCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.first_tick = check.first_tick(subject.end_tick)
+        self.wrong = False
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        if tick < self.first_tick:
+            return
+        self.judged += 1
+        before, found = self.wrong, self.check.found(error_of(record.truth, record.reference, tick))
+        self.wrong = bool(found)
+        if found and not before:
+            self.fail(tick, self.check.wanted(), found)

@@ -31,26 +31,69 @@ FilterWord = Annotated[int, Meta(ge=0, le=0x7FFF)]
 Pair = tuple[SpeedMS, SpeedMS]
 
 
-class Send(
-    msgspec.Struct,
-    frozen=True,
-    forbid_unknown_fields=True,
-    kw_only=True,
-    tag_field="send",
-    omit_defaults=True,
-):
-    """Base: the host of `network` sends something once."""
+FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
+LONGEST_MS = 86_400_000.0
+PauseMs = Annotated[float, Meta(gt=0.0, le=LONGEST_MS)]
+WithinMs = Annotated[float, Meta(ge=0.0, le=LONGEST_MS)]
+Verb = Literal["wait_for", "expect"]
 
-    network: Network = 0
+
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Base. `number`: from 1 on, as messages count them. `note`: for people, in the messages of the step."""
+
+    VERB: ClassVar[str] = ""
+
+    number: int = 0
+    note: str = ""
 
     @property
-    def name(self) -> str:
-        return str(self.__struct_config__.tag)
+    def network(self) -> int:
+        """Whose step it is: that of the key, or of the condition it waits for."""
+        return getattr(self, "network_", None) or 0
 
-    def problem(self, robots: int) -> str:
-        """What is wrong with its keys on a network of `robots` slots: `what; remedy`, or the empty string."""
+    def problem(self, network: ScenarioNetwork) -> str:
+        """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
         slot = getattr(self, "slot", None)
-        return "" if slot is None else beyond(slot, robots)
+        return "" if slot is None else absent(slot, network)
+
+    def do(self, player: Player) -> None:
+        """Does it, and lets time pass as far as it says."""
+        raise NotImplementedError
+
+    def lasts_ticks(self) -> int:
+        """How long it takes at least."""
+        return 0
+
+    def needs_ticks(self) -> int:
+        """How long it may take, by what it says."""
+        return self.lasts_ticks()
+
+    def said(self) -> str:
+        """What it is, in a few words."""
+        value = getattr(self, self.VERB, "")
+        return f"{self.VERB} {value}" if isinstance(value, str | int) else self.VERB
+
+    def __str__(self) -> str:
+        note = f" ({self.note})" if self.note else ""
+        return f"step {self.number}{note}: {self.said()}"
+
+
+class Send(Step, frozen=True, kw_only=True, tag_field="send", omit_defaults=True):
+    """`send`: the host of `network` sends a frame or characters, once, as soon as the transmitter is free."""
+
+    VERB = "send"
+
+    network_: Network = msgspec.field(default=0, name="network")
+
+    def said(self) -> str:
+        return f"send {self.__struct_config__.tag}"
+
+    def problem(self, network: ScenarioNetwork) -> str:
+        slot = getattr(self, "slot", None)
+        return "" if slot is None else beyond(slot, network.robots)
+
+    def do(self, player: Player) -> None:
+        player.hosts[self.network].send(self)
 
 
 def beyond(slot: int, robots: int) -> str:
@@ -70,8 +113,10 @@ class SendFrame(Send, frozen=True, kw_only=True):
     wrong_bits: tuple[int, ...] = ()
     bad_stop: tuple[int, ...] = ()
 
-    def problem(self, robots: int) -> str:
-        form = DOWNLINK[robots]
+    def problem(self, network: ScenarioNetwork) -> str:
+        if self.seq is None and network.host != "silent":
+            return 'seq: this network\'s host counts its frames itself; give seq, or write host = "silent"'
+        form = DOWNLINK[network.robots]
         first = len(form.lead) + len(form.sync)
         bits = 8 * (form.wire_size - first)
         for bit in self.wrong_bits:
@@ -83,7 +128,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
                 what = f"bad_stop: {list(self.bad_stop)} are not characters of the frame in their order"
                 return f"{what}; use 0 to {form.wire_size - 1}"
             before = place
-        return super().problem(robots)
+        return super().problem(network)
 
 
 class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
@@ -99,14 +144,14 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
     team_m_s: tuple[Pair, ...] | None = None
     ask: bool = False
 
-    def problem(self, robots: int) -> str:
-        if self.team_m_s is not None and len(self.team_m_s) != robots:
+    def problem(self, network: ScenarioNetwork) -> str:
+        if self.team_m_s is not None and len(self.team_m_s) != network.robots:
             pairs = amount(len(self.team_m_s), "pair")
-            return f"team_m_s: {pairs} for {robots} slots; give one pair [left, right] a slot"
+            return f"team_m_s: {pairs} for {network.robots} slots; give one pair [left, right] a slot"
         one = (self.slot, self.left_m_s, self.right_m_s)
         if self.team_m_s is not None and one != (None, None, None):
             return "team_m_s: tells all slots; leave out slot, left_m_s and right_m_s"
-        return super().problem(robots)
+        return super().problem(network)
 
 
 class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
@@ -114,10 +159,10 @@ class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
 
     slot: Slot | None = None
 
-    def problem(self, robots: int) -> str:
-        if None not in (self.seq, self.slot) and self.seq % robots != self.slot:  # type: ignore[operator]
+    def problem(self, network: ScenarioNetwork) -> str:
+        if None not in (self.seq, self.slot) and self.seq % network.robots != self.slot:  # type: ignore[operator]
             return f"seq: {self.seq} does not ask robot {self.slot}; leave it out"
-        return super().problem(robots)
+        return super().problem(network)
 
 
 class SendService(SendFrame, frozen=True, kw_only=True):
@@ -169,7 +214,7 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
 
     hex: str
 
-    def problem(self, robots: int) -> str:
+    def problem(self, network: ScenarioNetwork) -> str:
         words = self.hex.split()
         for word in words:
             if not CHARACTER.fullmatch(word):
@@ -187,77 +232,6 @@ SENDS: dict[str, type[Send]] = {
     str(struct.__struct_config__.tag): struct
     for struct in (SendTeam, SendPoll, SendPing, SendFilter, SendAcceleration, SendBytes)
 }
-
-
-FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
-LONGEST_MS = 86_400_000.0
-PauseMs = Annotated[float, Meta(gt=0.0, le=LONGEST_MS)]
-WithinMs = Annotated[float, Meta(ge=0.0, le=LONGEST_MS)]
-Verb = Literal["wait_for", "expect"]
-
-
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Base. `number`: from 1 on, as messages count them. `note`: for people, in the messages of the step."""
-
-    VERB: ClassVar[str] = ""
-
-    number: int = 0
-    note: str = ""
-
-    @property
-    def network(self) -> int:
-        """Whose step it is: that of the key, or of the condition it waits for."""
-        return getattr(self, "network_", None) or 0
-
-    def problem(self, network: ScenarioNetwork) -> str:
-        """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
-        slot = getattr(self, "slot", None)
-        return "" if slot is None else absent(slot, network)
-
-    def do(self, player: Player) -> None:
-        """Does it, and lets time pass as far as it says."""
-        raise NotImplementedError
-
-    def lasts_ticks(self) -> int:
-        """How long it takes at least."""
-        return 0
-
-    def needs_ticks(self) -> int:
-        """How long it may take, by what it says."""
-        return self.lasts_ticks()
-
-    def said(self) -> str:
-        """What it is, in a few words."""
-        value = getattr(self, self.VERB, "")
-        return f"{self.VERB} {value}" if isinstance(value, str | int) else self.VERB
-
-    def __str__(self) -> str:
-        note = f" ({self.note})" if self.note else ""
-        return f"step {self.number}{note}: {self.said()}"
-
-
-class SendStep(Step, frozen=True, kw_only=True):
-    """`send`: a frame or characters, once, as soon as the transmitter is free."""
-
-    VERB = "send"
-
-    what: Send
-
-    @property
-    def network(self) -> int:
-        return self.what.network
-
-    def said(self) -> str:
-        return f"send {self.what.name}"
-
-    def problem(self, network: ScenarioNetwork) -> str:
-        what = self.what
-        if isinstance(what, SendFrame) and what.seq is None and network.host != "silent":
-            return 'seq: this network\'s host counts its frames itself; give seq, or write host = "silent"'
-        return what.problem(network.robots)
-
-    def do(self, player: Player) -> None:
-        player.hosts[self.network].send(self.what)
 
 
 class StreamStep(Step, frozen=True, kw_only=True):

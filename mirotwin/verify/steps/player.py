@@ -136,14 +136,7 @@ class StepFailure(msgspec.Struct, frozen=True):
 
 
 class _Failed(Exception):
-    """A step was not fulfilled, at a tick."""
-
-    def __init__(self, tick: int, wanted: str, found: str, timed_out: bool = False) -> None:
-        super().__init__(wanted, found)
-        self.timed_out = timed_out
-        self.tick = tick
-        self.wanted = wanted
-        self.found = found
+    """A step was not fulfilled: the tick, what was wanted, what was found, and whether it waited for that."""
 
 
 class Player:
@@ -168,15 +161,7 @@ class Player:
                     raise _Failed(begun_tick, "to be done", self._end())
                 step.do(self)
             except _Failed as failed:
-                self.failure = StepFailure(
-                    f"{step}",
-                    step.number,
-                    begun_tick,
-                    failed.tick,
-                    failed.wanted,
-                    failed.found,
-                    failed.timed_out,
-                )
+                self.failure = StepFailure(f"{step}", step.number, begun_tick, *failed.args)
                 return
             except ValueError as error:
                 if isinstance(error, ScenarioError):
@@ -212,7 +197,7 @@ class Player:
         seen: list[Event] = []
         event = self._next(kind, until_tick, seen)
         if event is None:
-            raise _Failed(world.tick, said, self._nothing(wanted, seen), timed_out=True)
+            raise _Failed(world.tick, said, self._nothing(wanted, seen), True)
         if kind != wanted and not wanted.met_by(event):
             raise _Failed(event.tick, said, self._other(wanted, event))
 

@@ -9,7 +9,7 @@ note = "drives off"                    for people
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn, TypeVar
 
 import msgspec
@@ -28,7 +28,6 @@ from mirotwin.verify.steps.keys import (
     NeverStep,
     PauseMs,
     SaveStep,
-    SendStep,
     Step,
     WaitStep,
     WithinMs,
@@ -125,7 +124,7 @@ class _Table:
         note: str = self.taken("note", str, "")
         common: dict[str, Any] = {"number": self.index + 1, "note": note}
         if verb == "send":
-            return SendStep(what=self.rest(self.choice(verb, SENDS), verb), **common)
+            return self.rest(self.choice(verb, SENDS), verb, common, **common)
         if verb == "silence_for_ms":
             for_ms = self.taken(verb, PauseMs)
             return NeverStep(condition=self.rest(Heard, verb, hidden=("byte",)), for_ms=for_ms, **common)
@@ -173,13 +172,13 @@ class _Table:
         what = f"{value!r} is not one of the choices"
         self.refuse(verb, what, use_one_of(choices))
 
-    def rest(self, struct: type[S], verb: str, hidden: Sequence[str] = ()) -> S:
-        """The struct of the keys that are left; `verb` named it."""
+    def rest(self, struct: type[S], verb: str, hidden: Iterable[str] = (), **more: Any) -> S:
+        """The struct of the keys that are left, and `more`; `verb` named it."""
         self.table.pop(verb, None)
         known = [key for key in struct.__struct_encode_fields__ if key not in hidden]
         self.refuse_unknown([*known, *_TIMES_OF.get(verb, ()), "note"])
         config = struct.__struct_config__
-        return self.made(struct, {**self.table, str(config.tag_field): config.tag})
+        return self.made(struct, {**self.table, str(config.tag_field): config.tag, **more})
 
     def refuse_unknown(self, known: Sequence[str]) -> None:
         for key in self.table:

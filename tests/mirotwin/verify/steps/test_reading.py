@@ -16,7 +16,6 @@ from mirotwin.verify.steps.keys import (
     NeverStep,
     PauseStep,
     SendBytes,
-    SendStep,
     SendTeam,
     WaitStep,
     acceleration_units,
@@ -149,7 +148,7 @@ def test_steps_know_their_number_and_note():
     first, second, third = read(
         '{ note = "off", send = "team", left_m_s = 1 }, { silence_for_ms = 3 }, { wait_for = "command", name = "STT" }'
     )
-    assert first == SendStep(number=1, note="off", what=SendTeam(left_m_s=1.0))
+    assert first == SendTeam(number=1, note="off", left_m_s=1.0)
     assert f"{first}" == "step 1 (off): send team"
     assert isinstance(second, NeverStep)
     assert (second.number, second.for_ms, second.condition.what) == (2, 3.0, "heard")
@@ -229,8 +228,8 @@ def test_steps_say_what_their_tables_say(tables):
         assert step.note == table.get("note", "")
         if isinstance(step, PauseStep):
             assert step.pause_ms == table["pause_ms"]
-        elif isinstance(step, SendStep):
-            assert step.what == SendTeam(left_m_s=table.get("left_m_s"), ask=table.get("ask", False))
+        elif isinstance(step, SendTeam):
+            assert (step.left_m_s, step.ask) == (table.get("left_m_s"), table.get("ask", False))
         elif isinstance(step, WaitStep):
             assert step.within_ms == table.get("within_ms")
             assert msgspec.to_builtins(step.condition).get("accepted") == table.get("accepted")
