@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from mirotwin.verify.conform.by_answers import LEFT_OUT, NOT_OBSERVABLE
 from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.table import CHAPTERS
+from mirotwin.verify.conform.rules import CHAPTERS
 
 
 def render() -> str:

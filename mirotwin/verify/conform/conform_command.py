@@ -47,9 +47,9 @@ from mirotwin.verify.cases.artifacts import (
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.rules import ALL as EVERY_RULE
+from mirotwin.verify.conform.rules import LONG, RULES, chapter_of, find
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
-from mirotwin.verify.conform.table import ALL as EVERY_RULE
-from mirotwin.verify.conform.table import LONG, RULES, chapter_of, find
 
 LINES = 5
 """Firmware faults that are listed."""

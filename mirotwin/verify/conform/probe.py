@@ -10,14 +10,13 @@ from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import TICKS_PER_MS
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME
-from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, Monitor, Subject
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.hints import characters
-from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import BOTH, Rule, Topology
+from mirotwin.verify.conform.rule_monitor import ObservingMonitor
 from mirotwin.verify.conform.sealing import MISTAKES
 from mirotwin.verify.conform.trial import Trial, make_trial, run_trial, trial_of
 from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
@@ -32,7 +31,7 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
         return Listener(self, subject)
 
 
-class Listener(Monitor[Listening]):
+class Listener(ObservingMonitor[Listening]):
     """`events`: all of one robot and its host, in the order of time; `observed` has what rules ask about."""
 
     EVENTS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
@@ -40,21 +39,11 @@ class Listener(Monitor[Listening]):
     def __init__(self, check: Listening, subject: Subject) -> None:
         super().__init__(check, subject)
         self.events: list[Event] = []
-        self.observed = Observed(subject.robots, subject.slot)
 
     def event(self, event: Event) -> None:
         self.events.append(event)
         if event.what in ("command", "heard", "answer"):
             self.observed.take(event)
-
-    def restarted(self, tick: int) -> None:
-        self.observed.restarted(tick)
-
-    def period(self, record: RobotPeriod, tick: int) -> None:
-        self.observed.take_period(tick, record, self.subject.robot.board)
-
-    def end(self, tick: int) -> None:
-        self.observed.end_tick = tick
 
 
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -13,6 +13,22 @@ from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 if TYPE_CHECKING:
     from miro_robot.image import Image
     from mirotwin.verify.conform.trial_script import TrialScript
+
+    Written = Callable[[TrialScript], None]
+
+
+# The pages and sections that rules come from.
+FRAME = "protocol/README.md, Frame"
+TURNS = "protocol/README.md, Turns"
+VERSIONS = "protocol/README.md, Versions"
+WHY = "protocol/README.md, Why"
+RECEPTION = "protocol/README.md, Reception"
+FRESHNESS = "protocol/README.md, Freshness and failsafe"
+POWER_ON = "robot_fw/README.md, After power-on"
+PORT = "robot_fw/README.md, LM629: the port"
+WHEELS = "robot_fw/README.md, From LM629 to wheel"
+FIRMWARE = "robot_fw/README.md, The firmware"
+FAULTS = "robot_fw/README.md, Faults: what firmware must not do"
 
 
 class Topology(msgspec.Struct, frozen=True):
@@ -50,7 +66,7 @@ class Rule(msgspec.Struct, frozen=True):
     id: str
     text: str
     source: str
-    write: Callable[[TrialScript], None]
+    write: Written
     topologies: tuple[Topology, ...] = BOTH
     faults: tuple[FaultKind, ...] = ()
     lm629: Lm629Options = DEFAULT_OPTIONS
@@ -71,22 +87,11 @@ class Chapter:
         self.title = title
         self.rules: list[Rule] = []
 
-    def rule(
-        self,
-        id: str,
-        text: str,
-        source: str,
-        topologies: tuple[Topology, ...] = BOTH,
-        faults: tuple[FaultKind, ...] = (),
-        lm629: Lm629Options = DEFAULT_OPTIONS,
-        presupposes: tuple[str, ...] = (),
-        broken: str = "",
-        probe: Callable[[int, Image, int], str] | None = None,
-    ) -> Callable[[Callable[[TrialScript], None]], Callable[[TrialScript], None]]:
-        def keep(write: Callable[[TrialScript], None]) -> Callable[[TrialScript], None]:
-            self.rules.append(
-                Rule(id, text, source, write, topologies, faults, lm629, presupposes, broken, probe)
-            )
+    def rule(self, id: str, text: str, source: str, **more: Any) -> Callable[[Written], Written]:
+        """`more`: other fields of the rule."""
+
+        def keep(write: Written) -> Written:
+            self.rules.append(Rule(id, text, source, write, **more))
             return write
 
         return keep

@@ -14,7 +14,7 @@ from miro_protocol.transmission import Transmission
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
-from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
+from mirotwin.verify.checks.interface import C_co, Check, Kind, Monitor, Subject
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.trial import trial_of
@@ -33,7 +33,7 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
     def the_rule(self) -> Rule:
         """ValueError for a rule that there is not."""
-        from mirotwin.verify.conform.table import find  # the rules are read when one is asked for
+        from mirotwin.verify.conform.rules import find  # the rules are read when one is asked for
 
         try:
             return find(self.rule)
@@ -44,7 +44,24 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
         return RuleMonitor(self, subject)
 
 
-class RuleMonitor(Monitor[ConformsTo]):
+class ObservingMonitor(Monitor[C_co]):
+    """Keeps what rules ask about."""
+
+    def __init__(self, check: C_co, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.observed = Observed(subject.robots, subject.slot)
+
+    def restarted(self, tick: int) -> None:
+        self.observed.restarted(tick)
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        self.observed.take_period(tick, record, self.subject.robot.board)
+
+    def end(self, tick: int) -> None:
+        self.observed.end_tick = tick
+
+
+class RuleMonitor(ObservingMonitor[ConformsTo]):
     """`foreign`: the host of this network says something else than in the trial; `to_come`: what it has to say yet."""
 
     EVENTS = ("command", "heard", "answer", "sent")
@@ -58,7 +75,6 @@ class RuleMonitor(Monitor[ConformsTo]):
         self.to_come: list[Transmission] = [
             one for one in trial.transmissions if one.network == subject.network
         ][::-1]
-        self.observed = Observed(subject.robots, subject.slot)
 
     def event(self, event: Event) -> None:
         if event.what != "sent":
@@ -72,18 +88,12 @@ class RuleMonitor(Monitor[ConformsTo]):
         if fault.kind in self.rule.faults:
             self.fail(fault.tick, "no such firmware fault", str(fault), fault=True)
 
-    def restarted(self, tick: int) -> None:
-        self.observed.restarted(tick)
-
-    def period(self, record: RobotPeriod, tick: int) -> None:
-        self.observed.take_period(tick, record, self.subject.robot.board)
-
     def end(self, tick: int) -> None:
         if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
             self.failures.clear()
             self.failed = 0
             return
-        self.observed.end_tick = tick
+        super().end(tick)
         found = []
         for expectation in self.expected:
             here = not expectation.slots or self.subject.slot in expectation.slots

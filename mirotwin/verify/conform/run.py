@@ -33,7 +33,7 @@ from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.probe import why_lost
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.rule_monitor import ConformsTo
-from mirotwin.verify.conform.table import presupposed
+from mirotwin.verify.conform.rules import presupposed
 from mirotwin.verify.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 
 FAULTS_KEPT = 20

@@ -6,7 +6,7 @@ import pytest
 
 from mirotwin.desk.robot_port import RobotPort
 from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
-from mirotwin.verify.conform.table import ALL, RULES
+from mirotwin.verify.conform.rules import ALL, RULES
 from tests.mirotwin.desk.rig import ROBOT
 from tests.mutants.build import build, compiler
 from tests.mutants.draw import source_files

@@ -1,13 +1,52 @@
-"""The rules, a chapter a file. `SOURCES`: the pages and sections that they come from."""
+"""All rules, in the order of their numbers, finding one, and what one presupposes."""
 
-FRAME = "protocol/README.md, Frame"
-TURNS = "protocol/README.md, Turns"
-VERSIONS = "protocol/README.md, Versions"
-WHY = "protocol/README.md, Why"
-RECEPTION = "protocol/README.md, Reception"
-FRESHNESS = "protocol/README.md, Freshness and failsafe"
-POWER_ON = "robot_fw/README.md, After power-on"
-PORT = "robot_fw/README.md, LM629: the port"
-WHEELS = "robot_fw/README.md, From LM629 to wheel"
-FIRMWARE = "robot_fw/README.md, The firmware"
-FAULTS = "robot_fw/README.md, Faults: what firmware must not do"
+from __future__ import annotations
+
+from functools import cache
+
+from miro_exact.bad_input import BadInput, did_you_mean
+from mirotwin.verify.conform.rule import Chapter, Rule
+from mirotwin.verify.conform.rules import (
+    answers,
+    boot,
+    chips,
+    driving,
+    failsafe,
+    fresh,
+    reception,
+    service,
+    sound,
+)
+
+CHAPTERS: tuple[Chapter, ...] = (
+    boot.CHAPTER, reception.CHAPTER, fresh.CHAPTER, driving.CHAPTER, failsafe.CHAPTER, service.CHAPTER,
+    answers.CHAPTER, sound.CHAPTER, chips.CHAPTER, boot.STRAPS, sound.LONG,
+)  # fmt: skip
+ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
+LONG: tuple[Rule, ...] = tuple(sound.LONG.rules)
+RULES: tuple[Rule, ...] = tuple(rule for rule in ALL if rule not in LONG)
+"""Those that are tried unless others are asked for."""
+_BY_ID = {rule.id: rule for rule in ALL}
+
+
+def chapter_of(rule: Rule) -> Chapter:
+    """The chapter that a rule stands in."""
+    return next(chapter for chapter in CHAPTERS if rule in chapter.rules)
+
+
+@cache
+def presupposed(rule: Rule) -> tuple[Rule, ...]:
+    """All rules that `rule` presupposes, also by way of others: each after those that it presupposes itself."""
+    found: dict[str, Rule] = {}
+    for one in map(find, rule.presupposes):
+        found |= {other.id: other for other in (*presupposed(one), one)}
+    return tuple(found.values())
+
+
+def find(id: str) -> Rule:
+    """The rule called `id`, in capitals or not. Raises BadInput, with the nearest one that there is."""
+    found = _BY_ID.get(id.upper())
+    if found is not None:
+        return found
+    remedy = f"`mirotwin conform --list` shows {ALL[0].id} to {ALL[-1].id}"
+    raise BadInput("", "", f"there is no rule {id[:40]!r}", did_you_mean(id.upper(), _BY_ID, remedy))

@@ -18,8 +18,7 @@ from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
 from mirotwin.verify.conform.observed import Answer, Observed
-from mirotwin.verify.conform.rule import BOTH, THREE, Chapter, Topology
-from mirotwin.verify.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
+from mirotwin.verify.conform.rule import BOTH, FRAME, FRESHNESS, RECEPTION, THREE, TURNS, Chapter, Topology
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms, over_by
 
 CHAPTER = Chapter("Answers")

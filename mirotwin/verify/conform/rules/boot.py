@@ -10,8 +10,7 @@ from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import Chapter, Topology
-from mirotwin.verify.conform.rules import POWER_ON, TURNS
+from mirotwin.verify.conform.rule import POWER_ON, TURNS, Chapter, Topology
 from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Power-on")

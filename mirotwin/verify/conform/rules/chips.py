@@ -8,8 +8,7 @@ from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
 from miro_sim.periods import Axis
 from mirotwin.verify.conform.observed import Answer, Observed
-from mirotwin.verify.conform.rule import Chapter
-from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
+from mirotwin.verify.conform.rule import FRAME, PORT, POWER_ON, Chapter
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.trial_script import TrialScript
 

@@ -11,8 +11,7 @@ from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.probe import why_deaf
-from mirotwin.verify.conform.rule import Chapter, Topology
-from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
+from mirotwin.verify.conform.rule import FIRMWARE, FRAME, TURNS, Chapter, Topology
 from mirotwin.verify.conform.trial_script import ACTING_MS, Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")

@@ -18,8 +18,7 @@ from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import Chapter
-from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
+from mirotwin.verify.conform.rule import FRESHNESS, WHEELS, Chapter
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")

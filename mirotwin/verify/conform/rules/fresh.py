@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from miro_protocol.table import FRESH_AGAIN_TICKS, FRESH_STEPS, SEQ_MODULUS, TICKS_PER_MS
-from mirotwin.verify.conform.rule import Chapter, Topology
-from mirotwin.verify.conform.rules import FRESHNESS
+from mirotwin.verify.conform.rule import FRESHNESS, Chapter, Topology
 from mirotwin.verify.conform.trial_script import How, TrialScript, ms
 
 CHAPTER = Chapter("Freshness")

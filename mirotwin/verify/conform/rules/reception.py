@@ -11,8 +11,7 @@ from miro_protocol.frames import seal
 from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, FrameType
 from miro_protocol.whitening import whiten
-from mirotwin.verify.conform.rule import BOTH, Chapter, Topology
-from mirotwin.verify.conform.rules import FRAME, RECEPTION, VERSIONS, WHY
+from mirotwin.verify.conform.rule import BOTH, FRAME, RECEPTION, VERSIONS, WHY, Chapter, Topology
 from mirotwin.verify.conform.trial_script import Frame, How, TrialScript
 
 CHAPTER = Chapter("Reception")

@@ -9,8 +9,7 @@ from miro_protocol.table import SYNC, Opcode
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.periods import Axis
-from mirotwin.verify.conform.rule import THREE, Chapter
-from mirotwin.verify.conform.rules import FAULTS, FRESHNESS, POWER_ON, TURNS
+from mirotwin.verify.conform.rule import FAULTS, FRESHNESS, POWER_ON, THREE, TURNS, Chapter
 from mirotwin.verify.conform.rules.boot import keeps_off
 from mirotwin.verify.conform.trial_script import BOOTED_MS, TrialScript, ms
 

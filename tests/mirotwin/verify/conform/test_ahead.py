@@ -11,8 +11,8 @@ import pytest
 
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform import run
+from mirotwin.verify.conform.rules import RULES
 from mirotwin.verify.conform.run import FEWEST, Outcome, tried_ahead, try_all
-from mirotwin.verify.conform.table import RULES
 from tests import children
 from tests.mirotwin.verify.checks.rig import own_image
 from tests.mirotwin.verify.conform.images import FAULTS, HANGS, image_of
@@ -106,7 +106,7 @@ def test_outcomes_are_those_of_one_process(code):
 HOLDS = """
 import os, time
 from mirotwin.verify.conform import run
-from mirotwin.verify.conform.table import RULES
+from mirotwin.verify.conform.rules import RULES
 
 run.has_core = lambda: True
 def tried(rule):

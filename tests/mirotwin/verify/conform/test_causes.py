@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.conform import run
+from mirotwin.verify.conform.rules import RULES, find, presupposed
 from mirotwin.verify.conform.run import Outcome, try_all, with_faults
-from mirotwin.verify.conform.table import RULES, find, presupposed
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
 from tests.mirotwin.verify.conform.images import FAULTS, HANGS, image_of
 from tests.mirotwin.verify.conform.mistakes import MISTAKES

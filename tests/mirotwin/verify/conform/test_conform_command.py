@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mirotwin.verify.conform.table import ALL, RULES
+from mirotwin.verify.conform.rules import ALL, RULES
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
 from tests.mirotwin.verify.conform.images import BABBLES, FAULTS, HANGS, POKES, PUSHES, READS_BOTH, RUNS_OUT

@@ -12,8 +12,8 @@ from miro_robot.image import load_hex
 from miro_sim.world.world import World
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.rule_monitor import ConformsTo
+from mirotwin.verify.conform.rules import ALL, find
 from mirotwin.verify.conform.run import try_rule
-from mirotwin.verify.conform.table import ALL, find
 from mirotwin.verify.conform.trial import trial_of
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, silent_world
 from tests.mirotwin.verify.conform.images import HANGS, image_of
