@@ -11,8 +11,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.settings import EXPECT
-from mirotwin.campaign.comparison import GATED, MetricDifference, both_have, differences
-from mirotwin.campaign.design import Value, inline
+from mirotwin.campaign.comparison import GATED, both_have, differences
+from mirotwin.campaign.design import inline
 from mirotwin.campaign.results import ResultsInfo
 from mirotwin.campaign.rows import VERDICTS, Arm, ResultRows, label_of, paired_levels
 from mirotwin.report.page.bokeh_page import require_bokeh
@@ -49,17 +49,6 @@ MOST_LEVELS = 6
 MOST_COMPARISONS = 12
 LISTED = 300
 """Runs that went wrong; the table says how many there are."""
-
-
-class Comparison(msgspec.Struct, frozen=True):
-    """Two levels of a factor in `pairs` pairs. `figure`: id of its figure's element, "" where there is none."""
-
-    factor: str
-    first: Value
-    second: Value
-    pairs: int
-    differences: list[MetricDifference]
-    figure: str
 
 
 def campaign_page(path: Path) -> bytes:
@@ -102,24 +91,20 @@ def _by(rows: ResultRows) -> tuple[str, ...]:
 
 
 def _arms(rows: ResultRows, by: tuple[str, ...], metrics: Sequence[str], made: dict[str, Any]) -> list[Arm]:
-    from mirotwin.campaign.plots import DrawnArm, spread  # loads Bokeh
+    from mirotwin.campaign.plots import spread  # loads Bokeh
 
-    drawn: dict[str, list[DrawnArm]] = {name: [] for name in metrics}
-    found = []
-    for arm, numbers in rows.arms(by, rows.groups(by), metrics):
-        found.append(arm)
-        for name, summary in arm.metrics.items():
-            if summary is not None:
-                drawn[name].append(DrawnArm(arm.label, numbers[name], summary))
-    made |= {f"plot-{name}": spread(name, arms) for name, arms in drawn.items() if arms}
-    return found
+    found = list(rows.arms(by, rows.groups(by), metrics))
+    for name in metrics:
+        if drawn := [(arm, numbers[name]) for arm, numbers in found if arm.metrics[name] is not None]:
+            made[f"plot-{name}"] = spread(name, drawn)
+    return [arm for arm, _ in found]
 
 
-def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[Comparison]:
-    """Each level of a factor against its first one."""
-    from mirotwin.campaign.plots import Apart, apart  # loads Bokeh
+def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]:
+    """Each level of a factor against its first one. `figure`: id of its figure's element, "" where there is none."""
+    from mirotwin.campaign.plots import apart  # loads Bokeh
 
-    found: list[Comparison] = []
+    found: list[dict[str, Any]] = []
     for factor in rows.about.factors:
         first, *others = rows.levels(factor)
         for second in others[: MOST_LEVELS - 1]:
@@ -127,12 +112,13 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[Comparison]:
             if not pairs or len(found) == MOST_COMPARISONS:
                 continue
             compared = differences(GATED, rows, rows, pairs)
-            shown = [Apart(one, _apart(rows, one.metric, pairs)) for one in compared if one.metric in METRICS]
+            shown = [(one, _apart(rows, one.metric, pairs)) for one in compared if one.metric in METRICS]
             figure = ""
-            if any(one.difference.first and one.difference.interval for one in shown):
+            if any(one.first and one.interval for one, _ in shown):
                 figure = f"plot-pairs-{len(found)}"
                 made[figure] = apart(shown)
-            found.append(Comparison(factor, first, second, len(pairs), compared, figure))
+            levels = {"factor": factor, "first": first, "second": second, "pairs": len(pairs)}
+            found.append({**levels, "differences": compared, "figure": figure})
     return found
 
 

@@ -11,12 +11,12 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 from bokeh.models import ColumnDataSource, DataRange1d, FactorRange, Range1d, Span
 
 from mirotwin.campaign.comparison import MetricDifference
-from mirotwin.campaign.statistics import Figures, Numbers
+from mirotwin.campaign.rows import Arm
+from mirotwin.campaign.statistics import Numbers
 from mirotwin.report.page.axes import at_least, panel, tagged
 
 MOST_DOTS = 1500
@@ -32,34 +32,20 @@ LEAST = {"rms_position_cm": 0.01, "rms_theta_deg": 0.01, "settling_s": 0.05}
 LEAST_PERCENT = 0.1
 
 
-class DrawnArm(msgspec.Struct, frozen=True):
-    """A row of a figure; `numbers` without what a run does not have."""
-
-    label: str
-    numbers: Numbers
-    figures: Figures
-
-
-class Apart(msgspec.Struct, frozen=True):
-    """The difference of a metric in pairs, and each pair's own."""
-
-    difference: MetricDifference
-    numbers: Numbers
-
-
-def spread(metric: str, arms: Sequence[DrawnArm]) -> Any:
-    """A row for each arm, over one range."""
-    labels = [wrapped(arm.label) for arm in arms]
+def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
+    """A row for each arm that has the metric, over one range; with its numbers, without what a run does not have."""
+    labels = [wrapped(arm.label) for arm, _ in arms]
     made = _rows(metric, labels)
-    _dots(made, [(label, arm.numbers) for label, arm in zip(labels, arms, strict=True)])
-    _widen(made, LEAST[metric], *(arm.numbers for arm in arms))
-    quantiles = [arm.figures.quantiles for arm in arms]
+    _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])
+    _widen(made, LEAST[metric], *(numbers for _, numbers in arms))
+    figures = [found for arm, _ in arms if (found := arm.metrics[metric]) is not None]
+    quantiles = [one.quantiles for one in figures]
     source = ColumnDataSource(
         {
             "arm": labels,
             **{name: [one[share] for one in quantiles] for name, share in (("q05", "0.05"), ("q25", "0.25"))},
             **{name: [one[share] for one in quantiles] for name, share in (("q75", "0.75"), ("q95", "0.95"))},
-            "median": [arm.figures.median for arm in arms],
+            "median": [one.median for one in figures],
         }
     )
     whisker = made.segment(x0="q05", x1="q95", y0="arm", y1="arm", source=source, line_width=1.4)
@@ -73,23 +59,23 @@ def spread(metric: str, arms: Sequence[DrawnArm]) -> Any:
     return made
 
 
-def apart(found: Sequence[Apart]) -> Any:
+def apart(found: Sequence[tuple[MetricDifference, Numbers]]) -> Any:
     """Differences in per cent of the first one's mean: each pair a dot, the mean with its interval."""
-    shown = [one for one in found if one.difference.first and one.difference.interval is not None]
-    labels = [one.difference.metric for one in shown]
+    shown = [(one, numbers) for one, numbers in found if one.first and one.interval is not None]
+    labels = [one.metric for one, _ in shown]
     made = _rows("difference, % of the first's mean", labels)
     made.add_layout(tagged(Span(location=0.0, dimension="height", line_width=1.2), line_color="ink"))
-    scale = [100.0 / abs(one.difference.first) for one in shown]
-    numbers = [one.numbers * by for one, by in zip(shown, scale, strict=True)]
+    scale = [100.0 / abs(one.first) for one, _ in shown]
+    numbers = [each * by for (_, each), by in zip(shown, scale, strict=True)]
     _dots(made, list(zip(labels, numbers, strict=True)))
     _widen(made, LEAST_PERCENT, [0.0], *numbers)
-    intervals = [one.difference.interval for one in shown if one.difference.interval is not None]
+    intervals = [one.interval for one, _ in shown if one.interval is not None]
     source = ColumnDataSource(
         {
             "arm": labels,
             "low": [one.low * by for one, by in zip(intervals, scale, strict=True)],
             "high": [one.high * by for one, by in zip(intervals, scale, strict=True)],
-            "mean": [one.difference.difference * by for one, by in zip(shown, scale, strict=True)],
+            "mean": [one.difference * by for (one, _), by in zip(shown, scale, strict=True)],
         }
     )
     interval = made.hbar(

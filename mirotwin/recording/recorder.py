@@ -10,11 +10,12 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_robot.faults import FirmwareFault
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels, topics
@@ -38,19 +39,6 @@ TOGETHER = 40
 BROKEN_OFF = "mirotwin.broken_off"
 """Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed,
 and when, if that is why."""
-
-
-class AnyFault(Protocol):
-    """What a recording keeps of a firmware fault (`miro_robot.faults.FirmwareFault`)."""
-
-    @property
-    def kind(self) -> int: ...
-    @property
-    def tick(self) -> int: ...
-    @property
-    def pc(self) -> int: ...
-    @property
-    def symbol(self) -> str: ...
 
 
 class RunSource(msgspec.Struct, frozen=True):
@@ -176,7 +164,7 @@ class Recorder:
         """Adds one LM629 sample of a robot (full recordings)."""
         self.write((topics.robot_topic(network, slot, "samples"), sample.tick, sample))
 
-    def write_faults(self, network: int, slot: int, faults: Sequence[AnyFault]) -> None:
+    def write_faults(self, network: int, slot: int, faults: Sequence[FirmwareFault]) -> None:
         """Adds a robot's firmware faults."""
         topic = topics.robot_topic(network, slot, "fault")
         for fault in faults:

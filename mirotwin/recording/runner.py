@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
@@ -75,8 +75,8 @@ def _run_samples(world: World, recorder: Recorder) -> None:
         world.run_to(tick)
         if world.finished:
             return
-        for network, robot in _robots(world):
-            recorder.write_sample(network, robot.spec.slot, _sample(tick, robot))
+        for robot in world.robots:
+            recorder.write_sample(robot.network, robot.slot, _sample(tick, robot))
 
 
 def _sample(tick: int, robot: Any) -> SampleMessage:
@@ -96,11 +96,8 @@ def _sample(tick: int, robot: Any) -> SampleMessage:
 
 def faults_by_robot(world: World) -> list[tuple[int, int, list[FirmwareFault]]]:
     """(network, slot, faults) of every robot that has any."""
-    return [
-        (network, robot.spec.slot, list(robot.board.faults))
-        for network, robot in _robots(world)
-        if robot.board.faults
-    ]
+    faulty = [robot for robot in world.robots if robot.board.faults]
+    return [(robot.network, robot.slot, list(robot.board.faults)) for robot in faulty]
 
 
 def report_faults(world: World) -> int:
@@ -110,9 +107,3 @@ def report_faults(world: World) -> int:
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         complain(f"firmware fault: net{network}/robot{slot}: {faults[0]}{more}")
     return FIRMWARE_FAULT if found else DONE
-
-
-def _robots(world: World) -> Iterator[tuple[int, Any]]:
-    for index, network in enumerate(world.networks):
-        for robot in network.robots:
-            yield index, robot

@@ -15,9 +15,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
 from miro_protocol.actions import Power, Reset, ScriptItem
-from miro_protocol.events import Received
 from miro_protocol.stream_header import Header
-from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image, Symbol, Symbols, parse_hex
 from miro_sim.periods import Period
@@ -30,6 +28,7 @@ from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 from miro_sim.scenario.settings import in_text
 from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
+from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.shell.command import command_line, operand
@@ -96,16 +95,8 @@ def check_actions(script: Sequence[ScriptItem], path: str, scenario: Scenario) -
 
 def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
     """3 or 5: the layout in which more of the frames from hosts can be read."""
-    script = sent_in(sent)
-    counts = {robots: _frames(script, robots) for robots in ROBOT_COUNTS}
+    counts = frame_counts(sent_in(sent))
     return 5 if counts[5] > counts[3] else 3
-
-
-def _frames(script: Iterable[Transmission], robots: int) -> int:
-    from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
-
-    decoder = Decoder(robots)
-    return len([event for one in script for event in decoder.hear(one) if isinstance(event, Received)])
 
 
 def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | None = None) -> Scenario:

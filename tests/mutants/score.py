@@ -102,8 +102,8 @@ def jobs_of(count, seed, tried=()):
 def judged(image, tried=()):
     """Rules that an image breaks, each tried by itself, and the processor time; `tried`: () is all of them."""
     from miro_robot.image import load_hex  # a new process gets its engine first
-    from mirotwin.verify.conform.run import try_rule, with_faults
     from mirotwin.verify.conform.rules import RULES
+    from mirotwin.verify.conform.run import try_rule, with_faults
 
     rules = [rule for rule in RULES if not tried or rule.id in tried]
     begun = time.process_time()

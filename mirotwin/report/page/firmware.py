@@ -1,4 +1,4 @@
-"""What the firmware did, as rows of a page: cycles by function, interrupts, and the lines that ran.
+"""The lines of the firmware that ran, as rows of a page.
 
 Source files go by their names alone: a page says nothing of the folders of the machine that made it.
 """
@@ -22,39 +22,18 @@ from miro_robot.inspect.coverage import (
     line_share,
 )
 from miro_robot.inspect.lcov import FileRecord, Tracefile
-from miro_robot.inspect.profile import Profile
 
 SHOWN = 12
 """Functions that stand in the open; the rest is folded."""
 
 
-class FunctionRow(msgspec.Struct, frozen=True):
-    """`share`: of the cycles awake, `width`: of the longest bar; both in per cent."""
-
-    name: str
-    calls: int
-    cycles: int
-    share: float
-    width: float
-
-
-class SourceRow(msgspec.Struct, frozen=True):
-    """A line of a source file. `count`: how often it ran, None where it is no code."""
-
-    number: int
-    count: int | None
-    text: str
-
-
 class SourceFile(msgspec.Struct, frozen=True):
+    """`rows`: number and text of each line, and between them how often it ran, None where it is no code."""
+
     name: str
     lines: Share
     branches: Share
-    rows: list[SourceRow]
-
-    @property
-    def percent(self) -> float:
-        return 100.0 * self.lines.hit / self.lines.total if self.lines.total else 100.0
+    rows: list[tuple[int, int | None, str]]
 
 
 class CoverageRows(msgspec.Struct, frozen=True):
@@ -65,15 +44,6 @@ class CoverageRows(msgspec.Struct, frozen=True):
     branches: Share
     instructions: Share
     listing: bool
-
-
-def function_rows(profile: Profile) -> list[FunctionRow]:
-    awake = profile.cycles - profile.asleep_cycles
-    most = max((one.cycles for one in profile.functions), default=0)
-    return [
-        FunctionRow(one.name, one.calls, one.cycles, _percent(one.cycles, awake), _percent(one.cycles, most))
-        for one in profile.functions
-    ]
 
 
 def coverage_rows(image: Image, counts: Counts, sources: Sources) -> CoverageRows:
@@ -98,16 +68,12 @@ def coverage_rows(image: Image, counts: Counts, sources: Sources) -> CoverageRow
 def _file(name: str, lines: list[str], record: FileRecord) -> SourceFile:
     """Without its text, only the lines that are code."""
     if lines:
-        rows = [SourceRow(number, record.lines.get(number), text) for number, text in enumerate(lines, 1)]
+        rows = [(number, record.lines.get(number), text) for number, text in enumerate(lines, 1)]
     else:
-        rows = [SourceRow(number, count, "") for number, count in sorted(record.lines.items())]
+        rows = [(number, count, "") for number, count in sorted(record.lines.items())]
     one = {name: record}
     return SourceFile(name, line_share(one), branch_share(one), rows)
 
 
 def _base(name: str) -> str:
     return PurePath(name).name
-
-
-def _percent(part: int, whole: int) -> float:
-    return 100.0 * part / whole if whole else 0.0

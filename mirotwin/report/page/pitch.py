@@ -16,31 +16,18 @@ MOST_POINTS = 4000
 HALF_CM = 100.0 * ground.ROBOT_HALF_M
 
 
-class Path(msgspec.Struct, frozen=True):
-    """`points` as an SVG polyline has them."""
-
-    robot: int
-    kind: str
-    points: str
-
-
-class Dots(msgspec.Struct, frozen=True):
-    """Measured places, as one SVG path of dots."""
-
-    robot: int
-    data: str
-
-
 class Pitch(msgspec.Struct, frozen=True):
-    """`view_box` takes in the whole pitch and all paths."""
+    """`view_box` takes in the whole pitch and all paths. `paths`: number of the robot, truth or reference, and points
+    as an SVG polyline has them; `dots`: of each robot the measured places, as one SVG path.
+    """
 
     view_box: str
-    left: float
-    bottom: float
-    length: float
-    width: float
-    paths: list[Path]
-    dots: list[Dots]
+    paths: list[tuple[int, str, str]]
+    dots: list[str]
+    left: float = 100.0 * ground.LEFT_M
+    bottom: float = 100.0 * ground.BOTTOM_M
+    length: float = 100.0 * ground.LENGTH_M
+    width: float = 100.0 * ground.WIDTH_M
     half: float = HALF_CM
 
 
@@ -55,20 +42,12 @@ def pitch_of(tracks: PageTracks) -> Pitch:
         for kind, postures in kinds:
             places = _places(postures)
             corners += [(x, y) for x, y in places if math.isfinite(x + y)]
-            paths.append(Path(number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
+            paths.append((number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
         seen = [place for place in _places(robot.measured) if not math.isnan(place[0])]
-        dots.append(Dots(number, "".join(f"M{x:.2f} {y:.2f}h0" for x, y in seen)))
+        dots.append("".join(f"M{x:.2f} {y:.2f}h0" for x, y in seen))
     left, right = min(x for x, _ in corners) - MARGIN_CM, max(x for x, _ in corners) + MARGIN_CM
     bottom, top = min(y for _, y in corners) - MARGIN_CM, max(y for _, y in corners) + MARGIN_CM
-    return Pitch(
-        view_box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
-        left=100.0 * ground.LEFT_M,
-        bottom=100.0 * ground.BOTTOM_M,
-        length=100.0 * ground.LENGTH_M,
-        width=100.0 * ground.WIDTH_M,
-        paths=paths,
-        dots=dots,
-    )
+    return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, dots)
 
 
 def _places(postures: Postures) -> list[tuple[float, float]]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
+from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.coverage import Counts, counts_of
@@ -23,23 +24,16 @@ from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.interface import Check, Expectation, Failure
 
 
-class RobotFault(msgspec.Struct, frozen=True):
-    """What the firmware of a robot did that it must not do."""
-
-    network: int
-    slot: int
-    tick: int
-    text: str
-
-
 class Reproduction(msgspec.Struct, frozen=True):
-    """Its result. `image` has its debug files where they are; `robot`: whose processor was watched."""
+    """Its result. `faults`: network, slot and fault. `image` has its debug files where they are; `robot`: whose
+    processor was watched.
+    """
 
     periods: list[Period]
     digest: str
     verdicts: tuple[Expectation, ...]
     failures: list[Failure]
-    faults: list[RobotFault]
+    faults: list[tuple[int, int, FirmwareFault]]
     marks: list[LinkMark]
     image: Image
     robot: str
@@ -71,18 +65,10 @@ def reproduce(
         digest=world.digest,
         verdicts=again.checks.verdicts(),
         failures=again.failures,
-        faults=_faults(world),
+        faults=[(robot.network, robot.slot, one) for robot in world.robots for one in robot.board.faults],
         marks=log.marks(),
         image=image,
         robot=f"net{place[0]}/robot{place[1]}",
         profile=profile_of(image, counters, activity),
         counts=counts_of(counters),
     )
-
-
-def _faults(world: World) -> list[RobotFault]:
-    return [
-        RobotFault(robot.network, robot.slot, fault.tick, f"{fault}")
-        for robot in world.robots
-        for fault in robot.board.faults
-    ]

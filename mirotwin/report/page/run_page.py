@@ -19,7 +19,7 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
 from mirotwin.recording.track import Column, Postures
 from mirotwin.report.page.document import render
-from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
+from mirotwin.report.page.firmware import SHOWN, coverage_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.pitch import pitch_of
@@ -84,9 +84,9 @@ def run_page(material: Material) -> bytes:
     tracks = tracks_of(material.periods, steered, delay_frames, material.shown)
     add_samples(tracks, material.extras.samples)
     marks = _within(again.marks, tracks)
-    ticks = [*(one.tick for one in again.failures), *(one.tick for one in again.faults)]
+    ticks = [*(one.tick for one in again.failures), *(fault.tick for _, _, fault in again.faults)]
     figures = figures_of(tracks, marks, [tick for tick in ticks if _shows(tracks, tick)])
-    functions, kinds = function_rows(again.profile), {mark.kind for mark in marks}
+    kinds = {mark.kind for mark in marks}
     values = {
         "about": material.about,
         "title": scenario.title,
@@ -103,7 +103,6 @@ def run_page(material: Material) -> bytes:
         "steps": material.steps,
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, _counts(marks, lane)) for lane in lanes_of(marks)],
-        "functions": functions,
         "functions_shown": SHOWN,
         "interrupts": [one for one in again.profile.interrupts if one.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),

@@ -161,12 +161,13 @@ def test_a_campaign_says_what_is_missing_without_javascript(page):
 
 
 def test_axes_do_not_show_rounding_noise():
-    from mirotwin.campaign.plots import LEAST, DrawnArm, spread
+    from mirotwin.campaign.plots import LEAST, spread
+    from mirotwin.campaign.rows import Arm
     from mirotwin.campaign.statistics import figures
 
     numbers = np.array([1.0, 1.0 + 2e-16, 1.0 - 1e-16, 1.0])
     for metric, least in LEAST.items():
-        ends = spread(metric, [DrawnArm("all", numbers, figures(numbers, np.arange(4)))]).x_range
+        ends = spread(metric, [(Arm({}, 4, {}, {metric: figures(numbers, np.arange(4))}), numbers)]).x_range
         assert ends.end - ends.start == pytest.approx(least)
         assert ends.start < 1.0 < ends.end
 

@@ -98,8 +98,7 @@ def test_samples_of_a_full_recording_go_to_their_robots():
 
 def test_the_path_of_a_long_run_is_thinned_but_keeps_its_ends():
     tracks = tracks_of(list(synthetic.periods(2 * MOST_POINTS + 4)), [True], 0)
-    path = next(path for path in pitch_of(tracks).paths if path.kind == "truth")
-    points = path.points.split()
+    points = next(points for _, kind, points in pitch_of(tracks).paths if kind == "truth").split()
     assert len(points) <= MOST_POINTS + 1
     truth = tracks.robots[0].truth
     for point, index in ((points[0], 0), (points[-1], -1)):
