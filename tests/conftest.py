@@ -6,10 +6,13 @@ of which stay until its end. Each full collection would walk through them; a pyt
 
 import gc
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+settings.register_profile(
+    "long", deadline=None, max_examples=1000, print_blob=True, suppress_health_check=list(HealthCheck)
+)
 
 
 def pytest_sessionstart():

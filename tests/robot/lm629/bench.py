@@ -22,10 +22,11 @@ class Bench:
 
     @classmethod
     def running(cls, **options):
-        """A bench whose chip has gone through the reset handshake."""
+        """A bench whose chip has gone through the reset handshake, on a wheel whose phases are low."""
         bench = cls(Lm629(Lm629Options(**options)))
         bench.reset()
         bench.command("RSTI", 0)
+        bench.chip.set_encoder(bench.tick, 0, 0)
         return bench
 
     def wait(self, ticks):
@@ -106,9 +107,24 @@ class Bench:
         words = [word for value in values for word in (value >> 16 & 0xFFFF, value & 0xFFFF)]
         self.command("LTRJ", control, *words)
 
+    def start(self, control, *values, samples=1):
+        """LTRJ, STT, and so many samples."""
+        self.load(control, *values)
+        self.command("STT")
+        self.sample(samples)
+
     def filter(self, kp=0, ki=0, kd=0, il=0, ds=0):
         self.command("LFIL", ds << 8 | 0x0F, kp, ki, kd, il)
         self.command("UDF")
+
+    def closed(self, error, samples=1, **coefficients):
+        """The loop closed with a constant error."""
+        self.filter(**coefficients)
+        self.start(0x0200)
+        self.command("RSTI", 0)
+        self.sample()
+        self.chip.trajectory.position = error * 65536
+        self.sample(samples)
 
     def sample(self, count=1):
         """To the next sample boundary, `count` times."""

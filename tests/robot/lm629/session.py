@@ -4,45 +4,31 @@
 """
 
 import hashlib
+import random
 import sys
 
 from miro_exact import engine
 
 
-def numbers(seed):
-    """A 64-bit linear congruential generator, upper half."""
-    state = seed
-    while True:
-        state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
-        yield state >> 32
-
-
 def steps(seed, count):
     """(kind, a, b, c, d): what the session does, one step after the other."""
-    draw = numbers(seed)
-    for _ in range(count):
-        yield tuple(next(draw) for _ in range(5))
+    draw = random.Random(seed)
+    return [tuple(draw.getrandbits(32) for _ in range(5)) for _ in range(count)]
 
 
 def play(bench, step, place):
     """One step on a `Bench`; returns where the wheel stands."""
-    from tests.robot.lm629.bench import Bench
-
-    assert isinstance(bench, Bench)
     kind, a, b, c, d = step
     running = bench.chip.mode == 2
     kind %= 10
     if kind == 0 and running:
-        bench.load(0x002A | (a & 0x1801), b % 0x20000, c % 0x100000, d % 2000 - 1000)
-        bench.command("STT")
+        bench.start(0x002A | (a & 0x1801), b % 0x20000, c % 0x100000, d % 2000 - 1000, samples=0)
     elif kind == 1 and running:
-        bench.load(0x0828 | (a & 0x1000), 0x4000, c % 0x80000)
-        bench.command("STT")
+        bench.start(0x0828 | (a & 0x1000), 0x4000, c % 0x80000, samples=0)
     elif kind == 2 and running:
         bench.filter(a % 200, b % 200, c % 400, d % 0x8000, a % 3)
     elif kind == 3 and running:
-        bench.load((0, 0x100, 0x200, 0x400)[a % 4])
-        bench.command("STT")
+        bench.start((0, 0x100, 0x200, 0x400)[a % 4], samples=0)
     elif kind == 4:
         bench.write(a % 2, b % 256)
     elif kind == 5:

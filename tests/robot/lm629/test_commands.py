@@ -1,4 +1,6 @@
-"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on."""
+"""What the commands do: byte sequences of the data sheet, the programming guide and drivers of real chips, double
+buffering, flags.
+"""
 
 import pytest
 
@@ -22,9 +24,7 @@ def send(bench, text):
 def moving(acceleration=0x8000, velocity=0x20000, position=1000):
     """A position move that has run for 5 samples."""
     bench = Bench.running()
-    bench.load(0x002A, acceleration, velocity, position)
-    bench.command("STT")
-    bench.sample(5)
+    bench.start(0x002A, acceleration, velocity, position, samples=5)
     return bench
 
 
@@ -68,19 +68,6 @@ def test_published_filters_reach_the_working_registers_with_udf_only():
     assert (pid.kp, pid.ds) == (368, 0)
 
 
-def test_a_complete_data_sheet_move_takes_59121_samples():
-    bench = Bench.running()
-    send(bench, "1F | 002A | 0000 000F | 0006 D1EC | 0003 0D40")
-    bench.sample()
-    bench.command("STT")
-    origin = bench.chip.sample_tick
-    bench.chip.advance(origin + 59119 * 8192)
-    assert bench.chip.status == 0x20  # the motor does not turn: only the error is excessive
-    bench.chip.advance(origin + 59120 * 8192)
-    assert bench.chip.status == 0x24
-    assert bench.chip.desired_position == 200000
-
-
 def test_polarity_test_of_a_real_driver_gives_constant_full_drive():
     bench = Bench.running()
     send(bench, "1E | 0008 | 0870; 04; 1F | 002A | 0000 2000 | 0500 0000 | 3FFF FFFF; 01")
@@ -106,46 +93,47 @@ def test_velocity_mode_words_of_the_field():
     assert bench.status() & COMPLETE == 0
 
 
+@pytest.mark.parametrize(("word", "velocity"), [("1808", 0x10000), ("0808", -0x10000)])
+def test_velocity_alone_keeps_the_acceleration(word, velocity):
+    bench = moving()
+    send(bench, f"1F | {word} | 0001 0000; 01")
+    bench.sample(12)
+    assert bench.ask("RDDV") == velocity
+    assert bench.chip.trajectory.acceleration == 0x8000
+
+
+def test_the_reset_loop_that_four_drivers_share():
+    """Pulse, look for 00h at once, wait for 84h or C4h, RSTI 0000h, look for 80h or C0h, else once more."""
+    bench = Bench()
+    for _ in range(3):
+        bench.reset(wait=False)
+        assert 0x00 in [bench.status() for _ in range(20)]
+        bench.wait(36_000)  # 1.5 ms
+        if bench.status() not in (0x84, 0xC4):
+            continue
+        bench.command("RSTI", 0)
+        bench.ready()
+        if bench.status() in (0x80, 0xC0):
+            return
+    pytest.fail("the loop never ends")
+
+
+def test_polling_busy_before_each_byte_does_no_harm():
+    bench = Bench.running()
+    bench.command("SBPA")
+    for byte in (0x00, 0x01, 0x02, 0x03):
+        bench.ready()
+        bench.write(1, byte)
+    assert bench.chip.breakpoint == 0x00010203
+    bench.command("RDSIGS")
+    answer = []
+    for _ in range(2):
+        bench.ready()
+        answer.append(bench.read(1))
+    assert bytes(answer) == b"\x01\x80"
+
+
 # ------------------------------------------------------------------------------- starting and stopping
-
-
-def test_position_only_reuses_acceleration_and_velocity():
-    bench = moving(position=10)
-    bench.sample(20)
-    assert bench.status() & COMPLETE
-    bench.load(0x0002, 0)
-    bench.command("STT")
-    bench.sample(30)
-    assert bench.ask("RDDP") == 0
-    assert bench.signals() & 0x0400
-
-
-def test_relative_parameters_add_to_the_working_ones():
-    bench = moving(position=10)
-    bench.sample(20)
-    bench.load(0x003F, 0x100, -0x1000, -25)
-    bench.command("STT")
-    bench.sample()
-    profile = bench.chip.trajectory
-    assert (profile.acceleration, profile.max_velocity, profile.target) == (0x8100, 0x1F000, -15)
-    bench.command("STT")
-    bench.sample()
-    assert profile.target == -15
-
-
-@pytest.mark.parametrize(("base", "target"), [("target", 1100), ("desired", 108), ("real", 104)])
-def test_relative_positions_may_be_read_in_three_ways(base, target):
-    bench = Bench.running(relative_base=base)
-    bench.chip.set_encoder(bench.tick, 0, 0)
-    bench.load(0x002A, 0x8000, 0x20000, 1000)
-    bench.command("STT")
-    bench.turn(4)
-    bench.sample(5)
-    before = bench.chip.desired_position
-    bench.load(0x0003, 100)
-    bench.command("STT")
-    bench.sample()
-    assert bench.chip.trajectory.target == (100 + before if base == "desired" else target)
 
 
 def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
@@ -157,37 +145,9 @@ def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
     assert bench.status() & ERROR
     bench.sample(3)
     assert bench.chip.trajectory.acceleration == 0x8000
-    bench.load(0x0400)
-    bench.command("STT")
-    bench.sample(10)
+    bench.start(0x0400, samples=10)
     assert bench.chip.trajectory.acceleration == 0x4000
     assert bench.signals() & 0x4400 == 0x0400
-
-
-def test_a_smooth_stop_in_position_mode_completes():
-    bench = moving()
-    bench.load(0x0400)
-    bench.command("STT")
-    bench.sample(2)
-    assert bench.status() & COMPLETE == 0
-    bench.sample(5)
-    assert bench.status() & COMPLETE
-    assert bench.ask("RDDV") == 0
-    assert bench.ask("RDDP") < 20
-
-
-def test_an_abrupt_stop_takes_the_real_position_as_target():
-    bench = moving()
-    bench.chip.set_encoder(bench.tick, 0, 0)
-    bench.turn(3)
-    bench.load(0x0200)
-    bench.command("STT")
-    bench.sample()
-    assert bench.ask("RDDP") == 3
-    bench.ready()
-    assert bench.status() == COMPLETE
-    bench.sample(3)
-    assert bench.ask("RDDP") == 3
 
 
 @pytest.mark.parametrize("word", [0x0100, 0x0900])
@@ -203,20 +163,16 @@ def test_motor_off_drops_the_drive_and_a_new_start_begins_at_the_real_position(w
     bench.sample()
     assert bench.status() & (MOTOR_OFF | COMPLETE) == MOTOR_OFF | COMPLETE
     assert (bench.chip.pwm, bench.chip.sign, bench.chip.pwm_magnitude) == (0, 0, 0)
-    bench.chip.set_encoder(bench.tick, 0, 0)
     bench.turn(50)
     bench.sample()
     assert bench.ask("RDDP") == 50
-    bench.load(0x0002, 50)
-    bench.command("STT")
-    bench.sample()
+    bench.start(0x0002, 50)
     assert bench.status() & MOTOR_OFF == 0
     assert bench.chip.desired_position == 50
 
 
 def test_define_home_shifts_the_move_in_progress():
     bench = moving()
-    bench.chip.set_encoder(bench.tick, 0, 0)
     bench.turn(8)
     bench.sample()
     desired = bench.ask("RDDP")
@@ -225,13 +181,6 @@ def test_define_home_shifts_the_move_in_progress():
     assert bench.ask("RDDP") - (desired - 8) in (0, 2)  # a sample may have passed
     assert bench.chip.trajectory.target == 992
     assert bench.chip.trajectory_buffer.position == 1000
-
-
-def test_trajectory_complete_comes_though_the_encoder_never_moves():
-    bench = moving(position=30)
-    bench.sample(30)
-    assert bench.status() & COMPLETE
-    assert bench.ask("RDRP") == 0
 
 
 def test_the_port_commands_of_the_lm628_move_bit_8_and_no_pin():
@@ -258,25 +207,60 @@ def test_a_reset_selects_the_8_bit_output_again():
 # ------------------------------------------------------------------------------- flags and interrupts
 
 
-def test_a_breakpoint_comes_before_the_end_of_the_move():
-    bench = moving(position=40)
-    bench.filter(kp=10)
-    bench.chip.set_encoder(bench.tick, 0, 0)
-    bench.command("RSTI", 0)
-    bench.command("MSKI", 0x007E)
-    bench.command("SBPA", 0, 12)
-    order = []
-    for _ in range(40):
-        bench.turn(0)
-        place = bench.chip.real_position
-        for n in range(place + 1, min(bench.chip.desired_position, place + 4) + 1):
-            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[n % 4]
-            bench.chip.set_encoder(bench.tick, a, b)
-            bench.wait(32)
-        bench.sample()
-        order += [bench.chip.status & 0x7E] if not order or order[-1] != bench.chip.status & 0x7E else []
-    assert order == [0, BREAKPOINT, BREAKPOINT | COMPLETE]
-    assert bench.chip.hi == 1
+def command_error(bench):
+    bench.ready()
+    bench.write(0, 0x55)
+
+
+def trajectory_complete(bench):
+    bench.start(0x002A, 0x8000, 0x20000, 2, samples=10)
+
+
+def index_pulse(bench):
+    bench.command("SIP")
+    bench.chip.set_index(bench.tick, 0)
+    bench.wait(100)
+    bench.sample()
+
+
+def wrap_around(bench):
+    bench.chip.real_position = -(2**30)
+    bench.turn(-4)
+    bench.sample()
+
+
+def excessive_error(bench):
+    bench.command("LPEI", 1)
+    bench.start(0x002A, 0x8000, 0x20000, 1000, samples=5)
+
+
+def breakpoint_reached(bench):
+    bench.command("SBPA", 0, 4)
+    bench.turn(8)
+    bench.sample()
+
+
+CONDITIONS = (
+    command_error,
+    trajectory_complete,
+    index_pulse,
+    wrap_around,
+    excessive_error,
+    breakpoint_reached,
+)
+
+
+@pytest.mark.parametrize(("bit", "provoke"), list(enumerate(CONDITIONS, start=1)))
+def test_each_of_the_six_conditions_interrupts_by_its_own_bit_of_the_mask(bit, provoke):
+    for mask, hi in ((1 << bit, 1), (0x7E & ~(1 << bit), 0)):
+        bench = Bench.running()
+        bench.command("MSKI", mask)
+        provoke(bench)
+        assert bench.chip.status & 0x7E == 1 << bit
+        assert bench.chip.hi == hi == bench.signals() >> 15
+        bench.command("RSTI", 0x7E & ~(1 << bit))
+        bench.ready()
+        assert bench.chip.hi == 0
 
 
 def test_a_relative_breakpoint_counts_from_the_target():
@@ -303,9 +287,7 @@ def test_excessive_error_flags_or_stops():
 
 def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
     bench = Bench.running()
-    bench.load(0x1828, 0x100000, 0x100000)
-    bench.command("STT")
-    bench.sample(2)
+    bench.start(0x1828, 0x100000, 0x100000, samples=2)
     bench.chip.trajectory.position = (2**30 - 20) * 65536
     bench.sample()
     assert bench.status() & WRAP == 0
@@ -313,7 +295,6 @@ def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
     assert bench.status() & WRAP
     assert bench.ask("RDDP") == -(2**30) + 12
     bench.command("RSTI", 0x006E)
-    bench.chip.set_encoder(bench.tick, 0, 0)
     bench.chip.real_position = -(2**30)
     bench.turn(-1)
     bench.sample()

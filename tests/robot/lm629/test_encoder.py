@@ -59,27 +59,6 @@ def test_any_edges_count_like_a_sampler_that_looks_at_every_clock(filter_clocks,
     assert (ours.counts, caught) == theirs.take(tick + 400)
 
 
-def test_a_state_of_8_clocks_counts_and_one_of_7_does_not():
-    for clocks, counted in ((8, 1), (7, 0)):
-        encoder = Encoder(8)
-        encoder.set_phases(0, 0, 0)
-        encoder.set_phases(100, 1, 0)
-        encoder.set_phases(100 + 4 * clocks, 1, 1)
-        encoder.set_phases(100 + 4 * clocks + 2, 1, 1)
-        encoder.settle(100 + 4 * clocks)
-        assert encoder.counts == counted
-
-
-def test_the_first_state_is_where_the_wheel_stands():
-    encoder = Encoder(8)
-    encoder.set_phases(0, 1, 1)
-    encoder.settle(1000)
-    assert encoder.counts == 0
-    encoder.set_phases(1000, 0, 1)
-    encoder.settle(2000)
-    assert encoder.counts == 1
-
-
 def test_a_leading_b_counts_up_and_4_counts_are_a_line():
     bench = Bench.running()
     bench.turn(0)

@@ -21,12 +21,12 @@ def generator(a, limit, target, **modes):
     return trajectory
 
 
-def run(trajectory, change=None):
-    """Velocities and whole positions until the target; `change` is done before the 7th sample."""
+def run(trajectory, change=()):
+    """Velocities and whole positions until the target; `change` is made before the 7th sample."""
     velocities, positions = [], []
     while trajectory.moving:
-        if len(velocities) == 6 and change is not None:
-            change(trajectory)
+        for name in change if len(velocities) == 6 else ():
+            setattr(trajectory, name, change[name])
         finished = trajectory.step()
         velocities.append(trajectory.velocity)
         positions.append(trajectory.position >> 16)
@@ -34,47 +34,40 @@ def run(trajectory, change=None):
     return velocities, positions
 
 
-def counts(text):
-    return [int(Fraction(item) * 65536) for item in text.split(",")]
+BY_HAND = {  # acceleration, limit, target, what changes on the way; velocities in 1/65536 count, whole positions
+    "trapezoid": (
+        (0x10000, 0x30000, 20, {}),
+        "10000 20000 30000 30000 30000 30000 20000 20000 10000 0",
+        [1, 3, 6, 9, 12, 15, 17, 19, 20, 20],
+    ),
+    "triangle backwards": (
+        (0x10000, 0x30000, -7, {}),
+        "-10000 -20000 -20000 -10000 0",
+        [-1, -3, -5, -6, -7],
+    ),
+    "fractions": ((0x8000, 0x20000, 5, {}), "8000 10000 18000 10000 8000 0", [0, 1, 3, 4, 4, 5]),
+    "odd fractions": (
+        (0x9C40, 0x186A0, 10, {}),
+        "9C40 13880 186A0 186A0 186A0 186A0 EA60 4E20 4E20 0",
+        [0, 1, 3, 4, 6, 7, 8, 9, 9, 10],
+    ),
+    "a new limit on the way": (
+        (0x10000, 0x30000, 20, {"max_velocity": 0x10000}),
+        "10000 20000 30000 30000 30000 30000 20000 10000 10000 0",
+        [1, 3, 6, 9, 12, 15, 17, 18, 19, 20],
+    ),
+    "a new target behind the axis": (
+        (0x10000, 0x30000, 20, {"target": 5}),
+        "10000 20000 30000 30000 30000 30000 20000 10000 0 -10000 -20000 -30000 -30000 -20000 -10000 0",
+        [1, 3, 6, 9, 12, 15, 17, 18, 18, 17, 15, 12, 9, 7, 6, 5],
+    ),
+}
 
 
-def numbers(text, base=10):
-    return [int(item, base) for item in text.split(",")]
-
-
-def test_trapezoid_to_20_counts():
-    velocities, positions = run(generator(0x10000, 0x30000, 20))
-    assert velocities == counts("1,2,3,3,3,3,2,2,1,0")
-    assert positions == numbers("1,3,6,9,12,15,17,19,20,20")
-
-
-def test_triangle_to_minus_7_counts():
-    velocities, positions = run(generator(0x10000, 0x30000, -7))
-    assert velocities == counts("-1,-2,-2,-1,0")
-    assert positions == numbers("-1,-3,-5,-6,-7")
-
-
-def test_moves_with_fractions_land_exactly():
-    velocities, positions = run(generator(0x8000, 0x20000, 5))
-    assert velocities == numbers("8000,10000,18000,10000,8000,0", 16)
-    assert positions == numbers("0,1,3,4,4,5")
-    velocities, positions = run(generator(0x9C40, 0x186A0, 10))
-    assert velocities == numbers("9C40,13880,186A0,186A0,186A0,186A0,EA60,4E20,4E20,0", 16)
-    assert positions == numbers("0,1,3,4,6,7,8,9,9,10")
-
-
-def test_the_velocity_may_change_on_the_way():
-    velocities, positions = run(
-        generator(0x10000, 0x30000, 20), lambda t: setattr(t, "max_velocity", 0x10000)
-    )
-    assert velocities == counts("1,2,3,3,3,3,2,1,1,0")
-    assert positions == numbers("1,3,6,9,12,15,17,18,19,20")
-
-
-def test_the_target_may_move_behind_the_axis_on_the_way():
-    velocities, positions = run(generator(0x10000, 0x30000, 20), lambda t: setattr(t, "target", 5))
-    assert velocities == counts("1,2,3,3,3,3,2,1,0,-1,-2,-3,-3,-2,-1,0")
-    assert positions == numbers("1,3,6,9,12,15,17,18,18,17,15,12,9,7,6,5")
+@pytest.mark.parametrize(("move", "velocities", "positions"), BY_HAND.values(), ids=BY_HAND)
+def test_a_move_goes_as_calculated_by_hand(move, velocities, positions):
+    *profile, change = move
+    assert run(generator(*profile), change) == ([int(one, 16) for one in velocities.split()], positions)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +96,7 @@ def test_velocity_mode_and_its_reversal():
     up = [0x4000, 0x8000, 0xC000, 0x10000, 0x14000, 0x18000]
     down = [0x14000, 0x10000, 0xC000, 0x8000, 0x4000, 0]
     assert velocities == [*up, *[0x18000] * 4, *down, *[-v for v in up], *[-0x18000] * 2]
-    assert positions == numbers("0,0,1,2,3,5,6,8,9,11,12,13,14,14,15,15,14,14,13,12,11,9,8,6")
+    assert positions == [0, 0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 13, 14, 14, 15, 15, 14, 14, 13, 12, 11, 9, 8, 6]
 
 
 def test_a_smooth_stop_ends_on_a_whole_count():
