@@ -1,6 +1,7 @@
 """`mirotwin fuzz` as a user meets it: what it says, what it leaves, and how it refuses what it cannot use."""
 
 import json
+import re
 import signal
 import sys
 
@@ -8,34 +9,26 @@ import pytest
 
 from mirotwin.fuzz.files import CampaignFolder, unused
 from tests import children
-from tests.host.distribution import install
-from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
+from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, planted
+from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 pytestmark = pytest.mark.slow
 
-MISTAKE = "takes frames with a bad CRC"
-
-
-def started(tmp_path, *arguments):
-    """The command in a process of its own, with the engine of the tests and a line of progress each second."""
-    program = (
-        "import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_output as output\n"
-        "output.LINE_S = 1.0\n"
-        "from tests.mirotwin.fuzz.random_engine import RandomEngine\n"
-        "fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (\n"
-        "    RandomEngine(target, list(inputs), folder.folder('engine'), seed), [])\n"
-        "from mirotwin.entry import main\n"
-        "main()\n"
-    )
-    command = [sys.executable, "-c", program, "fuzz", "--out", tmp_path / "out", *arguments]
-    return children.start([*map(str, command)], stdout=-1, stderr=-1, text=True)
+PROGRAM = """
+import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_output as output
+output.LINE_S = 1.0
+from tests.mirotwin.fuzz.conftest import RandomEngine
+fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (
+    RandomEngine(target, inputs, folder.folder("engine"), seed), [])
+from mirotwin.entry import main
+main()
+"""
+"""The command in a process of its own, with the engine of the tests and a line of progress each second."""
 
 
 @needs_sdcc
-def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, built, tmp_path):
-    image = built(MISTAKE)
+def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, tmp_path):
+    image = planted("takes frames with a bad CRC").path
     code, out, err = mirotwin("fuzz", image, "--time", "3s", "--minimise", "0.3s", "--out", tmp_path / "out")
     assert code == 1
     assert engines[0].stopped
@@ -84,59 +77,35 @@ def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
     assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
 
 
-BROKEN = """
-from mirotwin.verify.checks.interface import Check, Monitor
-
-class Broken(Check, frozen=True, kw_only=True, tag="broken"):
-    KIND = "safety"
-    def monitor(self, subject):
-        return BrokenMonitor(self, subject)
-
-class BrokenMonitor(Monitor):
-    def period(self, record, tick):
-        raise RuntimeError("oh")
-"""
-
-
-@pytest.mark.parametrize("error", ['RuntimeError("oh")', "SystemExit(0)"])
+@pytest.mark.parametrize("error", [RuntimeError("oh"), SystemExit(0)], ids=repr)
 def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, tmp_path, monkeypatch, error):
-    parts = {"broken": f"broken_check_{len(error)}:Broken"}
-    source = BROKEN.replace('RuntimeError("oh")', error)
-    install(tmp_path / "dist", "broken", "1.0", parts, "checks", **{f"broken_check_{len(error)}": source})
-    monkeypatch.syspath_prepend(str(tmp_path / "dist"))
-    code, _, err = mirotwin("fuzz", "--time", "1s", "--expect", "broken", "--out", tmp_path / "out")
+    def raises(*_):
+        raise error
+
+    monkeypatch.setattr("mirotwin.verify.checks.course.PitchMonitor.period", raises)
+    code, _, err = mirotwin("fuzz", "--time", "1s", "--expect", "inside_pitch", "--out", tmp_path / "out")
     assert code == 2
     assert "--expect: " in err
-    assert f"check 'broken' cannot judge: {error.partition('(')[0]}: " in err
+    assert f"check 'inside_pitch' cannot judge: {type(error).__name__}: " in err
     assert "; the campaign has ended; repair the check" in err
     assert engines[0].stopped
     assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
 
 
-def test_ctrl_c_ends_it_with_what_was_found(tmp_path):
-    process = started(tmp_path, "--time", "60s")
+def test_plain_lines_tell_how_far_it_is_until_ctrl_c_ends_it_with_what_was_found(tmp_path):
+    command = [sys.executable, "-c", PROGRAM, "fuzz", "--out", tmp_path / "out", "--time", "60s"]
+    process = children.start([*map(str, command)], stdout=-1, stderr=-1, text=True)
     try:
-        for line in iter(process.stderr.readline, ""):
-            if "fuzzing" in line:
-                break
+        line = next(line for line in iter(process.stderr.readline, "") if "fuzzing" in line)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     finally:
         process.kill()
+    assert re.match(r"mirotwin: fuzzing miro.ihx: 0:0.*/s, .* edges, no crashes.*, \S+ left$", line)
     assert process.returncode == 130
     assert "mirotwin: interrupted; looking for 5 s at most at what is left" in err
     assert f"written to {tmp_path / 'out'}" in out
     assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
-
-
-def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
-    process = started(tmp_path, "--time", "2s")
-    _, err = process.communicate(timeout=120)
-    assert process.returncode == 0
-    line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:0"))
-    assert line.rpartition(", ")[2].endswith(" left")
-    assert "/s, " in line
-    assert " edges, no crashes" in line
 
 
 # ---- what cannot be used ---------------------------------------------------------------------------------------
@@ -196,37 +165,29 @@ def test_a_corpus_inside_the_folder_that_is_replaced_is_refused(mirotwin, engine
 
 
 @needs_sdcc
-def test_firmware_that_fails_before_it_hears_anything_is_refused(mirotwin, engines, built, tmp_path):
-    code, _, err = mirotwin(
-        "fuzz", built("stays in an interrupt"), "--time", "0.3s", "--out", tmp_path / "out"
-    )
-    assert code in (1, 2)
-    if code == 2:
-        assert "mend" in err
+def test_firmware_that_comes_up_with_a_fault_is_refused(mirotwin, engines, tmp_path):
+    image = built(*MISTAKES["executes A5h"][:3]).path
+    code, _, err = mirotwin("fuzz", image, "--out", tmp_path / "out")
+    assert code == 2
+    assert "the firmware comes up with a fault: firmware executed the undefined opcode A5 at " in err
 
 
 @needs_sdcc
 def test_firmware_that_never_sleeps_is_fuzzed_with_a_word_about_it(mirotwin, engines, tmp_path):
-    source = source_files()["main.c"]
-    assert source.count("        sleep = IDL;\n") == 1
-    built = build({"main.c": source.replace("        sleep = IDL;\n", "        sleep = 0;\n")})
-    code, _, err = mirotwin("fuzz", built.image, "--time", "0.3s", "--out", tmp_path / "out")
+    image = built("main.c", "        sleep = IDL;\n", "        sleep = 0;\n").path
+    code, _, err = mirotwin("fuzz", image, "--time", "0.3s", "--out", tmp_path / "out")
     assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms after its last character" in err
     assert code in (0, 1)
 
 
-def test_a_symbol_needs_symbols(mirotwin, engines, tmp_path):
+def test_an_image_without_symbols_can_be_fuzzed_and_has_no_functions_to_cover(mirotwin, engines, tmp_path):
     bare = tmp_path / "bare.ihx"
     bare.write_bytes(own_image().path.read_bytes())
-    code, _, err = mirotwin("fuzz", bare, "--covering", "main", "--out", tmp_path / "out")
+    command = ("fuzz", bare, "--time", "0.3s", "--out", tmp_path / "out")
+    code, _, err = mirotwin(*command, "--covering", "main")
     assert code == 2
     assert "the image has no symbols; put the .map or .cdb that the linker wrote beside the image" in err
-
-
-def test_an_image_without_symbols_can_be_fuzzed(mirotwin, engines, tmp_path):
-    bare = tmp_path / "bare.ihx"
-    bare.write_bytes(own_image().path.read_bytes())
-    code, out, _ = mirotwin("fuzz", bare, "--time", "0.3s", "--out", tmp_path / "out")
+    code, out, _ = mirotwin(*command)
     assert code == 0
     assert (tmp_path / "out" / "coverage.info.lst").exists()
     assert out.startswith("bare.ihx: ")

@@ -17,10 +17,31 @@ from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.hypothesis_process import Explorer, explore
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.target import target_for
-from tests.mirotwin.fuzz.toy import Toy
+from mirotwin.fuzz.target import TargetFailure, target_for
 
-TOY = TargetSpec(input="bytes", maker="tests.mirotwin.fuzz.toy:toy")
+
+class Toy:
+    """Edge 0 for each input, 1 for an F in front, 2 once for each byte. A failure for FZ, by the byte behind it."""
+
+    input = "bytes"
+    map_size = 64
+
+    def __init__(self, spec=None):
+        self.executions = 0
+        self.failure = None
+
+    def use_map(self, edges):
+        self.edges = edges
+
+    def run(self, data):
+        self.executions += 1
+        self.edges[:3] = bytes([1, data[:1] == b"F", len(data) & 0xFF])
+        pc = data[2] if len(data) > 2 else 0
+        self.failure = TargetFailure("no_fault", 1, pc, "FZ") if data[:2] == b"FZ" else None
+        return int(self.failure is not None)
+
+
+TOY = TargetSpec(input="bytes", maker=f"{__name__}:Toy")
 
 
 @pytest.fixture(autouse=True)
@@ -29,16 +50,19 @@ def importable_toy(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
 
-def kept_after(runs, seed, seeds=()):
+def exploring():
     kept = []
-    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    return kept, Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+
+
+def kept_after(runs, seed, seeds=()):
+    kept, explorer = exploring()
     explore(explorer, TOY, seeds, seed, lambda: explorer.target.executions < runs)
     return kept, explorer
 
 
 def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_new():
-    kept = []
-    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    kept, explorer = exploring()
     for data in (b"a", b"b", b"ab", b"F", b"abcd", b"1234567", b"12345678", b"Fa"):
         explorer.run(data)
     assert kept == [("queue", data) for data in (b"a", b"ab", b"F", b"abcd", b"12345678")]
@@ -46,8 +70,7 @@ def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_
 
 
 def test_a_finding_is_kept_once_for_each_check_and_place():
-    kept = []
-    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    kept, explorer = exploring()
     for data in (b"FZ\x01", b"FZ\x01\x02", b"FZ\x02"):
         explorer.run(data)
     assert kept == [("crashes", b"FZ\x01"), ("crashes", b"FZ\x02")]

@@ -1,13 +1,16 @@
-"""What was sent becomes inputs, and the target hears the same of them."""
+"""What was sent becomes inputs, and the target hears the same of them; and a folder of inputs of a user's own."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.bad_input import BadInput
+from miro_protocol import stream
 from miro_protocol.actions import Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
+from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of, seeds, sent, talks
 
 NUMBERS = st.integers(-32767, 32767)
@@ -113,3 +116,65 @@ def test_each_built_in_seed_is_read_as_what_it_says(kind, robots, slot):
         assert len(characters) == sum(len(one.data) for one in wire)
         if kind != "frames":
             assert characters == b"".join(one.data for one in wire)
+
+
+# A folder of a user's own
+
+FRAME = encode(TeamFrame(0, 1, ((1, 2), (3, 4), (5, 6))), 3)
+
+
+def test_streams_become_inputs_and_files_of_a_fuzzer_are_taken_as_they_are(tmp_path):
+    stream.write(tmp_path / "a.stream", [Transmission(100, DOWN, FRAME), Reset(10**6, 0, 0, 1)])
+    (tmp_path / "id:000001,src:0").write_bytes(b"\x06\x01")
+    (tmp_path / "queue").mkdir()
+    (tmp_path / "queue" / "id:2").write_bytes(b"raw")
+    (tmp_path / ".hidden").write_bytes(b"no")
+    corpus = read_corpus(tmp_path, "session", 3)
+    assert heard(SESSION, corpus.inputs[0])[0] == FRAME
+    assert corpus.inputs[1:] == (b"\x06\x01", b"raw")
+    assert corpus.notes == ()
+
+
+def test_a_recording_becomes_inputs(tmp_path, finished):
+    (tmp_path / "run.mcap").write_bytes((finished / "run.mcap").read_bytes())
+    corpus = read_corpus(tmp_path, "session", 3)
+    assert len(corpus.inputs) == 1
+    assert heard(SESSION, corpus.inputs[0])[0].count(FRAME[:8]) >= 5
+
+
+def test_foreign_files_are_passed_over_in_one_line(tmp_path):
+    (tmp_path / "good").write_bytes(b"x")
+    for name in ("a.png", "b.c", "c.json", "d.txt"):
+        (tmp_path / name).write_bytes(b"something")
+    corpus = read_corpus(tmp_path, "session", 3)
+    assert corpus.inputs == (b"x",)
+    assert corpus.notes == (
+        f"--corpus {tmp_path}: passed over 4 files that are no inputs: a.png, b.c, c.json, ..",
+    )
+
+
+def test_a_damaged_stream_is_named_with_its_line(tmp_path):
+    (tmp_path / "good").write_bytes(b"x")
+    (tmp_path / "bad.stream").write_text("# mirotwin stream 1\n12 > zz\n")
+    (note,) = read_corpus(tmp_path, "session", 3).notes
+    assert note.startswith(f"--corpus: passed over: {tmp_path}/bad.stream:2:")
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda folder: None, "there is no such folder"),
+        (lambda folder: folder.write_text("x"), "is no folder"),
+        (lambda folder: folder.mkdir(), "holds no file"),
+        (
+            lambda folder: (folder.mkdir(), (folder / "a.png").write_bytes(b"x")),
+            "no input among 1 file",
+        ),
+        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(b"")), "no input among 1 file"),
+        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(bytes(9000))), "no input among 1 file"),
+    ],
+)
+def test_a_folder_without_inputs_is_refused(tmp_path, make, said):
+    make(tmp_path / "corpus")
+    with pytest.raises(BadInput, match=said):
+        read_corpus(tmp_path / "corpus", "session", 3)

@@ -1,13 +1,18 @@
-"""A crash counts once a World says so, and what is left of it gives the verdict again."""
+"""A crash counts once a World says so, is told apart by its path, made small, and left as a case."""
+
+import time
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from miro_protocol import stream
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.inputs import seeds
+from mirotwin.fuzz.inputs import input_of, seeds, sent, talks
+from mirotwin.fuzz.minimise import Budget, minimise
 from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
 from mirotwin.fuzz.target import TargetFailure, target_for
 from mirotwin.fuzz.triage import Triage
@@ -139,3 +144,108 @@ def test_seeds_do_no_harm_in_target_and_world(kind):
         assert (target.run(data), target.failure) == (0, None)
         expected = {name: True for name in NAMES if name}
         assert RobotOracle(target).judged(data, expected).failure is None
+
+
+# What inputs reach, and the path that tells crashes apart
+
+
+def coverage():
+    image = own_image()
+    return InputCoverage(image, lambda: target_for(image))
+
+
+def of_talk(number):
+    return input_of("session", sent(talks(3, 0)[number], 3), 3)
+
+
+def test_what_runs_while_the_firmware_starts_counts_in_the_total():
+    reached = coverage()
+    assert reached.names.functions
+    names = reached.functions_of(reached.total)
+    assert "_main" in names
+    before = set(reached.total)
+    reached.run(of_talk(0))
+    assert before < set(reached.total)
+
+
+def test_the_counts_of_an_input_do_not_depend_on_the_inputs_before():
+    reached = coverage()
+    alone = reached.run(of_talk(0))
+    for data in seeds("session", 3, 0):
+        reached.run(data)
+    assert reached.run(of_talk(0)) == alone
+
+
+def test_the_counters_see_what_the_fast_run_does():
+    reached = coverage()
+    fast = target_for(own_image())
+    for data in seeds("session", 3, 0):
+        reached.run(data)
+        fast.run(data)
+        both = [[cpu.peek_iram(at) for at in range(256)] for cpu in (fast.cpu, reached.target.cpu)]
+        assert both[0] == both[1]
+        assert fast.cpu.cycles == reached.target.cpu.cycles
+
+
+def test_another_number_of_frames_takes_the_same_path_and_other_frames_another_one():
+    reached = coverage()
+    one, two = of_talk(0), of_talk(0) + of_talk(0)
+    assert reached.path(reached.run(one)) == reached.path(reached.run(two))
+    assert reached.path(reached.run(one)) != reached.path(reached.run(of_talk(5)))
+
+
+# Inputs are made small, in the same way each time
+
+
+def small(data, still, tries=100_000):
+    return minimise(data, still, Budget(tries, 60.0))
+
+
+def test_what_does_not_matter_goes_away_and_the_rest_becomes_zero():
+    data = bytes(range(1, 200))
+    assert small(data, lambda one: 77 in one and one.index(77) >= 3) == bytes([0, 0, 0, 77])
+
+
+def test_bytes_that_belong_together_stay_together():
+    data = b"....A....B........"
+    assert small(data, lambda one: b"A" in one and b"B" in one[one.index(b"A") :]) == b"AB"
+
+
+@given(st.binary(max_size=60), st.binary(min_size=1, max_size=3))
+def test_the_result_still_does_it_and_has_no_byte_that_could_be_left_out(data, needle):
+    whole = data + needle + data
+
+    def still(one):
+        return needle in one
+
+    found = small(whole, still)
+    assert found == needle
+    assert small(found, still) == found
+
+
+@given(st.binary(max_size=80))
+def test_the_same_input_is_tried_in_the_same_order(data):
+    def asked(one, log):
+        log.append(one)
+        return sum(one) % 7 == 3
+
+    logs = [[], []]
+    results = [small(data, lambda one, log=log: asked(one, log)) for log in logs]
+    assert results[0] == results[1]
+    assert logs[0] == logs[1]
+
+
+def test_an_input_that_does_not_do_it_comes_back_as_it_was():
+    assert small(b"abc", lambda one: False) == b"abc"
+
+
+def test_a_search_ends_with_its_tries():
+    tried = []
+    minimise(bytes(range(256)), lambda one: tried.append(one) or len(one) == 256, Budget(10, 60.0))
+    assert len(tried) == 10
+
+
+def test_a_search_ends_with_its_time():
+    began_s = time.monotonic()
+    minimise(bytes(4000), lambda one: time.sleep(0.01) or len(one) == 4000, Budget(10**9, 0.2))
+    assert time.monotonic() - began_s < 5.0

@@ -1,11 +1,11 @@
 """The MIRO's board as a target: as in a world, on both engines, and judged as the checks judge."""
 
+import re
 import sys
 
 import msgspec
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
@@ -14,39 +14,17 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
+from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.oracle import expected_of
 from mirotwin.fuzz.target import target_for
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.rig_options import silent_scenario
 from tests import children
-from tests.mirotwin.fuzz import target_digest
-from tests.mutants import planted
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
-from tests.mutants.sdcc import needs_sdcc
+from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
 
-JUDGED = [
-    name
-    for name in NAMES
-    if name and name not in ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear")
-]
-SESSIONS = st.lists(
-    st.one_of(
-        st.binary(min_size=4, max_size=4).map(lambda own: b"\x00" + own),
-        st.binary(min_size=4, max_size=4).map(lambda own: b"\x03" + own),
-        st.binary(min_size=12, max_size=12).map(lambda payload: b"\x05" + payload),
-        st.binary(min_size=13, max_size=13).map(lambda body: b"\x07" + body),
-        st.just(b"\x08"),
-        st.binary(min_size=1, max_size=8).map(lambda raw: bytes([9, len(raw) - 1]) + raw),
-        st.integers(0, 255).map(lambda wait: bytes([0x0A, wait])),
-        st.integers(0, 60).map(lambda wait: bytes([0x0B, wait])),
-        st.binary(min_size=2, max_size=2).map(lambda damage: b"\x0c" + damage),
-        st.integers(0, 30).map(lambda cut: bytes([0x0D, cut])),
-        st.integers(0, 30).map(lambda place: bytes([0x0E, place])),
-        st.just(b"\x0f"),
-    ),
-    max_size=8,
-).map(b"".join)
+ALWAYS = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear")
+JUDGED = [name for name in NAMES if name and name not in ALWAYS]
 
 
 @pytest.fixture(scope="module")
@@ -80,33 +58,58 @@ def received(log, since_tick):
     ]
 
 
-def test_both_engines_make_the_same_of_the_same_inputs():
-    module = "tests.mirotwin.fuzz.target_digest"
-    python = children.run(
-        [sys.executable, "-m", module, "--engine", "python"], capture_output=True, text=True, check=True
-    )
-    assert python.stdout.splitlines() == target_digest.lines()
+ENGINES = """
+import random
+from miro_exact import engine
+
+engine.select({engine!r})
+from miro_protocol.miro_wire import Miro
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.target import target_for
+from tests.mirotwin.verify.bare.firmwares import SLEEPS, image
+
+draw = random.Random(3)
+for kind in ("bytes", "frames", "session"):
+    for target in (target_for(load_hex(image_path()), kind), BareTarget(image(SLEEPS), kind, Miro())):
+        edges = bytearray(target.map_size)
+        target.use_map(edges)
+        said = (b"", b"ab!", b"a?" if kind == "bytes" else b"b", draw.randbytes(12), draw.randbytes(30))
+        for data in said:
+            run = target.run(data), target.failure, target.end_tick(), target.describe(data), target.highest_sp
+            ram = bytes(map(target.cpu.peek_iram, range(256))).hex()
+            counts = target.cpu.cycles, target.cpu.instructions
+            print(kind, *run, *counts, ram, sum(place * count for place, count in enumerate(edges)))
+"""
+
+
+def printed(engine):
+    command = [sys.executable, "-c", ENGINES.format(engine=engine)]
+    return children.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_both_engines_make_the_same_of_the_same_inputs_on_any_target():
+    compiled = printed("compiled")
+    assert compiled == printed("python")
+    assert {"no_fault", "never_sleeps"} <= set(re.findall(r"check='(\w+)'", compiled))
 
 
 @settings(max_examples=25, derandomize=True)
-@given(SESSIONS)
+@given(inputs("session"))
 def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipped, data):
     begun = shipped.board.log.end
     shipped.run(data)
-    there = [
-        event
-        for event in map(
-            shipped.board.log.event, range(max(begun, shipped.board.log.first), shipped.board.log.end)
-        )
-        if event[1] == event_log.RECEIVED
-    ]
+    log = shipped.board.log
+    events = map(log.event, range(max(begun, log.first), log.end))
+    there = [event for event in events if event[1] == event_log.RECEIVED]
     world, _ = world_of(shipped, data)
     assert received(world.networks[0].robots[0].board.log, shipped.harness.begin_tick)[-len(there) :] == there
 
 
 @pytest.mark.slow
 @settings(max_examples=60, derandomize=True)
-@given(SESSIONS)
+@given(inputs("session"))
 def test_the_shipped_firmware_passes_the_fast_oracle_and_the_checks(shipped, data):
     assert shipped.run(data) == 0, shipped.failure
     _, checks = world_of(shipped, data, JUDGED)
@@ -124,10 +127,8 @@ PLANTED = {
 @needs_sdcc
 @pytest.mark.parametrize("name", PLANTED)
 def test_the_fast_oracle_finds_what_the_check_of_that_name_finds(name):
-    mistake = planted.PLANTED[name]
     data, check = PLANTED[name]
-    firmware = build({mistake.file: mistake.applied(source_files()[mistake.file])})
-    target = target_for(load_hex(firmware.image))
+    target = target_for(planted(name))
     assert target.run(data)
     assert target.failure.check == check
     _, checks = world_of(target, data, JUDGED)
@@ -144,18 +145,35 @@ def test_an_input_of_another_kind_is_refused():
 
 
 def test_firmware_that_does_not_listen_is_refused(tmp_path):
-    file = tmp_path / "deaf.ihx"
-    file.write_text(":0200000080FE80\n:00000001FF\n")
     with pytest.raises(BadInput, match="has not turned its serial receiver on"):
-        target_for(load_hex(file))
+        target_for(load_hex(hex_file(tmp_path / "deaf.ihx", b"\x80\xfe")))
 
 
-def test_wheels_that_stop_already_need_no_new_order_for_velocity_0(shipped):
-    acceleration = b"\x05\x00\x02\x10" + bytes(9)
-    stopped = b"\x00" + bytes(4)
-    data = acceleration + b"\x00\x00\x00\x00\x04" + acceleration + stopped + stopped + b"\x0a\x80"
-    assert shipped.run(data) == 0, shipped.failure
-    _, checks = world_of(shipped, data, JUDGED)
+ACCELERATION = b"\x05\x00\x02\x10" + bytes(9)
+RIGHT = {
+    "wheels that stop already need no new order for velocity 0": (
+        (ACCELERATION + b"\x00\x00\x00\x00\x04" + ACCELERATION + 2 * bytes(5) + b"\x0a\x80", 3, 0)
+    ),
+    "a stale frame under test when the stop is due may put it off": (
+        (bytes(24) + b"\x2c\x79\x03" + bytes(4) + b"\x1b\x17\x17", 5, 4)
+    ),
+    "characters behind the tested frame do not end the time that its test has": (
+        (bytes.fromhex("0000000088889a8888888800"), 3, 0)
+    ),
+}
+"""Input, robots, slot: what the shipped firmware does right.
+
+The second frame ends 108.4 ms after the last fresh one, and the wheels are told to stop after 110.5 ms. The third is
+repeated until its test falls into the end of the 110 ms.
+"""
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_what_is_right_passes_the_fast_oracle_and_the_checks(case):
+    data, robots, slot = RIGHT[case]
+    target = target_for(load_hex(image_path()), robots=robots, slot=slot)
+    assert target.run(data) == 0, target.failure
+    _, checks = world_of(target, data, JUDGED)
     assert not checks.failures
 
 
@@ -183,15 +201,6 @@ def stop_after_ms(target, waited):
     stop = [tick for tick, kind, told, *_ in events if kind == event_log.COMMAND and told & 0xFF == 1][2]
     frame_end = [tick for tick, kind, *_ in events if kind == event_log.RECEIVED][30]
     return (stop - frame_end) / 24_000
-
-
-def test_a_stale_frame_under_test_when_the_stop_is_due_may_put_it_off():
-    """It ends 108.4 ms after the last fresh one, and the wheels are told to stop after 110.5 ms."""
-    target = target_for(load_hex(image_path()), robots=5, slot=4)
-    program = bytes(24) + b"\x2c\x79\x03" + bytes(4) + b"\x1b\x17\x17"
-    assert not target.run(program)
-    _, checks = world_of(target, program, JUDGED)
-    assert not checks.failures
 
 
 def test_a_robot_that_tests_a_frame_stops_when_the_test_is_over():

@@ -1,10 +1,11 @@
 """A target of a few branches: what the fork server and the launcher are tested with."""
 
 import time
-from typing import Any
+from pathlib import Path
 
 from mirotwin.fuzz.spec import TargetSpec
 
+ROOT = Path(__file__).parents[4]
 MAP_SIZE = 8192
 MAKER = "tests.mirotwin.fuzz.afl.double:double_of"
 WORD = b"DUCK"
@@ -27,7 +28,7 @@ class Double:
 
     input = "bytes"
     map_size = MAP_SIZE
-    image: Any = None
+    image = None
 
     def __init__(self, kind=2, raises=False, sleeps=False, always=False):
         self.kind, self.raises, self.sleeps, self.always = kind, raises, sleeps, always

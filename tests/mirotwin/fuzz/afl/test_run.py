@@ -17,8 +17,7 @@ from mirotwin.fuzz.afl.inputs import write_seeds
 from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import TargetSpec
 from tests import children
-from tests.mirotwin.fuzz.afl.double import WORD, Double, spec
-from tests.mirotwin.fuzz.afl.fake_afl import ROOT
+from tests.mirotwin.fuzz.afl.double import ROOT, WORD, Double, spec
 
 pytestmark = pytest.mark.skipif(
     shutil.which("afl-fuzz") is None and not os.environ.get("CI"), reason="needs AFL++"

@@ -1,7 +1,9 @@
 """The target process beside a fake AFL++, and without any."""
 
+import ctypes
 import os
 import signal
+import struct
 import sys
 from pathlib import Path
 
@@ -9,18 +11,97 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mirotwin.fuzz.afl import serve
 from mirotwin.fuzz.afl.job import read_executions
-from mirotwin.fuzz.afl.serve import (
-    CASES_VARIABLE,
-    FIRST_SIGNAL,
-    MAP_VARIABLE,
-    RUNS_A_COUNT,
-    attach,
-    wait_status,
-)
+from mirotwin.fuzz.afl.serve import CASES_VARIABLE, MAP_VARIABLE, attach, wait_status
 from tests import children
-from tests.mirotwin.fuzz.afl.double import MAP_SIZE, WORD, Double, spec
-from tests.mirotwin.fuzz.afl.fake_afl import CASES_BYTES, ROOT, FakeAfl
+from tests.mirotwin.fuzz.afl.double import MAP_SIZE, ROOT, WORD, Double, spec
+
+PRIVATE, CREATE, REMOVE = 0, 0o1000, 0
+CASES_BYTES = 4096
+
+
+class Segment:
+    """A segment of shared memory, removed at the end."""
+
+    def __init__(self, size):
+        self._library = ctypes.CDLL(None, use_errno=True)
+        self.number = self._library.shmget(PRIVATE, ctypes.c_size_t(size), CREATE | 0o600)
+        assert self.number >= 0, os.strerror(ctypes.get_errno())
+        self.memory = attach(self.number)
+
+    def remove(self):
+        self._library.shmctl(self.number, REMOVE, None)
+
+
+class FakeAfl:
+    """Starts the server of `spec` and speaks to it. `without`: a variable that it does not get."""
+
+    def __init__(self, spec, beside="", without=""):
+        self.edges, self.cases = Segment(65536), Segment(CASES_BYTES)
+        to_server, self.control = os.pipe()
+        self.status, from_server = os.pipe()
+
+        def prepare():
+            os.dup2(to_server, serve.CONTROL_FD)
+            os.dup2(from_server, serve.STATUS_FD)
+
+        variables = {MAP_VARIABLE: str(self.edges.number), CASES_VARIABLE: str(self.cases.number)}
+        variables.pop(without, None)
+        self.server = children.start(
+            [sys.executable, "-m", "mirotwin.fuzz.afl.serve", spec.text(), *([beside] if beside else [])],
+            env={**os.environ, **variables},
+            cwd=ROOT,
+            close_fds=False,  # those two stay open, all others close by themselves
+            preexec_fn=prepare,
+            stderr=children.subprocess.PIPE,
+            text=True,
+        )
+        os.close(to_server)
+        os.close(from_server)
+
+    def hello(self):
+        """The first word of the server, answered as AFL++ does."""
+        said = os.read(self.status, 4)
+        if said:
+            os.write(self.control, said)
+        return struct.unpack("<I", said)[0] if said else 0
+
+    def run(self, data):
+        """Process id and wait status for an input; the edge map is cleared before."""
+        self.edges.memory[:] = bytes(len(self.edges.memory))
+        self.cases.memory[: 4 + len(data)] = struct.pack("<I", len(data)) + data
+        os.write(self.control, bytes(4))
+        return struct.unpack("<iI", self._read(8))
+
+    def _read(self, count):
+        found = b""
+        while len(found) < count:
+            piece = os.read(self.status, count - len(found))
+            if not piece:
+                return bytes(count)
+            found += piece
+        return found
+
+    def end(self):
+        """Ends as AFL++ does; the exit code of the server."""
+        os.close(self.control)
+        code = self.server.wait(20)
+        os.close(self.status)
+        return code
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.edges.remove()
+        self.cases.remove()
+        if self.server.poll() is None:
+            os.close(self.control)
+            os.close(self.status)
+            self.server.send_signal(signal.SIGKILL)
+            self.server.wait()
+        self.server.stderr.close()
 
 
 def by_hand(specification, data):
@@ -31,33 +112,35 @@ def by_hand(specification, data):
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 
-def test_the_first_word_says_options_size_of_the_map_and_shared_memory():
-    with FakeAfl(spec()) as afl:
-        said = afl.hello()
-        assert said & 0x8000_0001 == 0x8000_0001
-        assert said & 0x4000_0000, "the size of the map follows"
-        assert ((said & 0x00FF_FFFE) >> 1) + 1 == MAP_SIZE
-        assert said & 0x0100_0000, "test cases come through shared memory"
-        assert not said & 0x3000_0000, "neither a snapshot module nor a dictionary"
-        assert afl.end() == 0
+@pytest.fixture
+def afl():
+    """It has said hello to the server of a double."""
+    with FakeAfl(spec()) as found:
+        found.word = found.hello()
+        yield found
 
 
-def test_the_process_that_is_told_cannot_exist():
-    with FakeAfl(spec()) as afl:
-        afl.hello()
-        process, _ = afl.run(b"hello")
-        assert process > int(Path("/proc/sys/kernel/pid_max").read_text())
-        afl.end()
+def test_the_first_word_says_options_size_of_the_map_and_shared_memory(afl):
+    said = afl.word
+    assert said & 0x8000_0001 == 0x8000_0001
+    assert said & 0x4000_0000, "the size of the map follows"
+    assert ((said & 0x00FF_FFFE) >> 1) + 1 == MAP_SIZE
+    assert said & 0x0100_0000, "test cases come through shared memory"
+    assert not said & 0x3000_0000, "neither a snapshot module nor a dictionary"
+    assert afl.end() == 0
 
 
-def test_edges_are_counted_in_the_memory_of_afl():
-    with FakeAfl(spec()) as afl:
-        afl.hello()
-        assert afl.run(b"DUC") == (afl.run(b"DUC")[0], 0)
-        assert bytes(afl.edges.memory[:MAP_SIZE]) == b"\0\1\1\1\1".ljust(MAP_SIZE, b"\0")
-        afl.run(b"hello")
-        assert bytes(afl.edges.memory) == b"\0\1".ljust(len(afl.edges.memory), b"\0")
-        afl.end()
+def test_the_process_that_is_told_cannot_exist(afl):
+    process, _ = afl.run(b"hello")
+    assert process > int(Path("/proc/sys/kernel/pid_max").read_text())
+
+
+def test_edges_are_counted_in_the_memory_of_afl_which_is_as_long_as_it_was_made(afl):
+    assert (len(afl.edges.memory), len(afl.cases.memory)) == (65536, CASES_BYTES)
+    assert afl.run(b"DUC") == (afl.run(b"DUC")[0], 0)
+    assert bytes(afl.edges.memory) == b"\0\1\1\1\1".ljust(65536, b"\0")
+    afl.run(b"hello")
+    assert bytes(afl.edges.memory) == b"\0\1".ljust(65536, b"\0")
 
 
 @pytest.mark.parametrize("kind", [1, 2, 8, 93])
@@ -66,9 +149,8 @@ def test_the_signal_of_a_find_tells_its_kind(kind):
         afl.hello()
         status = afl.run(WORD)[1]
         assert os.WIFSIGNALED(status)
-        assert os.WTERMSIG(status) - FIRST_SIGNAL == kind - 1
+        assert os.WTERMSIG(status) - serve.FIRST_SIGNAL == kind - 1
         assert afl.run(b"hello")[1] == 0
-        afl.end()
 
 
 @given(st.integers(1, 255))
@@ -79,33 +161,26 @@ def test_each_kind_of_finding_is_a_signal_that_kills(kind):
 
 
 @pytest.mark.slow
-def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does():
-    own = Double()
-    with FakeAfl(spec()) as afl:
-        afl.hello()
-        seen = {}
+def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does(afl):
+    own, seen = Double(), {}
 
-        @settings(max_examples=1000, database=None)
-        @given(st.binary(max_size=8) | st.binary(max_size=4).map(lambda tail: WORD + tail))
-        def one(data):
-            status = afl.run(data)[1]
-            assert status == wait_status(own.run(data))
-            seen.setdefault(data, status)
-            assert seen[data] == status
+    @settings(max_examples=1000, database=None)
+    @given(st.binary(max_size=8) | st.binary(max_size=4).map(lambda tail: WORD + tail))
+    def one(data):
+        status = afl.run(data)[1]
+        assert status == wait_status(own.run(data))
+        seen.setdefault(data, status)
+        assert seen[data] == status
 
-        one()
-        assert len(set(seen.values())) == 2
-        assert afl.end() == 0
+    one()
+    assert len(set(seen.values())) == 2
 
 
-def test_a_length_beyond_the_segment_is_cut_to_it():
-    with FakeAfl(spec()) as afl:
-        afl.hello()
-        afl.cases.memory[:4] = (1 << 31).to_bytes(4, "little")
-        afl.cases.memory[4:8] = WORD
-        os.write(afl.control, bytes(4))
-        assert os.WIFSIGNALED(int.from_bytes(afl._read(8)[4:], "little"))
-        afl.end()
+def test_a_length_beyond_the_segment_is_cut_to_it(afl):
+    afl.cases.memory[:4] = (1 << 31).to_bytes(4, "little")
+    afl.cases.memory[4:8] = WORD
+    os.write(afl.control, bytes(4))
+    assert os.WIFSIGNALED(int.from_bytes(afl._read(8)[4:], "little"))
 
 
 def test_executions_are_kept_and_counted_on(tmp_path):
@@ -113,10 +188,10 @@ def test_executions_are_kept_and_counted_on(tmp_path):
     for times in (1, 2):
         with FakeAfl(spec(), beside) as afl:
             afl.hello()
-            for _ in range(RUNS_A_COUNT):
+            for _ in range(serve.RUNS_A_COUNT):
                 afl.run(b"hello")
             afl.end()
-        assert read_executions(tmp_path / "main.counts") == RUNS_A_COUNT * times
+        assert read_executions(tmp_path / "main.counts") == serve.RUNS_A_COUNT * times
     assert not (tmp_path / "main.target").exists(), "there was nothing to complain of"
 
 
@@ -127,14 +202,12 @@ def test_a_count_that_is_not_whole_is_zero(tmp_path_factory, content):
     assert read_executions(path) == 0
 
 
-def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer():
-    with FakeAfl(spec()) as afl:
-        afl.hello()
-        os.close(afl.status)
-        os.write(afl.control, bytes(4))
-        os.close(afl.control)
-        assert afl.server.wait(20) == 0
-        assert afl.server.stderr.read() == ""
+def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer(afl):
+    os.close(afl.status)
+    os.write(afl.control, bytes(4))
+    os.close(afl.control)
+    assert afl.server.wait(20) == 0
+    assert afl.server.stderr.read() == ""
 
 
 def test_the_server_ends_when_afl_does_not_answer_its_first_word():
@@ -168,12 +241,6 @@ def test_shared_memory_that_is_not_there_is_an_error():
         attach(0x7FFF_FFFF)
 
 
-def test_attached_memory_is_as_long_as_it_was_made():
-    with FakeAfl(spec()) as afl:
-        assert len(afl.edges.memory) == 65536
-        assert len(afl.cases.memory) == CASES_BYTES
-
-
 # ---- without AFL++ -----------------------------------------------------------------------------------------
 
 
@@ -182,22 +249,19 @@ def test_without_afl_standard_input_is_run_once_and_told():
     assert by_hand(spec(), b"hello") == (0, "nothing found\n", "")
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{", "target: Input data was truncated; give JSON with board, image,"),
-        ('{"board": "x"}', "target: Invalid enum value 'x' - at `$.board`; "),
-        ('{"bord": "miro"}', "target: Object contains unknown field `bord`; "),
-        ('{"robots": -1}', "target: Expected `int` >= 0 - at `$.robots`; "),
-        (
-            '{"maker": "no_such:thing"}',
-            "target: maker: no_such:thing: No module named 'no_such'; write it as",
-        ),
-        ('{"maker": "os:nothing"}', "target: maker: os:nothing: module 'os' has no attribute 'nothing'; "),
-    ],
-)
-def test_a_specification_that_cannot_be_used_is_one_line_and_exit_code_2(text, said):
+UNUSABLE = {
+    "{": "target: Input data was truncated; give JSON with board, image,",
+    '{"board": "x"}': "target: Invalid enum value 'x' - at `$.board`; ",
+    '{"bord": "miro"}': "target: Object contains unknown field `bord`; ",
+    '{"robots": -1}': "target: Expected `int` >= 0 - at `$.robots`; ",
+    '{"maker": "no_such:thing"}': "target: maker: no_such:thing: No module named 'no_such'; write it as",
+    '{"maker": "os:nothing"}': "target: maker: os:nothing: module 'os' has no attribute 'nothing'; ",
+}
+
+
+@pytest.mark.parametrize("text", UNUSABLE)
+def test_a_specification_that_cannot_be_used_is_one_line_and_exit_code_2(text):
     code, out, err = by_hand(text, b"")
     assert (code, out) == (2, "")
-    assert err.startswith(said)
+    assert err.startswith(UNUSABLE[text])
     assert err.count("\n") == 1

@@ -1,5 +1,6 @@
-"""How afl-fuzz is called, on which cores, and what its errors come to."""
+"""What afl-fuzz is given: seeds, a dictionary, its command line and its cores; and what its errors come to."""
 
+import ast
 import os
 import sys
 from pathlib import Path
@@ -9,10 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.decoder import Decoder
+from miro_protocol.events import Received
+from miro_protocol.frames import ServiceFrame, TeamFrame, decode_fields
+from miro_protocol.table import ROBOT_COUNTS, SYNC, downlink
 from mirotwin.fuzz.afl import missing, run
+from mirotwin.fuzz.afl.inputs import LONGEST_TOKEN, message_tokens, wire_tokens, write_dictionary, write_seeds
 from mirotwin.fuzz.afl.job import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
-from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
+from mirotwin.fuzz.afl.settings import LONGEST_BYTES, REASONS, Call, environment, job_name
 from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import TargetSpec, spec_of
 from tests.mirotwin.fuzz.afl.double import Double, spec
@@ -57,20 +63,14 @@ def test_our_settings_win_and_others_are_passed_on():
     assert all(found[name].isdecimal() for name in REASONS)
 
 
-def test_each_setting_has_a_reason():
-    assert all(reason.strip() for reason in REASONS.values())
-
-
 def test_the_first_of_several_jobs_is_the_main_one():
     assert [job_name(job, 3) for job in range(3)] == ["main", "job1", "job2"]
     assert job_name(0, 1) == "default"
 
 
 def test_what_is_missing_says_how_to_get_it():
-    said = missing(("afl-fuzz-of-tomorrow",))
-    assert (
-        said == "afl-fuzz-of-tomorrow is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
-    )
+    remedy = "install AFL++ (Debian, Ubuntu: `apt install afl++`)"
+    assert missing(("afl-fuzz-of-tomorrow",)) == f"afl-fuzz-of-tomorrow is not on the PATH; {remedy}"
 
 
 def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
@@ -158,3 +158,53 @@ def test_what_the_target_complained_of_is_the_cause(tmp_path):
 @pytest.mark.parametrize("output", ["", "\n \n", "Segmentation fault\n"])
 def test_an_end_without_a_reason_shows_the_last_line(tmp_path, output):
     assert (output.strip() or "it said nothing") in said(tmp_path, output)
+
+
+# ---- seeds and dictionaries ---------------------------------------------------------------------------------
+
+
+def read_back(path):
+    """The strings of a dictionary, by Python's reader of byte strings."""
+    lines = path.read_text(encoding="ascii").splitlines()
+    return [ast.literal_eval("b" + line.split("=", 1)[1]) for line in lines]
+
+
+@given(st.lists(st.binary(min_size=1, max_size=LONGEST_TOKEN)))
+def test_each_string_of_a_dictionary_is_written_once(tmp_path_factory, tokens):
+    path = tmp_path_factory.mktemp("dictionary") / "words"
+    write_dictionary(path, {f'name "{number}"\n': token for number, token in enumerate(tokens)})
+    assert sorted(read_back(path)) == sorted(set(tokens))
+
+
+@pytest.mark.parametrize("token", [b"", bytes(129)])
+def test_a_string_that_afl_would_refuse_is_refused(tmp_path, token):
+    with pytest.raises(BadInput, match=f"words: long one: {len(token)} bytes; give 1 to 128"):
+        write_dictionary(tmp_path / "words", {"long one": token})
+
+
+@pytest.mark.parametrize("robots", ROBOT_COUNTS)
+def test_the_strings_of_the_wire_hold_sync_preamble_and_whole_frames(robots):
+    tokens = wire_tokens(robots)
+    assert tokens["sync"] == SYNC
+    assert tokens["preamble"] == downlink(robots).lead
+    frames = [token for token in tokens.values() if len(token) == downlink(robots).wire_size]
+    received = [event for frame in frames for event in Decoder(robots).feed(frame)]
+    messages = [decode_fields(event.body, robots) for event in received if isinstance(event, Received)]
+    assert sum(isinstance(message, TeamFrame) for message in messages) == 2
+    assert sum(isinstance(message, ServiceFrame) for message in messages) == 3
+
+
+@pytest.mark.parametrize("robots", ROBOT_COUNTS)
+def test_all_our_strings_fit_a_dictionary(tmp_path, robots):
+    write_dictionary(tmp_path / "words", wire_tokens(robots) | message_tokens(robots))
+    assert len(read_back(tmp_path / "words")) > 20
+
+
+def test_seeds_are_written_once_each_without_empty_ones_and_cut(tmp_path):
+    long = bytes(range(256)) * 17
+    inputs = {"first": b"x", "empty": b"", "../second": b"x", "../long": long}
+    assert write_seeds(tmp_path / "seeds", inputs) == 2
+    assert {path.name: path.read_bytes() for path in (tmp_path / "seeds").iterdir()} == {
+        "0000-first": b"x",
+        "0001-___long": long[:LONGEST_BYTES],
+    }

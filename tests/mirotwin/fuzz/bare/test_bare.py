@@ -1,4 +1,9 @@
-"""Any firmware with a serial port as a target: what it hears, how runs end, what is found."""
+"""Any firmware with a serial port as a target: what it hears, how runs end, what is found; wire formats."""
+
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -6,10 +11,18 @@ from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
-from miro_protocol.protocol import Protocol
-from mirotwin.fuzz.bare import CHECK_CODE, NEVER_SLEEPS_CODE, NO_FAULT_CODE, BareTarget, frame_input
+from miro_protocol.protocol import Damage, Frame, Protocol
+from mirotwin.fuzz.bare import (
+    CHECK_CODE,
+    NEVER_SLEEPS_CODE,
+    NO_FAULT_CODE,
+    BareTarget,
+    frame_input,
+    protocol_named,
+)
 from mirotwin.verify.bare.exchange import NamedCheck
 from mirotwin.verify.bare.run import BarePlayback
+from tests.host import distribution
 from tests.mirotwin.verify.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])
@@ -224,3 +237,71 @@ def test_what_cannot_be_fuzzed_is_refused_with_the_reason(make, said):
 def test_a_given_rate_is_taken_instead_of_the_receivers():
     target = BareTarget(image(SERIAL + "SJMP $"), "bytes", crystal_hz=11_059_200, baud=9600)
     assert target.line.bit_ticks == 1152
+
+
+# Wire formats by name and parameters, ours and those of distributions
+
+THEIRS = """
+from miro_protocol.protocol import Protocol
+
+class Lines(Protocol, frozen=True, tag="lines"):
+    end: str = "x"
+    def encode(self, body):
+        return body + self.end.encode()
+
+class Other:
+    pass
+"""
+
+
+def test_ours_by_name_with_parameters():
+    assert protocol_named("miro") == Miro(robots=3)
+    assert protocol_named("miro:robots=5") == Miro(robots=5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("mire", "'mire' is not one of the choices; did you mean miro?"),
+        ("miro:robots=4", "miro:robots=4: robots: invalid enum value 4; miro has robots"),
+        ("miro:robots", "'robots' are no parameters; write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"),
+        ("miro:rate=1", "miro:rate=1: rate: unknown key; miro has robots"),
+        ("", "'' is not one of the choices"),
+    ],
+)
+def test_what_is_no_protocol_is_refused(text, said):
+    with pytest.raises(BadInput) as caught:
+        protocol_named(text)
+    assert str(caught.value).startswith(f"--protocol: {said}")
+
+
+def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
+    parts = {"lines": "their_lines:Lines", "other": "their_lines:Other"}
+    distribution.install(tmp_path, "theirs", "1.0", parts, "protocols", their_lines=THEIRS)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert protocol_named('lines:end="\\n"').encode(b"a") == b"a\n"
+    with pytest.raises(BadInput, match="is not a struct of parameters; derive it from miro_protocol"):
+        protocol_named("other")
+    sys.modules.pop("their_lines")
+
+
+# The page about foreign firmware: its check and its format work as they stand there
+
+PAGE = (Path(__file__).parents[4] / "docs" / "fuzz-any-8051.md").read_text(encoding="utf-8")
+CHECK, FORMAT = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_its_check_says_what_is_wrong():
+    found = {}
+    exec(CHECK, found)
+    levels = [found["level_is_kept"](SimpleNamespace(memory={"level": level})) for level in (100, 101)]
+    assert levels == [None, "the level is 101"]
+
+
+def test_its_format_keeps_the_laws_of_the_interface():
+    found = {}
+    exec(FORMAT, found)
+    lines = found["Lines"]()
+    assert lines.encode(b"ab") == b"abc3\n"
+    assert lines.decode(b"abc3\n" + b"abc4\n") == [Frame(b"ab", 0, 5), Damage(5, 10, "bad sum")]
+    assert lines.decode(lines.repair(b"a\nb")) == [Frame(b"a b", 0, 6)]

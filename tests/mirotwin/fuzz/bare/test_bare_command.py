@@ -3,9 +3,10 @@
 import shlex
 
 import pytest
-from intelhex import IntelHex
 
-from tests.mirotwin.verify.bare.firmwares import FAULTY, POLLS, SLEEPS, image
+from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.verify.bare.firmwares import FAULTY, POLLS, SLEEPS
+from tests.robot.mcs51.asm import assemble
 
 CHECK = """
 def never_q(run):
@@ -13,18 +14,14 @@ def never_q(run):
 """
 
 
+MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
+FIRMWARES = {"sleeps": SLEEPS, "polls": POLLS, "mended": MENDED, "faulty": FAULTY}
+
+
 @pytest.fixture
 def hexes(tmp_path):
     """The firmwares as files."""
-    mended = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
-    made = {}
-    for name, text in {"sleeps": SLEEPS, "polls": POLLS, "mended": mended, "faulty": FAULTY}.items():
-        found = image(text)
-        file = IntelHex()
-        file.frombytes(found.code[: found.size])
-        made[name] = str(tmp_path / f"{name}.ihx")
-        file.write_hex_file(made[name])
-    return made
+    return {name: str(hex_file(tmp_path / f"{name}.ihx", assemble(text))) for name, text in FIRMWARES.items()}
 
 
 @pytest.fixture
@@ -100,10 +97,8 @@ def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines,
         options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--force", *more)
         code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 2
-        assert (
-            f"raised AttributeError: 'Exchange' object has no attribute 'nothing' ({tmp_path}/mycheck.py:2 in never_q)"
-            in err
-        )
+        said = "raised AttributeError: 'Exchange' object has no attribute 'nothing'"
+        assert f"{said} ({tmp_path}/mycheck.py:2 in never_q)" in err
 
 
 @pytest.mark.parametrize(
@@ -132,16 +127,12 @@ def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines
     inputs = corpus(tmp_path, b"!")
     campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
     case = str(next((tmp_path / "out" / "crashes").glob("no_fault-*.stream")))
+    needs = "is for a bare processor, which has no firmware of its own; give --firmware"
+    firmware = ("--firmware", hexes["sleeps"])
     for arguments, said in (
-        (("replay", case), "is for a bare processor, which has no firmware of its own; give --firmware"),
-        (
-            ("replay", case, "--firmware", hexes["sleeps"], "--seed", "1"),
-            "--seed: is not for a case of a bare",
-        ),
-        (
-            ("fw", "trace", case, "--firmware", hexes["sleeps"]),
-            "is for a bare processor and not for the robot",
-        ),
+        (("replay", case), needs),
+        (("replay", case, *firmware, "--seed", "1"), "--seed: is not for a case of a bare"),
+        (("fw", "trace", case, *firmware), "is for a bare processor and not for the robot"),
     ):
         code, _, err = mirotwin(*arguments)
         assert (code, said in err) == (2, True), err
