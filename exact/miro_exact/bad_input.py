@@ -42,8 +42,9 @@ def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:
     """The remedy for a word that is not among the known ones: the nearest of them, if one is near, and `remedy`."""
     from difflib import get_close_matches  # only an error needs it
 
-    close = get_close_matches(word[:LONGEST_END], list(known), n=1)
-    return " ".join([*(f"did you mean {one}?" for one in close), *([remedy] if remedy else [])])
+    spelt = {one.lower(): one for one in known}
+    close = get_close_matches(word[:LONGEST_END].lower(), spelt, n=1)
+    return " ".join([*(f"did you mean {spelt[one]}?" for one in close), *([remedy] if remedy else [])])
 
 
 def one_line(text: str) -> str:

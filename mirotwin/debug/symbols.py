@@ -150,7 +150,11 @@ class Moment:
             return special
         symbol = self.symbols.image.symbols.find(name)
         if symbol is None:
-            raise NoValue(f"there is no {name} here", did_you_mean(name, self.symbols.known_names()))
+            owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
+            remedy = did_you_mean(name, self.symbols.known_names())
+            if owners:
+                remedy = f"it is a local variable of {', '.join(sorted(owners))}"
+            raise NoValue(f"there is no {name} here", remedy)
         if symbol.space == "code":
             return Value(number=symbol.address, note="an address of code")
         if symbol.space == "iram":

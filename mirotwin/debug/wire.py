@@ -25,7 +25,7 @@ class Request(msgspec.Struct):
     seq: int
     type: str
     command: str
-    arguments: Message = {}
+    arguments: Message | None = None
 
 
 class Wire:
@@ -88,9 +88,10 @@ class Wire:
             self.data += more
         data, self.data = self.data[begin:end], self.data[end:]
         try:
-            return msgspec.structs.asdict(msgspec.json.decode(data, type=Request))
+            request = msgspec.json.decode(data, type=Request)
         except msgspec.MsgspecError as error:
             raise _garbage(data, f"no request: {error}") from None
+        return msgspec.structs.asdict(request) | {"arguments": request.arguments or {}}
 
 
 def _given(value: Any) -> Any:

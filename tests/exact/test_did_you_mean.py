@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
     [
         ("rnu", ["run", "report"], "", "did you mean run?"),
         ("rnu", ["run", "report"], "there are two", "did you mean run? there are two"),
+        ("rUN", ["Run", "REPORT"], "", "did you mean Run?"),
         ("x", ["run", "report"], "there are two", "there are two"),
         ("x", [], "", ""),
         ("run" * 100_000, ["run"], "", ""),

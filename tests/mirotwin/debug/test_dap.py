@@ -162,6 +162,13 @@ def test_a_request_that_cannot_be_done_gets_an_error_and_the_session_goes_on(
     assert client.ask("threads")["success"]
 
 
+def test_null_stands_for_arguments_that_are_left_out(adapter):
+    _, client = adapter
+    request = b'{"seq": 1, "type": "request", "command": "initialize", "arguments": null}'
+    client.raw(b"Content-Length: %d\r\n\r\n%b" % (len(request), request))
+    assert client.until(type="response")["success"]
+
+
 def test_breakpoints_that_cannot_be_set_say_why(adapter):
     _, client = adapter
     client.begin(subject="fig6")

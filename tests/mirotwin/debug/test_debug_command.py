@@ -178,6 +178,8 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("break main if tick > 3 && wire:placee", "there is no placee; did you mean place?"),
         ("watch age if lm629.left.status == nothing", "there is no nothing"),
         ("print nothing", "there is no nothing here"),
+        ("print sp", "there is no sp here; did you mean SP?"),
+        ("print seq", "there is no seq here; it is a local variable of telemetry_answer"),
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
