@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
-from miro_sim.world.conditions import Condition, Edge, Reached, WheelSpeeds, When
+from miro_protocol.toml_text import struct_of
+from miro_sim.world.conditions import CONDITIONS, Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
 from miro_sim.world.pins import PinWatch
 
@@ -109,10 +110,12 @@ class Watch:
     # What the conditions mean
 
     def _place(self, condition: Condition) -> tuple[int, int]:
-        """Network and slot at which it happens."""
+        """Network and slot at which it happens. Raises ValueError for values that no file may give."""
+        if type(condition) in CONDITIONS.values():
+            struct_of(msgspec.to_builtins(condition), type(condition))
         networks = self.world.networks
         if not 0 <= condition.network < len(networks):
-            raise ValueError(f"there is no network {condition.network}; there are {len(networks)}, from 0 on")
+            raise ValueError(f"there is no network {condition.network}; the last one is {len(networks) - 1}")
         slot = condition.at_slot(min(robot.slot for robot in networks[condition.network].spec.robot))
         if slot != PC:
             self.world.robot(condition.network, slot)

@@ -185,7 +185,7 @@ class World:
         left to the next wait; so is what happened since the last wait, as far as the logs hold it (2048 events a
         robot). Only where the run stops depends on a wait. `within`: ticks after which WaitExpired is raised, with
         what was seen meanwhile; default: the end of the scenario. Raises ValueError for a network, robot, pin or
-        symbol that is not there.
+        symbol that is not there, and for what can never be.
 
             world.run_until(conditions.Answer(slot=0), within=ticks(0.040))
         """
@@ -212,7 +212,7 @@ class World:
 
     def _network(self, index: int) -> Network:
         if not 0 <= index < len(self.networks):
-            raise ValueError(f"there is no network {index}; there are {len(self.networks)}, from 0 on")
+            raise ValueError(f"there is no network {index}; the last one is {len(self.networks) - 1}")
         return self.networks[index]
 
     def robot(self, network: int = 0, slot: int = 0) -> Robot:

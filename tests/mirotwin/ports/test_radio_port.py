@@ -87,7 +87,7 @@ def test_a_scenario_with_steps_is_refused(tmp_path):
 
 
 def test_a_network_that_is_not_there_is_refused():
-    with pytest.raises(ValueError, match="there is no network 1; there are 1, from 0 on"):
+    with pytest.raises(ValueError, match="there is no network 1; the last one is 0"):
         RadioPort(live_world(), 1)
 
 

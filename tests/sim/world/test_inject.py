@@ -231,7 +231,7 @@ def test_a_script_that_no_host_can_send_is_refused(sent, what):
 
 @pytest.mark.parametrize("network", [-1, 2])
 def test_a_network_that_is_not_there_is_refused(network):
-    with pytest.raises(ValueError, match=f"there is no network {network}; there are 2"):
+    with pytest.raises(ValueError, match=f"there is no network {network}; the last one is 1"):
         silent().inject(FRAME, network)
 
 

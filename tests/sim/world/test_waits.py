@@ -181,7 +181,9 @@ def test_a_wait_without_end_ends_with_the_run():
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
-        (wait.Answer(network=2), "there is no network 2; there are 2"),
+        (wait.Answer(network=2), "there is no network 2; the last one is 1"),
+        (wait.Answer(slot=12), "slot: is out of range; must be <= 4"),
+        (wait.Answer(accepted=300), "accepted: is out of range; must be <= 255"),
         (wait.Received(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
         (wait.Reached(symbol="mian"), "'mian' is no symbol of"),
         (wait.Reached(symbol="frames_accepted"), "'frames_accepted' is not in code memory"),
