@@ -1,17 +1,28 @@
-"""Single keys of a scenario, set by their path: `--set KEY=VALUE`."""
+"""Keys that stand instead of a scenario's own: `--set KEY=VALUE`, a variant's, those of a file that names it."""
 
 import json
+import math
+import re
+import tempfile
 import tomllib
 from pathlib import Path
 
 import msgspec
 import pytest
+import tomli_w
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from miro_host.registries import LAWS
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.camera_keys import GaussianCamera, PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse, written
+from miro_sim.scenario.keys import HostSpec
+from miro_sim.world.world import World
+from mirotwin.commands import main
 from tests.naive.tables import scalar_places
 
 TWO_TEAMS = Path(__file__).parents[2] / "examples" / "two_teams.toml"
@@ -76,11 +87,8 @@ def test_of_two_settings_of_a_key_the_later_one_holds():
     assert load("fig6", ["duration_s=2", "duration_s=3"]).scenario.duration_s == 3.0
     host = load("fig6", ["host.compute_s=0.001", "host={}"]).scenario.host
     assert host.compute_s == 0.003
-    radio = (
-        load("fig6", ["network.radio.eb_n0_db=12", "network.radio.bit_error_rate=0"])
-        .scenario.networks[0]
-        .radio
-    )
+    settings = ["network.radio.eb_n0_db=12", "network.radio.bit_error_rate=0"]
+    radio = load("fig6", settings).scenario.networks[0].radio
     assert (radio.eb_n0_db, radio.bit_error_rate) == (None, 0.0)
 
 
@@ -289,3 +297,265 @@ def test_a_setting_does_not_leave_out_its_own_key():
     assert "controller.kind=gaussian: unknown key; keys here: law," in refusal(
         "network.robot.controller.kind=gaussian"
     )
+
+
+SILENT = 'scenario = "silent"\n'
+CONTROLLER = "[network.robot.controller]"
+
+
+def test_keys_stand_instead_of_those_of_the_scenario_that_is_named():
+    silent = load("silent").scenario
+    mine = parse(
+        'scenario = "silent"\nname = "mine"\nduration_s = 0.5\nset = { network.robot.slot = 2 }', "mine"
+    )
+    assert (mine.name, mine.duration_s, mine.networks[0].robot[0].slot) == ("mine", 0.5, 2)
+    assert mine.title == silent.title
+    assert mine.networks[0].radio == silent.networks[0].radio
+
+
+def refused(text):
+    with pytest.raises(ScenarioError) as caught:
+        parse(text, "mine.toml")
+    return f"{caught.value}"
+
+
+def test_a_table_stands_as_a_whole(tmp_path):
+    (tmp_path / "late.toml").write_text(builtin_text("fig6").replace("delay_frames = 1", "delay_frames = 3"))
+    (tmp_path / "mine.toml").write_text('scenario = "late.toml"\n[camera]\nkind = "geometric"\n')
+    assert load(str(tmp_path / "late.toml")).scenario.camera.delay_frames == 3
+    assert load(str(tmp_path / "mine.toml")).scenario.camera.delay_frames == 1
+
+
+def test_a_file_is_named_from_the_folder_of_the_file_that_names_it(tmp_path):
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "bench" / "five.toml").write_text(
+        'name = "five"\nduration_s = 1.0\nnetwork = [{ robots = 5, robot = [{ slot = 4, reference.kind = "line" }] }]'
+    )
+    (tmp_path / "mine.toml").write_text('scenario = "bench/five.toml"\nduration_s = 0.1\n')
+    loaded = load(str(tmp_path / "mine.toml"))
+    assert (loaded.scenario.networks[0].robots, loaded.scenario.duration_s) == (5, 0.1)
+    assert parse(loaded.text, "elsewhere") == loaded.scenario
+
+
+def test_settings_of_the_command_line_win_over_those_of_the_file():
+    text = 'scenario = "silent"\nset = { duration_s = 0.5, network.robot.slot = 2 }'
+    assert parse(text, "mine", ["duration_s=0.25"]).duration_s == 0.25
+    assert parse(text, "mine", ["duration_s=0.25"]).networks[0].robot[0].slot == 2
+
+
+@given(
+    st.fixed_dictionaries(
+        {"scenario": st.sampled_from(["silent", "fig6", "fig7"])},
+        optional={
+            "duration_s": st.sampled_from([0.5, 2.0]),
+            "stop_on_fault": st.booleans(),
+            "expect": st.just({"no_fault": True}),
+            "set": st.just({"network": {"radio": {"latency_s": 0.01}}}),
+            "step": st.just([{"pause_ms": 3.0}]),
+        },
+    )
+)
+def test_the_text_that_is_kept_says_the_same_alone(tables):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "mine.toml")
+        path.write_text(tomli_w.dumps(tables))
+        loaded = load(str(path))
+    assert parse(loaded.text, "elsewhere") == loaded.scenario
+    assert "scenario =" not in loaded.text
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("scenario = 3", "scenario: expected a name or a path, got 3"),
+        ('scenario = ""', "scenario: expected a name or a path, got ''"),
+        ('scenario = "silnt"', "scenario: silnt: no such scenario; did you mean silent?"),
+        ('scenario = "none.toml"', "scenario: none.toml: no such file"),
+        ('scenario = "silent"\nset = 3', "set: expected a table of keys"),
+        (f"{SILENT}set = {{ duration = 3 }}", "set.duration=3: unknown key; use duration_s, in seconds"),
+        (f"{SILENT}set = {{ network.robot.slot = 9 }}", "set.network.robot.slot=9: 9 is out of range"),
+        (f"{SILENT}set = {{ network.1.robots = 5 }}", "set.network.1.robots=5: network has 1 entry"),
+        (f"{SILENT}duration = 3", "duration: unknown key; use duration_s, in seconds"),
+        ("set = { duration_s = 3 }", 'set: unknown key; it goes with scenario = "NAME"'),
+        ('base = "fig6"', "base: unknown key; did you mean scenario?"),
+        ('sceanrio = "fig6"', "sceanrio: unknown key; did you mean scenario?"),
+    ],
+)
+def test_what_is_wrong_is_named_where_it_stands(text, what):
+    assert refused(text).startswith(f"mine.toml: {what}")
+
+
+def test_the_keys_of_a_file_are_listed_with_those_of_a_scenario():
+    assert re.search("keys here: name, .*, network, scenario, set, variant;", refused('qqq = "fig6"'))
+    assert refusal("scenario=fig7").endswith("scenario=fig7: unknown key; it goes at the top of a file")
+
+
+@pytest.mark.parametrize(
+    ("header", "key"),
+    [
+        *(
+            (f"{header}\nq1_per_s = 0.4", "network.robot.controller.q1_per_s = 0.4")
+            for header in (CONTROLLER, f"[{CONTROLLER}]", f"[[network]]\n{CONTROLLER}")
+        ),
+        ('[network]\nradio.profile = "late"', 'network.radio.profile = "late"'),
+        (CONTROLLER, "network.robot.controller.q1_per_s = 0.3"),
+    ],
+)
+def test_a_header_of_a_part_of_a_network_is_answered_with_the_setting_that_is_meant(header, key):
+    what = "changes no single key of fig6; at the top of the file write"
+    assert refused(f'scenario = "fig6"\n{header}\n').endswith(f"{what} set = {{ {key} }} instead")
+    parse(f'scenario = "fig6"\nset = {{ {key} }}', "mine.toml")
+
+
+def test_a_scenario_that_names_itself_or_one_that_names_another_is_refused(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('scenario = "mine.toml"')
+    assert "mine.toml is itself another scenario with keys changed" in refusal(source=str(path))
+
+
+@pytest.mark.parametrize("place", ["network.robot.slot", "expect.inside_pitch", "duration_s"])
+def test_an_integer_that_is_too_long_to_be_shown_is_refused(place):
+    too_long, long = "an integer of 20000 bits; give a smaller one", f"0x{5000 * 'f'}"
+    assert too_long in refused(f"{SILENT}set = {{ {place} = {long} }}")
+    step = f'{SILENT}step = [{{ send = "ping", seq = {long} }}]'
+    assert refused(step).startswith(f"mine.toml: step[0].seq: {too_long}")
+
+
+SMALL = """
+name = "small"
+duration_s = 0.5
+{}
+[[network]]
+[network.radio]
+{}
+[[network.robot]]
+reference.kind = "line"
+{}
+"""
+
+
+def small(top, radio="", robot="", settings=()):
+    return parse(SMALL.format(top, radio, robot), "small", settings)
+
+
+EXACT = GaussianCamera(position_error_cm=0.0, heading_error_deg=0.0, pixel_cm=0.0, delay_frames=0)
+DISTURBED = [
+    "network.control_noise.v_m_s=0.1",
+    "network.radio.lost_frames=0.5",
+    "network.radio.profile=fade5",
+    "network.robot.drive.tyre.grip=0.2",
+    "network.robot.drive.ball.friction=0.2",
+    "network.robot.drive.disturbance.force_n=1",
+    "network.robot.drive.chassis.left_radius_factor=1.1",
+    "network.robot.drive.chassis.stiction_ratio=3",
+    "network.robot.drive.chassis.mass_kg=0.6",
+    "camera.dropped_frames=0.5",
+    "host.word_bits=8",
+    "host.integration=adams_bashforth",
+]
+
+
+@pytest.mark.parametrize("disturbed", [[], DISTURBED])
+@pytest.mark.parametrize("name", ["fig6", "fig8"])
+def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(name, disturbed):
+    scenario = load(name, [*disturbed, "variant=ideal"]).scenario
+    network = scenario.networks[0]
+    robot = network.robot[0]
+    assert scenario.camera == EXACT
+    assert scenario.host == HostSpec(compute_s=0.00001)
+    assert (network.radio.bit_error_rate, network.radio.eb_n0_db, network.radio.bursts) == (0.0, None, None)
+    assert (network.radio.lost_frames, network.radio.squelch) == (0.0, True)
+    assert (network.control_noise.v_m_s, robot.wheel_radius_mismatch) == (0.0, 0.0)
+    assert not robot.drive.is_rough()
+    assert robot.drive.chassis.left_radius_factor == 1.0
+    plain = load(name).scenario.networks[0].robot[0]
+    assert (robot.reference, robot.controller, robot.start_error_x_cm) == (
+        plain.reference,
+        plain.controller,
+        plain.start_error_x_cm,
+    )
+    assert robot.drive.chassis.mass_kg == (0.6 if disturbed else 0.5)  # a robot, not a disturbance
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig8"])
+def test_realistic_is_the_defaults_and_so_the_built_in_scenarios(name):
+    mass = ["network.robot.drive.chassis.mass_kg=0.6"]
+    assert load(name, [*DISTURBED, "variant=realistic"]).scenario == load(name, mass).scenario
+    assert load(name, ["variant=ideal", "variant=realistic"]).scenario == load(name).scenario
+
+
+def test_a_setting_after_the_variant_wins():
+    scenario = load("fig6", ["variant=ideal", "camera.delay_frames=2", "network.radio.eb_n0_db=9"]).scenario
+    assert scenario.camera == msgspec.structs.replace(EXACT, delay_frames=2)
+    radio = scenario.networks[0].radio
+    assert (radio.eb_n0_db, radio.bit_error_rate) == (9.0, None)
+
+
+def test_what_is_no_disturbance_stays():
+    kept = ["camera.window_px=40", "network.radio.channel=3", "network.radio.telemetry=false"]
+    scenario = load("fig6", [*kept, "camera.calibration=exact", "variant=realistic"]).scenario
+    assert scenario.camera == PixelCamera(window_px=40)
+    assert (scenario.networks[0].radio.channel, scenario.networks[0].radio.telemetry) == (3, False)
+
+
+def test_in_a_file_the_variant_fills_in_what_the_file_does_not_say():
+    assert small('variant = "ideal"') == small("", settings=["variant=ideal"])
+    found = small(
+        'variant = "ideal"\ncamera = { kind = "gaussian", delay_frames = 1 }\nhost.compute_s = 0.002',
+        "eb_n0_db = 9.0",
+        "wheel_radius_mismatch = 0.02",
+    )
+    assert found.camera == msgspec.structs.replace(EXACT, delay_frames=1)
+    assert found.host.compute_s == 0.002
+    radio = found.networks[0].radio
+    assert (radio.eb_n0_db, radio.bit_error_rate, radio.squelch) == (9.0, None, True)
+    assert found.networks[0].robot[0].wheel_radius_mismatch == 0.02
+
+
+def test_a_camera_of_another_kind_and_a_profile_in_a_file_are_what_the_file_says():
+    pixels = 'variant = "ideal"\ncamera = { kind = "pixels", window_px = 40 }'
+    found = small(pixels, 'profile = "fade15"')
+    assert found.camera == PixelCamera(window_px=40)
+    assert found.networks[0].radio.bit_error_rate == 1e-5
+
+
+def test_on_the_command_line_a_variant_replaces_that_of_the_file():
+    assert small('variant = "ideal"', settings=["variant=realistic"]) == small("")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [["variant=ideal"], ["variant=ideal", "camera.delay_frames=1"], [*DISTURBED, "variant=ideal"]],
+    ids=len,
+)
+def test_the_text_that_a_recording_keeps_of_a_variant_says_the_same(settings):
+    loaded = load("fig8", settings)
+    assert parse(loaded.text, "kept") == loaded.scenario
+
+
+def test_another_name_is_refused_in_one_line():
+    unknown = "'idael' is no variant; did you mean ideal? variants: ideal, realistic"
+    assert refusal("variant=idael") == f"fig6: --set variant=idael: {unknown}"
+    assert "--set variant=3: 3 is no variant; variants: ideal, realistic" in refusal("variant=3")
+    with pytest.raises(ScenarioError, match=r"small: variant: 'x' is no variant"):
+        small('variant = "x"')
+    with pytest.raises(ScenarioError, match=r"network"):
+        parse('name = "a"\nduration_s = 1.0\nnetwork = 3', "odd", ["variant=ideal"])
+
+
+def test_the_command_line_lists_them():
+    done = CliRunner().invoke(main, ["scenarios", "variants"], env={"COLUMNS": "300"})
+    assert done.exit_code == 0
+    assert "ideal" in done.output
+    assert "realistic" in done.output
+    assert "wheel_radius_mismatch = 0.0" in done.output
+
+
+def test_in_the_ideal_loop_body_frame_follows_the_line_within_a_millimetre():
+    settings = ["variant=ideal", 'network.robot.controller={law="body_frame"}']
+    one, squares = World(load("fig6", settings).scenario, 0, load_hex(image_path())), []
+    while not one.finished:
+        robot = one.step().robots[0]
+        dx, dy = robot.truth.x_m - robot.reference.x_m, robot.truth.y_m - robot.reference.y_m
+        squares.append(dx * dx + dy * dy)
+    assert math.sqrt(math.fsum(squares[-30:]) / 30) < 0.001

@@ -1,7 +1,9 @@
-"""The pitch: starts and references that are not on it are refused with place and limits."""
+"""Starts off the pitch, and references that leave it, or that no robot or law could drive, are refused with place."""
 
+import cmath
 import math
 import re
+from itertools import product
 
 import pytest
 from hypothesis import example, given
@@ -10,8 +12,130 @@ from hypothesis import strategies as st
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.build import reference_for
-from miro_sim.scenario.file import ScenarioError, builtin_names, load, parse
+from miro_sim.scenario.file import ScenarioError, parse
 from tests.host.distribution import install
+
+DRIVE = """
+name = "drive"
+duration_s = {duration_s}
+[[network]]
+[[network.robot]]
+reference = {{ {reference} }}
+controller = {{ {controller} }}
+"""
+POLAR = 'law = "yang_kim"'
+FREE = 'law = "body_frame"'
+LINE = 'kind = "line"'
+PLACE = "my.toml: network[0].robot[0].reference: "
+CIRCLE = 'kind = "arc", curvature_per_m = 8.0, heading_deg = -45.0'
+THROUGH = f"{LINE}, start_x_cm = 20.0, start_y_cm = 20.0, heading_deg = -135.0, drive_s = 2.0"
+WAY = 'kind = "waypoints", points = [{ x_cm = 0.0, y_cm = 0.0, heading_deg = 10.0 }, { x_cm = 60.0, y_cm = 20.0 }, '
+
+
+def drive_text(reference, controller=POLAR, duration_s=6.0):
+    return DRIVE.format(reference=reference, controller=controller, duration_s=duration_s)
+
+
+def accepted(*arguments):
+    parse(drive_text(*arguments), "my.toml")
+
+
+def drive_refusal(*arguments):
+    with pytest.raises(ScenarioError) as caught:
+        accepted(*arguments)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+WHEELS = "a wheel needs 1.526 m/s; it reaches 1.46 m/s; drive it more slowly, or turn less"
+RAISE = "drive it more slowly, or raise controller.max_v_dot_m_s2"
+
+
+@pytest.mark.parametrize(
+    ("reference", "controller", "expected"),
+    [
+        (
+            f"{LINE}, speed_m_s = 1.2, drive_s = 0.9",
+            POLAR,
+            "more than the controller's max_v_m_s = 0.95; drive",
+        ),
+        (f"{CIRCLE}, drive_s = 2", f"{FREE}, max_w_rad_s = 1.5", "the controller's max_w_rad_s = 1.5; drive"),
+        (f"{LINE}, speed_m_s = 0.4, ramp_s = 0.04, drive_s = 2", POLAR, f"max_v_dot_m_s2 = 8; {RAISE}"),
+        (f"{CIRCLE}, drive_s = 2", f"{FREE}, max_w_dot_rad_s2 = 3.1", "it needs 3.2 rad/s2, more than the"),
+        (f"{CIRCLE}, speed_m_s = 1.2, drive_s = 1.5", f"{FREE}, max_v_m_s = 2, max_w_rad_s = 20", WHEELS),
+        (f"{WAY}], speed_m_s = 1.0, accel_m_s2 = 3.0, lateral_accel_m_s2 = 9.0", POLAR, "it needs 0.9"),
+    ],
+)
+def test_what_is_beyond_wheels_or_law_is_refused(reference, controller, expected):
+    message = drive_refusal(reference, controller)
+    assert re.match(re.escape(PLACE) + r"after \d+\.\d\d s, at \(-?\d+\.\d, -?\d+\.\d\) cm, ", message)
+    assert expected in message
+
+
+def test_what_limits_just_allow_is_not_refused():
+    accepted(f"{LINE}, speed_m_s = 0.4, ramp_s = 0.5, drive_s = 2", f"{POLAR}, max_v_m_s = 0.4")
+    accepted(f"{LINE}, drive_s = 2", f"{POLAR}, max_v_dot_m_s2 = 0.4")
+
+
+def test_a_start_at_full_speed_is_a_change_within_one_camera_frame():
+    accepted(f"{LINE}, speed_m_s = 0.26, ramp_s = 0.0, drive_s = 2")
+    assert "needs 8.991 m/s2" in drive_refusal('kind = "line", speed_m_s = 0.3, ramp_s = 0.0, drive_s = 2')
+
+
+@pytest.mark.parametrize(
+    ("reference", "expected"),
+    [
+        (CIRCLE, "passes the origin: after 4.17 s, at (-0.0, 0.0) cm, it is 0.04 cm away"),
+        (THROUGH, "the law 'yang_kim', which has polar coordinates, needs 2.4 cm; lead it past the origin"),
+        (f"{LINE}, start_x_cm = 1.0, drive_s = 3.0", "after 0.00 s, at (1.0, 0.0) cm, it is 1.00 cm away"),
+        ('kind = "sine", start_x_cm = -4.0, drive_s = 3.0', "or choose another law, such as body_frame"),
+        (f"{WAY}{{ x_cm = 40.0, y_cm = 50.0 }}, {{ x_cm = 1.0, y_cm = 1.0 }}]", "it is 1.41 cm away"),
+    ],
+)
+def test_a_path_past_the_origin_is_refused_under_a_law_in_polar_coordinates_only(reference, expected):
+    message = drive_refusal(reference, POLAR, 11.0)
+    assert message.startswith(PLACE + "passes the origin: after ")
+    assert expected in message
+    accepted(reference, FREE, 5.0)
+
+
+@pytest.mark.parametrize(
+    "reference",
+    [
+        *(LINE, f"{LINE}, speed_m_s = 0.0", f"{LINE}, drive_s = 0.3"),
+        f"{LINE}, start_x_cm = 10.0, start_y_cm = 2.5",
+        'kind = "sine"',
+        f"{WAY}]",
+    ],
+)
+def test_a_path_that_starts_in_the_origin_or_keeps_away_from_it_is_not_refused(reference):
+    accepted(reference, POLAR, 5.0)
+
+
+def test_a_closed_path_may_belong_to_a_run_of_a_day():
+    points = "{ x_cm = 20, y_cm = 10 }, { x_cm = 70, y_cm = 20 }, { x_cm = 30, y_cm = 50 }"
+    accepted(f'kind = "waypoints", closed = true, points = [{points}]', FREE, 86_400.0)
+    accepted('kind = "arc", start_x_cm = 50, curvature_per_m = 5.0, heading_deg = 0.0', FREE, 86_400.0)
+
+
+@pytest.mark.parametrize(
+    ("reference", "expected"),
+    [
+        ('kind = "waypoints"', "reference.points: this key is missing"),
+        ('kind = "waypoints", points = []', "reference.points: there are 0; give 2 to 200"),
+        ('kind = "waypoints", points = [3]', "reference.points[0]: expected a table, got a whole number (3)"),
+        (f"{WAY}{{ x_cm = 66.0, y_cm = 20.0 }}]", "reference.points[2]: less than 7.5 cm from points[1]"),
+        (f"{WAY}{{ x_cm = nan, y_cm = 20 }}]", "points[2].x_cm: nan is not a number that can be used"),
+        (f"{WAY}{{ x_cm = 80, y = 20 }}]", "reference.points[2].y: unknown key; use y_cm, in centimetres"),
+        (f"{WAY}{{ x_cm = 118.0, y_cm = 20.0 }}]", "reference: leaves the pitch after"),
+        ('kind = "sine", wavelength_cm = 0.0', "wavelength_cm: 0.0 is out of range; must be >= 1.0"),
+        ('kind = "sine", amplitude_cm = inf', "amplitude_cm: inf is not a number that can be used"),
+        (CIRCLE, "reference: passes the origin"),
+    ],
+)
+def test_points_and_sizes_that_make_no_path_are_named_with_their_place(reference, expected):
+    assert expected in drive_refusal(reference, POLAR, 12.0)
+
 
 TEXT = """
 name = "place"
@@ -23,7 +147,6 @@ slot = 1
 {start}
 reference = {{ {reference} }}
 """
-LINE = 'kind = "line"'
 HERE = "network[0].robot[1]"
 SPOTS = st.builds(Posture, st.floats(-0.3, 1.4), st.floats(-0.3, 1.1), st.floats(-math.pi, math.pi))
 
@@ -43,22 +166,13 @@ def refusal(*arguments, **options):
 @example(Posture(1.1625, 0.0, 0.0))
 @example(Posture(1.1625, 0.0, math.pi / 4))
 def test_a_robot_is_on_the_pitch_when_its_four_corners_are(at):
-    corners = [
-        (
-            at.x_m + ahead * math.cos(at.theta_rad) - aside * math.sin(at.theta_rad),
-            at.y_m + ahead * math.sin(at.theta_rad) + aside * math.cos(at.theta_rad),
-        )
-        for ahead in (-0.0375, 0.0375)
-        for aside in (-0.0375, 0.0375)
+    half, turned = 0.0375, cmath.exp(1j * at.theta_rad)
+    spots = [
+        complex(at.x_m, at.y_m) + turned * complex(*corner) for corner in product((-half, half), repeat=2)
     ]
-    room = min(min(x + 0.10, 1.20 - x, y + 0.10, 0.80 - y) for x, y in corners)
+    room = min(min(spot.real + 0.10, 1.20 - spot.real, spot.imag + 0.10, 0.80 - spot.imag) for spot in spots)
     if abs(room) > 1e-12:
         assert pitch.holds(at) == (room > 0.0)
-
-
-@pytest.mark.parametrize("name", builtin_names())
-def test_the_built_in_scenarios_are_on_the_pitch(name):
-    load(name)
 
 
 @pytest.mark.parametrize(
@@ -91,11 +205,6 @@ def test_a_start_at_the_very_edge_is_none_of_these():
         (f"{LINE}, heading_deg = 180.0", 6.0, "leaves the pitch after 0.57 s of 6 s"),
         (f"{LINE}, heading_deg = 90.0, drive_s = 5.0", 60.0, "takes y ="),
         (f"{LINE}, speed_m_s = 1.46, ramp_s = 1000.0", 86_400.0, "leaves the pitch after 39."),
-        (
-            'kind = "arc", curvature_per_m = 8.0, heading_deg = -45.0',
-            60.0,
-            "reference: passes the origin: after",
-        ),
         ('kind = "arc", curvature_per_m = 1.0', 6.0, "reference: leaves the pitch after"),
     ],
 )
