@@ -83,6 +83,10 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
     assert f"`{name}`" in README.read_text()
 
 
+CRYSTAL = ".crystal_offset_ppm:"
+TOO_SHORT = "every_s = 0.000105, length_s = 0.000105", "every_s = 0.0002, length_s = 0.000106"
+
+
 @pytest.mark.parametrize(
     ("lines", "expected"),
     [
@@ -90,7 +94,7 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
         ('profile = ["late", "nothing"]', ".profile: 'nothing' is no profile; profiles: wire, late,"),
         (
             "profile = 3",
-            ".profile: expected a name or a list of names, got 3; see `mirotwin scenarios profiles`",
+            ".profile: expected a name or a list of names, got 3; see `mirotwin scenarios profiles",
         ),
         ("eb_n0_db = 11.0\nbit_error_rate = 0.0", ".eb_n0_db: sets the same as bit_error_rate; give one of"),
         ("eb_n0 = 11.0", ".eb_n0: unknown key; use eb_n0_db, in decibels"),
@@ -98,12 +102,9 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
         ("baud_offset_hz = 3", ".baud_offset_hz: unknown key; use baud_offset_ppm, in parts per million"),
         (
             "crystal_offset_ppm = 60000",
-            ".crystal_offset_ppm: 60000 is out of range; must be -50000 to 50000 in parts per",
+            f"{CRYSTAL} 60000 is out of range; must be -50000 to 50000 in parts per",
         ),
-        (
-            "crystal_offset_ppm = 0.5",
-            ".crystal_offset_ppm: expected a whole number in parts per million, got",
-        ),
+        ("crystal_offset_ppm = 0.5", f"{CRYSTAL} expected a whole number in parts per million, got"),
         ("eb_n0_db = '11 dB'", ".eb_n0_db: expected a number in decibels, got a string ('11 dB')"),
         ("false_starts_hz = -1.0", ".false_starts_hz: -1.0 is out of range; must be 0 to 9600 in hertz"),
         (
@@ -118,8 +119,9 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
         ),
         (
             "dropouts = { every_s = 1, length_s = 0 }",
-            ".dropouts.length_s: 0.0 is out of range; must be 0.000105 to 1e+06 in seconds",
+            ".dropouts.length_s: 0.0 is out of range; must be 0.000105 to",
         ),
+        *((f"dropouts = {{ {pair} }}", ".dropouts") for pair in TOO_SHORT),
         ("channel = -1", ".channel: -1 is out of range; must be 0 to 999"),
     ],
 )
@@ -128,19 +130,17 @@ def test_a_bad_radio_is_named_with_its_place_and_its_remedy(lines, expected):
 
 
 def test_profiles_that_contradict_are_named_with_the_key_and_the_ways_out():
-    assert refusal('profile = ["slicer", "fade15"]') == (
-        ".profile: slicer needs eb_n0_db, and fade15 sets bit_error_rate in its place;"
-        " leave one of them out, name slicer after fade15, or give eb_n0_db"
-    )
+    needed = ".profile: slicer needs eb_n0_db, and fade15 sets bit_error_rate in its place;"
+    remedy = " leave one of them out, name slicer after fade15, or give eb_n0_db"
+    assert refusal('profile = ["slicer", "fade15"]') == needed + remedy
     assert radio('profile = ["fade15", "slicer"]').eb_n0_db == 13.35
     assert radio('profile = ["slicer", "fade15"]\neb_n0_db = 12.0').eb_n0_db == 12.0
 
 
 def test_a_key_that_contradicts_a_profile_is_named_with_it():
-    assert refusal('profile = "slicer"\nbit_error_rate = 0.01') == (
-        ".profile: slicer needs eb_n0_db, and bit_error_rate is given in its place;"
-        " leave one of them out, or give eb_n0_db instead"
-    )
+    needed = ".profile: slicer needs eb_n0_db, and bit_error_rate is given in its place;"
+    remedy = " leave one of them out, or give eb_n0_db instead"
+    assert refusal('profile = "slicer"\nbit_error_rate = 0.01') == needed + remedy
 
 
 @pytest.mark.parametrize("first", profiles.profiles())
@@ -154,16 +154,10 @@ def test_two_profiles_go_together_or_are_both_named(first):
 
 
 def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused():
-    slow = text("baud_offset_ppm = -40000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
-    with pytest.raises(
-        ScenarioError, match=r"network\[0\]\.radio\.baud_offset_ppm: -40000 makes a frame of 31"
-    ):
-        parse(slow, "air.toml")
-    late = text("baud_offset_ppm = -3000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
-    with pytest.raises(
-        ScenarioError, match=r"network\[0\]\.radio\.keyup_s: 0\.001 s and a frame of 31 .* do not"
-    ):
-        parse(late, "air.toml")
+    for ppm, expected in ((-40000, "baud_offset_ppm: -40000 makes"), (-3000, "keyup_s: 0.001 s and")):
+        slow = text(f"baud_offset_ppm = {ppm}").replace("[[network]]", "[[network]]\nrobots = 5", 1)
+        with pytest.raises(ScenarioError, match=rf"network\[0\]\.radio\.{expected} a frame of 31"):
+            parse(slow, "air.toml")
 
 
 def test_the_command_line_lists_the_profiles_with_their_keys():
@@ -190,11 +184,11 @@ BURSTS = "bursts = { good_to_bad = 0.002, bad_to_good = 0.01 }"
 
 
 def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded():
-    whole = ran(world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01"))
-    cut = world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01")
+    radios = ALL, f"{ALL}\nchannel = 1\n{BURSTS}", "channel = 1\nlatency_s = 0.01"
+    whole, cut = ran(world(*radios)), world(*radios)
     for tick in range(0, 6 * CONTROL_PERIOD_TICKS, 333_333):
         cut.run_to(tick)
-        again = world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01")
+        again = world(*radios)
         again.load(cut.save())
         cut = again
     cut.run_to(6 * CONTROL_PERIOD_TICKS)
@@ -228,12 +222,3 @@ def test_what_is_off_is_not_in_the_state():
     paths = set(everything.state.decode(everything.state.save()))
     assert "networks[0].downlink.listeners[0].slicer.mean" in paths
     assert "networks[0].downlink.overheard[0].transmissions" in paths
-
-
-@pytest.mark.parametrize(
-    "pair", ["every_s = 0.000105, length_s = 0.000105", "every_s = 0.0002, length_s = 0.000106"]
-)
-def test_drop_outs_too_short_for_the_bits_are_an_error_with_their_path(pair):
-    text = f'name = "x"\nduration_s = 0.1\n[[network]]\nradio.dropouts = {{ {pair} }}\n'
-    with pytest.raises(ScenarioError, match=r"network\[0\]\.radio\.dropouts"):
-        parse(f'{text}[[network.robot]]\nreference.kind = "line"\n', "x.toml")
