@@ -1,5 +1,7 @@
 """The runs whose bits are frozen: `python -m tests.sim.digests` says which differ, `--write` puts the new digests down.
 
+With names of runs it prints their digests: `python -m tests.sim.digests "fig6 0.5 s seed 7"`.
+
 Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
 
@@ -8,16 +10,19 @@ Functions import what has to wait until the engine is chosen.
 
 import argparse
 import json
+import re
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 from miro_exact import engine
 from tests import children
-from tests.sim.digest_of import REFUSED, digest
 
+REFUSED = 3
+"""Exit code where this Python or its engine is refused; the reason stands in one line on stderr."""
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
 SHORT = "fig6 0.5 s seed 7"
@@ -28,6 +33,44 @@ CAMERAS = (
     'camera={kind="geometric",calibration="none"}',
     'camera={kind="pixels",calibration="none"}',
 )
+
+
+_NAME = re.compile(
+    r"(?P<scenario>\S+) (?P<duration_s>[0-9.]+) s seed (?P<seed>[0-9]+)(?P<settings>( --set \S+)*)"
+)
+
+
+class Entry(NamedTuple):
+    """A run: a scenario, with settings, cut to a duration, with a seed."""
+
+    scenario: str
+    duration_s: float
+    seed: int
+    settings: tuple[str, ...]
+
+
+def parse(name):
+    """The entry of a name like `fig6 0.5 s seed 7 --set camera.kind=gaussian`. Raises ValueError if it is none."""
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} names no run: write it like 'fig6 0.5 s seed 7'")
+    settings = tuple(match["settings"].split(" --set ")[1:])
+    return Entry(match["scenario"], float(match["duration_s"]), int(match["seed"]), settings)
+
+
+def digest(name):
+    """Runs it from begin to end."""
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from miro_sim.scenario.file import load
+    from miro_sim.world.world import World
+
+    entry = parse(name)
+    scenario = load(entry.scenario, (*entry.settings, f"duration_s={entry.duration_s}")).scenario
+    world = World(scenario, entry.seed, load_hex(image_path()))
+    while not world.finished:
+        world.step()
+    return world.digest
 
 
 def names():
@@ -62,8 +105,9 @@ def _name(scenario, *settings):
 
 
 def main():
-    """Prints the names of those that differ; exit code 1 if there are some, 3 if the engine is refused."""
+    """Exit code 1 if runs of the table differ, 3 if the engine is refused."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("name", nargs="*", help="print this run's digest")
     parser.add_argument("--write", action="store_true", help="for a change of bits that is meant")
     parser.add_argument(
         "--engine", choices=engine.ENGINES, default="compiled", help="python: uncompiled, for minutes"
@@ -72,6 +116,10 @@ def main():
     golden = json.loads(GOLDEN.read_text())
     try:
         engine.select(options.engine)
+        for name in options.name:
+            print(digest(name), flush=True)
+        if options.name:
+            return 0
         wanted = list(names())
         with ProcessPoolExecutor(initializer=children.reset_signals) as pool:
             digests = pool.map(partial(_digest, options.engine), wanted)

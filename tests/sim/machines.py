@@ -1,11 +1,11 @@
 """The same bits on another family of processors: `python -m tests.sim.machines s390x`.
 
-What a run is stands in `digest_of.py`.
+What a run is stands in `digests.py`.
 
     apt-get (own lists, nothing installed) -> root/   Python of Debian for that machine, its C library and headers
     pip                                    -> site/   what `miro_sim.world` imports: wheels, or built from source
     setup.py build with the cross compiler -> O2/lib/ the packages with their hot modules for that machine
-    qemu-s390x-static root/usr/bin/python3.11 -m tests.sim.digest_of "fig6 0.5 s seed 7"
+    qemu-s390x-static root/usr/bin/python3.11 -m tests.sim.digests "fig6 0.5 s seed 7"
 
 Needs Debian 12 with `qemu-user-static` and the machine's cross compiler; the command names what is missing. Delete
 `build/NAME` to start again; otherwise only what changed is compiled again.
@@ -27,10 +27,9 @@ from pathlib import Path
 
 from miro_exact import engine
 from tests import children
-from tests.sim.digest_of import REFUSED, parse
+from tests.sim.digests import GOLDEN, REFUSED, parse
 
 ROOT = Path(__file__).parents[2]
-GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
 VERSION = "3.11"  # of Debian 12's Python
 DEBS = (
     *(f"{package}{VERSION}-minimal" for package in ("python", "libpython")),
@@ -182,7 +181,7 @@ def copy(machine):
 def digests(machine, lib, names, which):
     """Of the runs so named, by a processor of that machine with the packages in `lib`. Raises Refused."""
     root = machine.folder / "root"
-    python = [str(root / "usr" / "bin" / f"python{VERSION}"), "-m", "tests.sim.digest_of"]
+    python = [str(root / "usr" / "bin" / f"python{VERSION}"), "-m", "tests.sim.digests"]
     command = [machine.emulator, "-L", str(root), *python, "--engine", which, *names]
     path = os.pathsep.join((str(lib), str(machine.folder / "site")))
     return run(command, env={"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}).split()
@@ -235,7 +234,7 @@ def wanted(options):
     if not options.whole_runs:
         shortest = min(golden, key=lambda name: parse(name).duration_s)
         golden = {shortest: golden[shortest]}
-    command = [sys.executable, "-m", "tests.sim.digest_of", "--engine", options.engine]
+    command = [sys.executable, "-m", "tests.sim.digests", "--engine", options.engine]
     return golden | {name: run([*command, name]).strip() for name in options.beside}
 
 
