@@ -1,7 +1,6 @@
 """Keys that stand instead of a scenario's own: `--set KEY=VALUE`, a variant's, those of a file that names it."""
 
 import json
-import math
 import re
 import tempfile
 import tomllib
@@ -16,12 +15,9 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from miro_host.registries import LAWS
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_sim.scenario.camera_keys import GaussianCamera, PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse, written
 from miro_sim.scenario.keys import HostSpec
-from miro_sim.world.world import World
 from mirotwin.commands import main
 from tests.naive.tables import scalar_places
 
@@ -549,13 +545,3 @@ def test_the_command_line_lists_them():
     assert "ideal" in done.output
     assert "realistic" in done.output
     assert "wheel_radius_mismatch = 0.0" in done.output
-
-
-def test_in_the_ideal_loop_body_frame_follows_the_line_within_a_millimetre():
-    settings = ["variant=ideal", 'network.robot.controller={law="body_frame"}']
-    one, squares = World(load("fig6", settings).scenario, 0, load_hex(image_path())), []
-    while not one.finished:
-        robot = one.step().robots[0]
-        dx, dy = robot.truth.x_m - robot.reference.x_m, robot.truth.y_m - robot.reference.y_m
-        squares.append(dx * dx + dy * dy)
-    assert math.sqrt(math.fsum(squares[-30:]) / 30) < 0.001
