@@ -12,7 +12,10 @@ is left for a whole module's.
 import os
 import signal
 import subprocess
+import sys
+from pathlib import Path
 
+ROOT = Path(__file__).parents[1]
 SIGNALS = ("SIGINT", "SIGHUP", "SIGTERM", "SIGQUIT")
 
 
@@ -31,6 +34,13 @@ def run(command, **named):
 def start(command, **named):
     """`subprocess.Popen`, with default signals."""
     return subprocess.Popen(command, **_with_reset(named))
+
+
+def uncompiled(code):
+    """What this code prints in a process that runs the sources instead of compiled modules."""
+    code = f"from miro_exact import engine; engine.select('python'); {code}"
+    command = [sys.executable, "-c", code]
+    return run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
 def fork():

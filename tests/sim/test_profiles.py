@@ -122,6 +122,12 @@ TOO_SHORT = "every_s = 0.000105, length_s = 0.000105", "every_s = 0.0002, length
             ".dropouts.length_s: 0.0 is out of range; must be 0.000105 to",
         ),
         *((f"dropouts = {{ {pair} }}", ".dropouts") for pair in TOO_SHORT),
+        ("lost_character_rate = 1.5", ".lost_character_rate: 1.5 is out of range; must be 0 to 1"),
+        ("latency_s = -1e-9", ".latency_s: -1e-09 is out of range; must be 0 to 0.03 in seconds"),
+        ("keyup_s = 1.0", ".keyup_s: 1.0 is out of range; must be 0 to 0.03 in seconds"),
+        ("bit_error_rate = 0.6", ".bit_error_rate: 0.6 is out of range; must be 0 to 0.5"),
+        ("slicer.settle_s = 0.0001", ".slicer.settle_s: 0.0001 is out of range; must be 0.000105 to 1"),
+        ("slicer.offset = 1.1", ".slicer.offset: 1.1 is out of range; must be -1 to 1"),
         ("channel = -1", ".channel: -1 is out of range; must be 0 to 999"),
     ],
 )

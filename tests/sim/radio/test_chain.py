@@ -11,7 +11,7 @@ from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import load
 from tests.naive import radio as naive
-from tests.sim.radio.strategies import bursts, dropouts, seeds
+from tests.sim.radio.radios import bursts, dropouts, seeds
 
 SECONDS = 100
 SLOTS = 9600 * SECONDS

@@ -1,11 +1,21 @@
-"""Parameters of a band: units in, ticks and thresholds out, errors by name."""
+"""Parameters of a band: units in, ticks and thresholds out; the formula of non-coherent FSK beside mpmath."""
 
 from fractions import Fraction
 
+import mpmath
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
-from miro_sim.radio.probability import error_threshold
+from miro_sim.radio.params import Dropouts, Radio
+from miro_sim.radio.probability import (
+    ONE,
+    error_threshold,
+    fsk_threshold,
+    margin_table,
+    mean_threshold,
+    rate_threshold,
+)
 
 
 def test_units_become_ticks_and_a_threshold():
@@ -27,30 +37,57 @@ def test_a_rate_that_is_no_probability_is_refused(rate):
         error_threshold(rate)
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: Radio(latency_s=-1e-9), "latency_s must be 0 to 0.03, got -1e-09"),
-        (lambda: Radio(keyup_s=1.0), "keyup_s must be 0 to 0.03"),
-        (lambda: Radio(bit_error_rate=float("nan")), "bit_error_rate must be 0 to 0.5, got nan"),
-        (lambda: Radio(bit_error_rate=0.0, eb_n0_db=10.0), "eb_n0_db: sets the same as bit_error_rate"),
-        (lambda: Radio(slicer=SlicerParams()), "slicer: its bit errors follow from Eb/N0"),
-        (lambda: Radio(lost_character_rate=1.5), "lost_character_rate must be 0 to 1"),
-        (
-            lambda: Bursts(good_to_bad=1.0, bad_to_good=1e-9),
-            "bad_to_good: 1e-09 and good_to_bad 1.0 make more",
-        ),
-        (lambda: Bursts(good_to_bad=-1e-9, bad_to_good=0.5), "good_to_bad must be 0 to 1"),
-        (lambda: Dropouts(every_s=0.00012, length_s=0.00012), "too short together"),
-        (lambda: SlicerParams(settle_s=0.0001), "settle_s must be 0.000105 to 1"),
-        (lambda: SlicerParams(offset=1.1), "offset must be -1 to 1"),
-    ],
-)
-def test_a_parameter_outside_its_range_is_refused_by_name(make, text):
-    with pytest.raises(ValueError, match=text):
-        make()
-
-
 def test_an_ideal_band_is_a_wire():
     ideal = Radio.ideal()
     assert (ideal.latency_ticks, ideal.error_threshold, ideal.keyup_ticks, ideal.squelch) == (0, 0, 0, True)
+
+
+def ber(eb_n0_db, margin=1):
+    with mpmath.workprec(120):
+        return mpmath.exp(-(mpmath.mpf(10) ** (mpmath.mpf(eb_n0_db) / 10)) * mpmath.mpf(margin) ** 2 / 2) / 2
+
+
+@given(st.floats(-20, 60))
+def test_a_signal_to_noise_ratio_becomes_the_nearest_threshold(eb_n0_db):
+    assert abs(fsk_threshold(eb_n0_db) - ber(eb_n0_db) * ONE) <= mpmath.mpf("0.50001")
+
+
+@pytest.mark.parametrize(("eb_n0_db", "rate"), [(8.93, 1e-2), (10.94, 1e-3), (12.31, 1e-4), (13.35, 1e-5)])
+def test_the_figures_of_the_radio_literature_come_out(eb_n0_db, rate):
+    assert fsk_threshold(eb_n0_db) / ONE == pytest.approx(rate, rel=0.02)
+
+
+def test_without_a_signal_half_of_the_bits_are_wrong():
+    assert fsk_threshold(-300.0) == ONE // 2
+
+
+@given(st.floats(-20, 60), st.integers(0, 512))
+def test_a_margin_has_the_errors_of_a_signal_of_that_amplitude(eb_n0_db, index):
+    margin = (index - 128) / 128
+    wrong = ber(eb_n0_db, margin)
+    expected = wrong if margin >= 0 else 1 - wrong
+    assert abs(margin_table(eb_n0_db)[index] - expected * ONE) <= mpmath.mpf("0.50001")
+
+
+def test_a_margin_of_one_is_no_penalty():
+    assert margin_table(11.0)[256] == fsk_threshold(11.0)
+
+
+def test_times_become_chances_a_bit():
+    assert rate_threshold(9600.0) == ONE
+    assert rate_threshold(0.0) == 0
+    assert mean_threshold(1.0) == round(ONE / 9600)
+    dropouts = Dropouts(every_s=2.0, length_s=0.02)
+    assert (dropouts.enter, dropouts.leave) == (round(ONE / 19_200), round(ONE / 192))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: rate_threshold(9601.0), "9601.0/s in a bit time"),
+        (lambda: mean_threshold(0.0001), "shorter than a bit"),
+    ],
+)
+def test_what_cannot_be_is_refused(make, text):
+    with pytest.raises(ValueError, match=text):
+        make()
