@@ -1,6 +1,8 @@
 """What the drive's tests do with a drive: PWM as the board gives it, and a script that any engine can run."""
 
 from miro_exact.state import Flat
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Chassis, Disturbance, DriveParams, RollingBall, Tyre
 
 PERIOD = 2048
 
@@ -24,12 +26,24 @@ def pwm(drive, left, right, periods):
 PATTERN = ((60, 70), (127, 128), (-128, 20), (0, 0), (3, -3), (-40, -50), (90, -90), (0, 0), (9, 9))
 
 
-def trace(make, periods):
-    """Every state (floats as hex) after each stretch of the pattern."""
-    drive = make()
-    lines = []
+TRACED = {
+    "plain": DriveParams(),
+    "rough": DriveParams(
+        tyre=Tyre(grip=0.25),
+        ball=RollingBall(friction=0.3),
+        chassis=Chassis(
+            stiction_ratio=1.5, left_radius_factor=0.985, gear_backlash_rad=0.02, gear_load_friction=0.2
+        ),
+        disturbance=Disturbance(force_n=0.1, sine_torque_nm=0.01, noise_force_n=0.2, period_s=0.05),
+    ),
+}
+
+
+def trace(name):
+    """Every state (floats as hex) of a drive after each stretch of the pattern."""
+    drive, lines = DifferentialDrive(TRACED[name], 0.1, 0.2, -1.0), []
     for left, right in PATTERN:
-        pwm(drive, left, right, periods)
+        pwm(drive, left, right, 60)
         state = Flat(drive)
         lines += [f"{path} {float(number).hex()}" for path, number in state.decode(state.save()).items()]
     return lines

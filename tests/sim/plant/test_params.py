@@ -3,7 +3,6 @@
 import math
 from pathlib import Path
 
-import msgspec
 import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
@@ -44,17 +43,6 @@ def test_each_wheel_has_its_own_radius():
     assert (params.radius_m(0), params.radius_m(1)) == (0.020 * 0.99, 0.020 * 1.01)
 
 
-@pytest.mark.parametrize(
-    ("kind", "field", "value"),
-    [(Motor, "inductance_h", 0.0), (Battery, "voltage_v", -7.2), (Chassis, "mass_kg", math.nan)]
-    + [(Chassis, "rolling_resistance", -0.1), (OpticalEncoder, "lines", 0)]
-    + [(Motor, "resistance_ohm", 1e-300), (Chassis, "gear_ratio", 1e300), (Chassis, "wheel_radius_m", 1e9)],
-)
-def test_impossible_figures_are_refused_by_name_and_range(kind, field, value):
-    with pytest.raises(ValueError, match=f"{field} must be .* to .*, got"):
-        kind(**{field: value})
-
-
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: type(table).__name__)
 def test_every_number_has_a_range_whose_ends_are_in_it(table):
     numbers = {name for name in table.__struct_fields__ if not isinstance(getattr(table, name), bool)}
@@ -62,7 +50,7 @@ def test_every_number_has_a_range_whose_ends_are_in_it(table):
     for name, (low, high) in table.WITHIN.items():
         for end in (low, high):
             assert getattr(type(table)(**{name: end}), name) == end
-        for beyond in (low - 0.01 * abs(high), high * 1.01):
+        for beyond in (low - 0.01 * abs(high), high * 1.01, math.nan):
             with pytest.raises(ValueError, match=f"{name} must be"):
                 type(table)(**{name: beyond})
 
@@ -100,8 +88,3 @@ def test_no_shaft_that_is_driven_turns_faster_than_twice_its_speed_without_load(
         pwm(drive, 128, -128, 1)
         assert abs(drive.body.left_rad_s) <= most
         assert abs(drive.body.right_rad_s) <= most
-
-
-def test_an_unknown_key_is_refused_with_its_path():
-    with pytest.raises(msgspec.ValidationError, match=r"masskg.*\$\.chassis"):
-        msgspec.convert({"chassis": {"masskg": 1.0}}, DriveParams)
