@@ -10,11 +10,13 @@ import random
 import sys
 import time
 from dataclasses import dataclass, field
+from itertools import combinations
 
 from msgspec.structs import astuple
 
 from miro_exact.clock import CAMERA_FRAME_TICKS
 from miro_exact.rng import Stream
+from miro_host.estimators.predict import moved
 from miro_host.eye import calibration_kinds
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.patterns import PATTERNS, TEAMS
@@ -105,13 +107,8 @@ class Crowd:
             for index, sighting in enumerate(tracker.track(self.camera, tick)):
                 self._judge(own, index, sighting, frame)
         self.counts.frames += 1
-        near = [
-            (a, b)
-            for i, a in enumerate(self.drivers)
-            for b in self.drivers[:i]
-            if _distance(a.at, b.at) < TOGETHER_M
-        ]
-        self.counts.together += bool(near)
+        pairs = combinations(self.drivers, 2)
+        self.counts.together += any(_distance(a.at, b.at) < TOGETHER_M for a, b in pairs)
 
     def _drive(self, driver):
         driver.frames -= 1
@@ -120,7 +117,7 @@ class Crowd:
         v, w = driver.wants
         most = SLOPE_M_S2 * PERIOD_S
         v = min(max(v, driver.v_m_s - most), driver.v_m_s + most)
-        after = _moved(driver.at, v, w)
+        after = moved(driver.at, v * PERIOD_S, w * PERIOD_S)
         if not self._free(driver, after):
             self.counts.stops += v != 0.0
             v, w, after = 0.0, 0.0, driver.at
@@ -175,14 +172,6 @@ class Crowd:
 
 def _distance(one, other):
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
-
-
-def _moved(at, v, w):
-    """A camera period later."""
-    middle = at.theta_rad + 0.5 * w * PERIOD_S
-    way = v * PERIOD_S
-    theta = math.remainder(at.theta_rad + w * PERIOD_S, 2 * math.pi)
-    return Posture(at.x_m + way * math.cos(middle), at.y_m + way * math.sin(middle), theta)
 
 
 def main():
