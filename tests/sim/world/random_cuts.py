@@ -1,5 +1,7 @@
 """Runs that are cut anywhere, beside the same run that is not: `python -m tests.sim.world.random_cuts --count 10000`.
 
+`--window-ms 2` saves a world at every tick of a random window instead, and goes on from there.
+
 Input that is announced early keeps a frame of the station off the air which late input would meet, so only a silent
 host is told at random moments; a controller is told everything at the begin.
 """
@@ -8,11 +10,11 @@ import argparse
 import random
 import sys
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.scenario.file import parse
+from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 
 PERIODS = 12
@@ -103,23 +105,44 @@ def differing(count, seed, image, progress):
     return found
 
 
+def differing_ticks(first_tick, count, seed, image, progress=lambda done: None):
+    """The ticks at which a world that is saved and goes on in another one does not end as one that never stopped."""
+    scenario = load("fig6", ("duration_s=1.0", "network.radio.profile=lossy")).scenario
+    end_tick = ((first_tick + count) // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
+    whole, stopping, other = (World(scenario, seed, image) for _ in range(3))
+    whole.run_to(end_tick)
+    found = []
+    for tick in range(first_tick, first_tick + count):
+        stopping.run_to(tick)
+        other.load(stopping.save())
+        other.run_to(end_tick)
+        if other.digest != whole.digest:
+            found.append(f"tick {tick}")
+        progress(tick - first_tick + 1)
+    return found
+
+
 def main():
     """Prints what differs; exit code 1 if anything does."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=10_000, help="stops and injections together")
+    parser.add_argument("--window-ms", type=float, help="save at every tick of a window of this length")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     image = load_hex(image_path())
 
     def progress(done):
-        print(f"\r{done} stops and injections", end="", file=sys.stderr, flush=True)
+        print(f"\r{done} ", end="", file=sys.stderr, flush=True)
 
-    found = differing(options.count, options.seed, image, progress)
+    if options.window_ms:
+        first_tick, count = random.Random(options.seed).randrange(ticks(0.9)), ticks(options.window_ms / 1000)
+        what = f"{count} stops from tick {first_tick} on"
+        found = differing_ticks(first_tick, count, options.seed, image, progress)
+    else:
+        what = f"{options.count} stops and injections"
+        found = differing(options.count, options.seed, image, progress)
     print(file=sys.stderr)
-    print(
-        "\n".join(found)
-        or f"{options.count} stops and injections: every digest is that of the run in one piece"
-    )
+    print("\n".join(found) or f"{what}: every digest is that of the run in one piece")
     return 1 if found else 0
 
 

@@ -10,7 +10,7 @@ from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
 from miro_sim.world.world import World
-from tests.sim.world.random_cuts import differing
+from tests.sim.world.random_cuts import differing, differing_ticks
 from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 FRAME = encode(TeamFrame(0, 5, ((100, 100), (0, 0), (0, 0))), 3)
@@ -260,3 +260,9 @@ def test_what_waits_to_be_sent_is_saved_but_not_part_of_the_digest():
 
 def test_runs_that_are_cut_anywhere_and_told_at_any_moment_have_the_digest_of_the_run_in_one_piece():
     assert differing(250, 1, image(), lambda done: None) == []
+
+
+@settings(max_examples=3)
+@given(st.integers(0, 20_000_000), st.integers(0, 1000))
+def test_going_on_from_a_world_saved_at_any_tick_equals_not_stopping(first_tick, seed):
+    assert differing_ticks(first_tick, 40, seed, image()) == []
