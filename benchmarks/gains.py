@@ -412,7 +412,7 @@ def median_cm(drive: Drive) -> float | None:
 HEAD = """\
 # The same search for each law
 
-<!-- not run: thousands of runs, a quarter of an hour on two cores; tests/sim/test_gains.py has its parts -->
+<!-- not run: thousands of runs, a quarter of an hour on two cores; tests/sim/test_benchmarks.py has its parts -->
 ```sh
 python -m benchmarks.gains --write docs/gains.md
 ```

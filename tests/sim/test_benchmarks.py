@@ -1,0 +1,337 @@
+"""Tables and searches of `benchmarks`, small enough for every test run: disturbances, gains, the improved chain."""
+
+import math
+import re
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks import chain, disturbances, frame_loss, gains, improved
+from benchmarks.gains import FAMILIES, PATHS, Budget, Drive, Outcome, Search, Task
+from benchmarks.interval import clopper_pearson, wilson
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.pitch import ground
+from miro_sim.scenario import file as scenario_file
+from miro_sim.scenario.build import dead_s
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin.campaign.single import run_single
+
+PAGE = Path(__file__).parents[2] / "docs/disturbances.md"
+
+
+@pytest.mark.parametrize("case", disturbances.CASES[1:], ids=lambda case: case.name)
+def test_each_case_is_a_scenario_of_its_own(case):
+    base = disturbances.settings_of(disturbances.CASES[0], "paper")
+    for figure in disturbances.FIGURES:
+        assert load(figure, disturbances.settings_of(case, "paper")).scenario != load(figure, base).scenario
+
+
+@pytest.mark.parametrize("controller", disturbances.CONTROLLERS)
+def test_estimators_are_told_the_delay_and_nothing_else(controller):
+    ages = set()
+    for case in disturbances.CASES:
+        scenario = load("fig6", disturbances.settings_of(case, controller)).scenario
+        estimator = scenario.networks[0].robot[0].estimator
+        if controller != "paper":
+            assert estimator.age_s == pytest.approx(scenario.camera.delay_frames * 1001 / 30000, abs=1e-9)
+            ages.add(estimator.age_s)
+    assert len(ages) == (0 if controller == "paper" else 3)
+
+
+def test_names_of_groups_and_parts_of_names_choose_cases():
+    chosen = disturbances.chosen(["slip", "8 bits"])
+    assert {disturbances.CASES[number].group for number in chosen} == {"slip", "word"}
+    assert len(chosen) == 3
+    assert len(disturbances.chosen([""])) == len(disturbances.CASES)
+
+
+@pytest.mark.slow
+def test_a_table_of_one_seed_has_a_figure_in_each_cell(capsys):
+    assert disturbances.main(["--only", "base", "--seeds", "0", "--jobs", "1"]) == 0
+    out, err = capsys.readouterr()
+    *head, row = out.splitlines()
+    assert head == list(disturbances.head())
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[0] == "none"
+    assert all(re.fullmatch(r"0\.\d\d|1\.\d\d", cell) for cell in cells[1:])
+    assert len(cells) == 7
+    assert "6 of 6 cells" in err
+
+
+@pytest.mark.parametrize(
+    ("main", "arguments"),
+    [
+        *((disturbances.main, each.split()) for each in ("--only weather", "--seeds x", "--jobs 0")),
+        *((gains.main, each.split()) for each in ("--only weather", "--jobs 0", "--held-out x")),
+        (gains.main, ["--only", "paper", "--write", "x.md"]),
+    ],
+)
+def test_what_cannot_be_run_or_searched_is_refused(main, arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_the_page_has_a_row_for_each_case():
+    table = PAGE.read_text(encoding="utf-8").partition("## The bridge and the gears")[0]
+    rows = re.findall(r"^\| (.+?) \| \d", table, re.MULTILINE)
+    assert rows == [case.name for case in disturbances.CASES]
+
+
+SMALL = Budget(explored=6, generations=2, children=4)
+RUNS = st.lists(st.builds(Outcome, st.booleans(), st.floats(0.0, 3.0)), min_size=5, max_size=5)
+families = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+
+
+class Record:
+    """A runner without a robot: what a set does is a function of its text. Keeps the tasks."""
+
+    def __init__(self):
+        self.tasks = []
+
+    def __call__(self, what, tasks):
+        self.tasks += tasks
+        return [{figure: self.drive(task, figure) for figure in task.figures} for task in tasks]
+
+    def drive(self, task, figure):
+        outcomes = (Outcome((len(task.settings) + seed) % figure > 1, 1.0) for seed in task.seeds)
+        return gains.drive_of(task, outcomes)
+
+
+@families
+@given(number=st.integers(0, 10**6), path=st.sampled_from(sorted(PATHS)), generation=st.integers(0, 5))
+def test_every_set_is_a_scenario_within_the_bounds_and_is_drawn_again_alike(family, number, path, generation):
+    first = gains.drawn(family, number)
+    second = gains.child(family, first, path, generation, number)
+    assert gains.drawn(family, number) == first
+    assert gains.child(family, first, path, generation, number) == second
+    for found in (first, second):
+        assert all(low <= found[name] <= high for name, (low, high) in family.bounds.items())
+        load("fig6", (family.settings(found),))
+
+
+@given(number=st.integers(0, 10**6))
+def test_the_sets_that_keep_the_theory_of_epsilon_tracking_do_keep_it(number):
+    family = next(family for family in FAMILIES if "margin" in family.bounds)
+    found = family.keys(gains.drawn(family, number))
+    inputs = ((0.2 / found["length_m"]) ** 2 + 0.2**2) ** 0.5
+    assert found["beta_per_s"] * found["epsilon_rad"] > 2.0 * inputs
+
+
+@families
+def test_each_law_tries_as_many_sets_from_the_same_starts_with_the_same_seeds(family):
+    runner = Record()
+    found = Search(family, SMALL, runner).found()
+    assert found.sets == 6 + 2 * 2 * 4
+    asked = [(task.figures, task.seeds, task.patient) for task in runner.tasks]
+    line, curve = PATHS["line"], PATHS["curve"]
+    assert asked == [
+        *[(gains.FIGURES, gains.SEARCH, False)] * 6,
+        *[(line, gains.SEARCH, False)] * 8,
+        *[(line, gains.CHECK, False)] * 4,
+        (line, gains.HELD_OUT, True),
+        *[(curve, gains.SEARCH, False)] * 8,
+        *[(curve, gains.CHECK, False)] * 4,
+        (curve, gains.HELD_OUT, True),
+    ]
+
+
+def test_the_seeds_that_are_held_out_have_chosen_nothing():
+    groups = [set(gains.SEARCH), set(gains.CHECK), set(gains.HELD_OUT)]
+    assert len(set.union(*groups)) == sum(len(group) for group in groups)
+
+
+@given(RUNS)
+def test_a_set_leaves_a_start_when_it_can_no_longer_settle_and_is_judged_as_if_it_had_gone_on(runs):
+    hasty, patient = (gains.drive_of(Task("", (6,), range(5), patient), runs) for patient in (False, True))
+    assert patient.runs == 5
+    assert hasty.settles == patient.settles == (len([run for run in runs if run.settled]) >= 4)
+    assert hasty.runs <= patient.runs
+    if hasty.settles:
+        assert hasty == patient
+
+
+@given(st.integers(0, 9), st.floats(0.0, 3.0), st.floats(0.0, 500.0))
+def test_a_run_more_that_settles_is_cheaper_however_near_the_other_one_ends(settled, error_cm, end_cm):
+    worse = Drive((error_cm,) * settled, (end_cm,) * (10 - settled), 10)
+    better = Drive((error_cm,) * (settled + 1), (end_cm,) * (9 - settled), 10)
+    assert better.cost_cm < worse.cost_cm
+
+
+@given(st.floats(0.0, 100.0), st.floats(0.1, 100.0))
+def test_where_nothing_settles_the_set_that_ends_nearer_is_the_cheaper_one(end_cm, more_cm):
+    near, far = (Drive((), (end,) * 2, 5) for end in (end_cm, end_cm + more_cm))
+    assert gains.MISSED_CM <= near.cost_cm < far.cost_cm < gains.LOST_CM
+
+
+def test_the_best_set_is_the_one_of_least_cost_and_of_equals_the_first():
+    def tried(name, cost_cm):
+        return gains.Tried({"name": name}, {6: Drive((cost_cm,), (), 1)})
+
+    order = gains.ranked([tried(1, 2.0), tried(2, 1.0), tried(3, 1.0)], (6,))
+    assert [one.gains["name"] for one in order] == [2, 3, 1]
+
+
+def fake_runs(task):
+    return Record()("", [task])[0]
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_the_page_does_not_depend_on_who_makes_the_runs(workers, monkeypatch, capsys):
+    monkeypatch.setattr(gains, "driven", fake_runs)
+    budget, held_out = Budget(4, 1, 4), range(20)
+    with ThreadPoolExecutor(workers) as executor:
+        pieced = [Search(family, budget, gains.runner_of(executor), held_out).found() for family in FAMILIES]
+    whole = [Search(family, budget, Record(), held_out).found() for family in FAMILIES]
+    assert gains.page(pieced, budget, held_out) == gains.page(whole, budget, held_out)
+    assert "exploring: done" in capsys.readouterr().err
+
+
+def test_the_page_has_shares_counts_and_gains_of_each_law():
+    found = [Search(family, SMALL, Record()).found() for family in FAMILIES]
+    text = gains.page(found, SMALL, gains.HELD_OUT)
+    for one in found:
+        rows = [line for line in text.splitlines() if line.startswith(f"| {one.family.name} |")]
+        assert len(rows) == 4  # shares, best sets, gains for two paths
+        assert rows[0].endswith(f"| {one.sets} | {one.runs} |")
+        assert rows[1].count(" of 50: ") == len(gains.FIGURES)
+    assert "/home" not in text
+
+
+def test_a_run_that_drives_away_is_over_and_one_that_stays_has_an_error():
+    """Both from the start of Fig. 6: gains of the scenario, and none that steer at all."""
+    good = "network.robot.controller.gamma1_per_s=2.05"
+    lost = 'network.robot.controller={law="yang_kim", max_v_m_s=0.95, gamma1_per_s=0.0, p1_m_s2=0.0, q1_per_s=0.0}'
+    seeds = range(2000, 2001)
+    drives = [gains.driven(Task(setting, (6,), seeds, True))[6] for setting in (good, lost)]
+    assert drives[0].settled == 1
+    assert 0.0 < drives[0].errors_cm[0] < 3.0
+    assert (drives[1].runs, drives[1].settled) == (1, 0)
+    assert drives[1].ends_cm[0] > 3.0
+
+
+IMPROVED = {case.name: case for case in improved.cases()}
+SHORT = ("duration_s=2.0", 'camera={kind="gaussian"}', 'network.robot.controller={law="body_frame"}')
+
+
+def run_world(*sets, seed=1, scenario="fig6"):
+    world = World(scenario_file.load(scenario, (*SHORT, *sets)).scenario, seed, load_hex(image_path()))
+    while not world.finished:
+        world.step()
+    return world
+
+
+def run_case(name, estimator):
+    (job,) = improved.works(IMPROVED[name], range(1, 2), "body_frame", estimator)
+    return improved.result_of(run_single(job))
+
+
+@pytest.mark.parametrize("estimator", ["ekf", "ekf+telemetry"])
+def test_a_calibrated_camera_brings_the_robot_within_a_millimetre_and_a_half(estimator):
+    result = run_case("calibrated, Fig. 6", estimator)
+    assert result.settled
+    assert 0.0 < result.position_cm < 0.15
+    assert result.off_pitch_s == 0.0
+
+
+def test_uneven_wheels_do_not_lead_the_robot_aside():
+    result = run_case("wheels 1.05 and 0.95, calibrated, Fig. 8", "ekf")
+    assert result.position_cm < 0.3
+
+
+def test_starts_are_drawn_on_the_pitch_near_enough_and_over_all_headings():
+    starts = [improved.start_of(seed, 0.6) for seed in range(200)]
+    assert all(ground.holds(start) and math.hypot(start.x_m, start.y_m) <= 0.6 for start in starts)
+    assert {int(4.0 * (start.theta_rad + math.pi) / math.tau) for start in starts} == {0, 1, 2, 3}
+    assert improved.start_of(7, 0.6) == starts[7]
+
+
+def test_a_start_that_was_drawn_is_where_the_robot_starts():
+    case = IMPROVED["starts within 60 cm, arc"]
+    start = improved.start_of(3, case.near_m)
+    assert improved.scenario_heading_rad(case) == math.radians(60.0)
+    world = run_world(*improved.start_settings(case, 3), "duration_s=0.01", scenario="fig8")
+    theta_rad = world.networks[0].robots[0].drive.pose_at(0)[2]
+    assert abs(math.remainder(theta_rad - start.theta_rad, math.tau)) < 1e-9
+
+
+def test_a_line_says_what_is_beyond_its_limits():
+    case = improved.Case("name", "fig6", (), improved.Limits(0.25, 0.5, settles=True))
+    fine = improved.Result(0.2, True, 0.0)
+    assert improved.row(case, [fine] * 20) == ("| name | 0.200 | 0.200 | 0.200 | 20 of 20 | 0.0 |  |", True)
+    assert not improved.row(case, [fine, improved.Result(0.2, False, 1.0)])[1]
+    assert not improved.row(case, [fine] * 18 + [fine._replace(position_cm=0.6)] * 2)[1]
+    assert improved.row(case, [fine] * 19 + [fine._replace(position_cm=0.6)])[1] is False
+    assert not improved.row(case, [fine._replace(position_cm=0.3)] * 20)[1]
+
+
+def test_the_case_of_lost_frames_loses_a_fifth_of_them():
+    world = run_world(improved.LOSSY, "duration_s=6.0")
+    share = world.networks[0].robots[0].counter(0) / world.networks[0].frames_sent
+    assert 0.7 < share < 0.9
+
+
+@pytest.mark.parametrize(("robots", "expected_s"), [(3, 0.02796), (5, 0.03629)])
+def test_the_pilot_is_told_the_delay_of_its_network(robots, expected_s):
+    scenario = scenario_file.load("fig6", (f"network.robots={robots}",)).scenario
+    assert dead_s(scenario, scenario.networks[0]) == pytest.approx(expected_s, abs=1e-5)
+    world = World(scenario, 0, load_hex(image_path()))
+    assert world.networks[0].robots[0].pilot.dead_s == dead_s(scenario, scenario.networks[0])
+
+
+def test_the_cost_is_that_of_both_loops_over_all_periods():
+    image = load_hex(image_path())
+    plain, ours = (
+        chain.world("fig6", "yang_kim", "none", image),
+        chain.world("fig6", "body_frame", "ekf", image),
+    )
+    spent = chain.pair(plain, ours)
+    assert plain.finished
+    assert ours.finished
+    assert spent[2] == 180
+    assert min(spent[:2]) > 0.0
+
+
+def deviations(point):
+    expected = frame_loss.formula(point.robots, point.eb_n0_db)
+    return (point.lost - point.sent * expected) / (point.sent * expected * (1 - expected)) ** 0.5
+
+
+@pytest.mark.parametrize("robots", [3, 5])
+@pytest.mark.parametrize(("receiver", "frames"), [(frame_loss.decoder, 1500), (frame_loss.firmware, 150)])
+def test_as_many_frames_are_lost_as_have_a_wrong_bit_where_it_counts(receiver, frames, robots):
+    assert abs(deviations(receiver(robots, 10.0, frames, 4))) < 4
+
+
+def test_a_slicer_that_has_not_settled_costs_frames():
+    assert deviations(frame_loss.slicer(3, 10.0, 1500, 4)) > 4
+
+
+@pytest.mark.parametrize("receiver", [frame_loss.decoder, frame_loss.firmware])
+def test_without_errors_no_frame_is_lost_in_the_noise_between_frames(receiver):
+    assert receiver(3, 40.0, 100, 4).lost == 0
+
+
+def test_the_bits_that_count_are_those_from_sync_to_crc_and_one_stop_bit():
+    assert [frame_loss.critical_bits(robots) for robots in (3, 5)] == [171, 251]
+    assert frame_loss.formula(3, 12.31) == pytest.approx(171e-4, rel=0.02)
+
+
+def test_the_same_figures_make_the_same_picture(tmp_path):
+    points = [frame_loss.Point(3, "decoder", 10.0, 1000, 440), frame_loss.Point(5, "firmware", 14.0, 100, 0)]
+    for name in ("a.png", "b.png"):
+        frame_loss.draw(points, tmp_path / name)
+    picture = (tmp_path / "a.png").read_bytes()
+    assert picture == (tmp_path / "b.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("count", "trials"), [(3, 300), (100, 300), (299, 300)])
+def test_wilsons_interval_is_near_the_exact_one(count, trials):
+    assert wilson(count, trials) == pytest.approx(clopper_pearson(count, trials), abs=0.012)
