@@ -60,10 +60,8 @@ def run(instructions, scenario):
             tick += STRIDE_TICKS
             world.run_to(tick)
             if world.index != period and world.last is not None:
-                period = world.index
-                commands += sum(
-                    len(axis.commands) for axis in (world.last.robots[0].left, world.last.robots[0].right)
-                )
+                period, last = world.index, world.last.robots[0]
+                commands += len(last.left.commands) + len(last.right.commands)
                 sent += sum(len(run.data) for run in world.last.wire if run.direction == "<")
             executed = robot.board.cpu.instructions
             accepted = robot.counter(0) or 0
@@ -75,21 +73,6 @@ def run(instructions, scenario):
             return
 
 
-def processes(instructions, scenario):
-    """One for each engine; they print checkpoints."""
-    first, second = (
-        children.start(
-            [sys.executable, "-m", "tests.sim.engines", "--engine", name, "--scenario", scenario]
-            + ["--instructions", str(instructions)],
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
-        for name in engine.ENGINES
-    )
-    return first, second
-
-
 def compare(compiled, python):
     """The checkpoints that both print alike. Raises AssertionError at the first that differs."""
     for ours, theirs in itertools.zip_longest(compiled, python):
@@ -99,10 +82,13 @@ def compare(compiled, python):
 
 def lockstep(instructions, scenario="fig6"):
     """Both engines over so many instructions. Raises AssertionError where they part, or when one of them fails."""
-    pair = processes(instructions, scenario)
+    command = [sys.executable, "-m", "tests.sim.engines", "--scenario", scenario]
+    command += ["--instructions", str(instructions), "--engine"]
+    pair = [
+        children.start([*command, name], stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        for name in engine.ENGINES
+    ]
     try:
-        assert pair[0].stdout is not None
-        assert pair[1].stdout is not None
         yield from compare(pair[0].stdout, pair[1].stdout)
         assert [process.wait() for process in pair] == [0, 0]
     finally:
@@ -135,7 +121,6 @@ def main():
         print(f"\n{error}")
         return 1
     print(file=sys.stderr)
-    assert last is not None
     print(
         f"{options.scenario}: equal state hashes at {count} checkpoints over {last.instructions} instructions, "
         f"{last.frames} frames accepted, {last.commands} LM629 commands, {last.sent} bytes sent, "

@@ -59,14 +59,13 @@ def saved_worlds(profile="wire"):
     saves = []
     for tick in SAVED_AT:
         world.run_to(tick)
-        world.inject(
-            b"\x55\xaa\x00", at_tick=tick + 3_000_000
-        )  # waits: no other save shows the outbox in use
+        # waits: no other save shows the outbox in use
+        world.inject(b"\x55\xaa\x00", at_tick=tick + 3_000_000)
         saves.append(world.save())
     return saves
 
 
-def with_bytes_changed(saved, draw):
+def with_bytes_changed(_, saved, draw):
     """Some bytes replaced, removed or put in, or the end cut off; never what was given."""
     data = bytearray(saved)
     for _ in range(draw.choice((1, 1, 1, 2, 8))):
@@ -140,11 +139,8 @@ def _other(data, form, draw):
         return data + draw.randbytes(draw.choice((1, 8, 100)))
     if kind == 3:
         many = draw.choice((1, 50, 4096, 5000))
-        return (
-            struct.pack("<I", int.from_bytes(data[:4], "little") + many & 0xFFFFFFFF)
-            + data[4:]
-            + bytes(8 * many)
-        )
+        length = int.from_bytes(data[:4], "little") + many & 0xFFFFFFFF
+        return struct.pack("<I", length) + data[4:] + bytes(8 * many)
     return data[:place] + bytes([data[place] ^ 1 << draw.randrange(8)]) + data[place + 1 :]
 
 
@@ -167,23 +163,8 @@ def outcome(world, saved):
     return "ran"
 
 
-def changed_bytes(count, seed, progress):
-    """What came of so many worlds with bytes changed."""
-    world = fresh()
-    saves = saved_worlds()
-    found = Counter()
-    for number in range(count):
-        draw = random.Random(seed * 1_000_003 + number)
-        faulthandler.dump_traceback_later(LIMIT_S, exit=True)
-        found[outcome(world, with_bytes_changed(draw.choice(saves), draw))] += 1
-        progress(number)
-    faulthandler.cancel_dump_traceback_later()
-    return found
-
-
-def changed_values(count, seed, progress):
-    """What came of so many worlds with values changed and a checksum that is right."""
-    profiles = ("wire", "shared")
+def changed(change, count, seed, progress=lambda number: None, profiles=("wire",)):
+    """What came of so many worlds with something changed."""
     saves = {profile: saved_worlds(profile) for profile in profiles}
     worlds = {profile: fresh(profile) for profile in profiles}
     found = Counter()
@@ -191,14 +172,18 @@ def changed_values(count, seed, progress):
         draw = random.Random(seed * 1_000_003 + number)
         profile = draw.choice(profiles)
         faulthandler.dump_traceback_later(LIMIT_S, exit=True)
-        saved = with_values_changed(worlds[profile], draw.choice(saves[profile]), draw)
-        what = outcome(worlds[profile], saved)
+        what = outcome(worlds[profile], change(worlds[profile], draw.choice(saves[profile]), draw))
         found[what if what in ("refused", "ran") else f"number {number}: {what}"] += 1
         if what != "refused":
             worlds[profile] = fresh(profile)
         progress(number)
     faulthandler.cancel_dump_traceback_later()
     return found
+
+
+def changed_values(count, seed, progress=lambda number: None):
+    """What came of values changed, in worlds with different radios."""
+    return changed(with_values_changed, count, seed, progress, ("wire", "shared"))
 
 
 def main():
@@ -214,7 +199,7 @@ def main():
     def progress(number):
         print(f"\r{number} ", end="", file=sys.stderr, flush=True)
 
-    bytes_found = changed_bytes(options.count, options.seed, progress)
+    bytes_found = changed(with_bytes_changed, options.count, options.seed, progress)
     values_found = changed_values(options.resealed, options.seed, progress)
     print(f"\nbytes changed: {dict(bytes_found)}\nvalues changed: {dict(values_found)}")
     return 0 if set(bytes_found) <= {"refused"} and set(values_found) <= {"refused", "ran"} else 1

@@ -6,7 +6,14 @@ import struct
 import pytest
 
 from miro_sim.world.saved import opened, sealed
-from tests.sim.mutated_worlds import changed_bytes, changed_values, fresh, saved_worlds, with_field
+from tests.sim.mutated_worlds import (
+    changed,
+    changed_values,
+    fresh,
+    saved_worlds,
+    with_bytes_changed,
+    with_field,
+)
 
 
 @pytest.fixture(scope="module")
@@ -99,11 +106,11 @@ def test_what_a_saved_world_belongs_to_is_told(saved):
 
 
 def test_worlds_with_bytes_changed_are_all_refused():
-    assert changed_bytes(300, 1, lambda number: None) == {"refused": 300}
+    assert changed(with_bytes_changed, 300, 1) == {"refused": 300}
 
 
 @pytest.mark.slow
 def test_worlds_with_values_changed_are_refused_or_run():
-    found = changed_values(150, 1, lambda number: None)
+    found = changed_values(150, 1)
     assert set(found) == {"refused", "ran"}
     assert found["refused"] > 50

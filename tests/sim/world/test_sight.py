@@ -20,20 +20,19 @@ from miro_sim.world.world import World
 IMAGE = load_hex(image_path())
 ROBOT = """
 [[network.robot]]
-slot = {slot}
-start_error_x_cm = {x_cm}
-start_error_y_cm = {y_cm}
+slot = {}
+start_error_x_cm = {}
+start_error_y_cm = {}
 reference.kind = "line"
 """
+NO_ERRORS = "worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0"
 HEAD = 'name = "eyes"\nduration_s = 1\n[camera]\n{camera}\n[[network]]\n'
 
 
 def scenario(camera, robots=((0, 0, 0),), others=()):
-    text = HEAD.format(camera=camera)
-    text += "".join(ROBOT.format(slot=slot, x_cm=x, y_cm=y) for slot, x, y in robots)
+    text = HEAD.format(camera=camera) + "".join(ROBOT.format(*robot) for robot in robots)
     if others:
-        text += "[[network]]\n"
-        text += "".join(ROBOT.format(slot=slot, x_cm=x, y_cm=y) for slot, x, y in others)
+        text += "[[network]]\n" + "".join(ROBOT.format(*robot) for robot in others)
     return parse(text, "eyes.toml")
 
 
@@ -93,28 +92,18 @@ def test_the_calibration_of_1997_is_drawn_once_a_seed():
 
 
 def test_1997_is_a_word_or_a_number():
-    word, number = (
-        measured(world(f'kind = "geometric"\ncalibration = {name}')) for name in ('"1997"', "1997")
-    )
-    assert word == number
+    word, number = (world(f'kind = "geometric"\ncalibration = {name}') for name in ('"1997"', "1997"))
+    assert measured(word) == measured(number)
 
 
 @pytest.mark.parametrize(
     ("errors", "least_cm", "most_cm"),
     [
         ("worst_cm = 0.5", 0.0, 0.5),
-        ("worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0", 0.0, 1e-6),
+        (NO_ERRORS, 0.0, 1e-6),
         ("worst_cm = 0.0, focal_share = 0.0, tilt_deg = 0.0", 0.3, 0.5),  # a pixel is 0.42 cm
-        (
-            "worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0, ignore_height = true",
-            1.0,
-            3.2,
-        ),
-        (
-            "worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0, ignore_distortion = true",
-            0.1,
-            2.7,
-        ),
+        (f"{NO_ERRORS}, ignore_height = true", 1.0, 3.2),
+        (f"{NO_ERRORS}, ignore_distortion = true", 0.1, 2.7),
     ],
 )
 def test_each_error_of_the_calibration_is_switched_by_itself(errors, least_cm, most_cm):
@@ -160,14 +149,8 @@ def test_each_host_follows_its_own_robots_among_those_of_the_other():
                 assert robot.measurement is not None
                 assert off_cm((old.truth, robot.measurement)) < 0.2
         before = period
-    assert one.counters()["vision"] == {
-        "frames": 24,
-        "lost": 0,
-        "dropped": 0,
-        "repeated": 0,
-        "wrong": 0,
-        "swapped": 0,
-    }
+    none = dict.fromkeys(("lost", "dropped", "repeated", "wrong", "swapped"), 0)
+    assert one.counters()["vision"] == {"frames": 24, **none}
 
 
 @pytest.mark.parametrize("kind", ["pixels", "geometric", "gaussian"])
@@ -261,8 +244,8 @@ def test_without_a_ball_its_colour_need_not_be_told_from_others():
 
 
 def test_a_third_team_has_no_colour():
-    text = HEAD.format(camera='kind = "pixels"') + ROBOT.format(slot=0, x_cm=0, y_cm=0)
-    text += 2 * ("[[network]]\n" + ROBOT.format(slot=0, x_cm=30, y_cm=20))
+    text = HEAD.format(camera='kind = "pixels"') + ROBOT.format(0, 0, 0)
+    text += 2 * ("[[network]]\n" + ROBOT.format(0, 30, 20))
     with pytest.raises(ScenarioError, match=r"camera\.kind: 3 networks, but patches have the"):
         parse(text, "eyes.toml")
 
