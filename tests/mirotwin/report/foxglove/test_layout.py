@@ -12,7 +12,6 @@ PANELS = LAYOUT["configById"]
 CONFIGS = {
     "3D": layouts.ThreeDeeConfig,
     "Image": layouts.ImageConfig,
-    "RosOut": layouts.LogConfig,
     "RawMessages": layouts.RawMessagesConfig,
     "Plot": layouts.PlotConfig,
 }

@@ -9,10 +9,10 @@ import msgspec
 import pytest
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
-from mirotwin.report.foxglove import convert, messages
+from mirotwin.report.foxglove import convert, messages, shapes
 from tests.mirotwin.report.foxglove.validate import problems
 
-NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
+NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration")
 FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
 
 
@@ -116,20 +116,21 @@ def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown):
 @pytest.mark.parametrize(
     "damage",
     [
-        lambda log: log.pop("line"),
-        lambda log: log.update(tick=0),
-        lambda log: log.update(level=9),
-        lambda log: log.update(line=-1),
-        lambda log: log.update(line=True),
-        lambda log: log.update(message=None),
-        lambda log: log["timestamp"].update(nsec=1_000_000_000),
+        lambda entity: entity["lines"][0].pop("thickness"),
+        lambda entity: entity.update(tick=0),
+        lambda entity: entity["lines"][0].update(type=9),
+        lambda entity: entity["lines"][0].update(indices=[-1]),
+        lambda entity: entity["lines"][0].update(indices=[True]),
+        lambda entity: entity.update(frame_id=None),
+        lambda entity: entity["timestamp"].update(nsec=1_000_000_000),
     ],
 )
 def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage):
-    schema = msgspec.json.decode(convert._published("Log"))
-    line = messages.Log(messages.time_of(1), messages.INFO, "words", "net0")
-    good = msgspec.to_builtins(line)
+    schema = msgspec.json.decode(convert._published("SceneUpdate"))
+    line = shapes.line([(0.0, 0.0), (1.0, 0.0)], 0.0, 0.1, shapes.paint("line"))
+    entity = messages.SceneEntity(timestamp=messages.time_of(1), frame_id="pitch", id="net0", lines=(line,))
+    good = msgspec.json.decode(msgspec.json.encode(messages.SceneUpdate((), (entity,))))
     assert list(problems(good, schema)) == []
     bad = copy.deepcopy(good)
-    damage(bad)
+    damage(bad["entities"][0])
     assert len(list(problems(bad, schema))) == 1
