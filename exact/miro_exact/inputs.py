@@ -1,10 +1,12 @@
 """Reads an input file whole; refuses devices, pipes that may never end, and files larger than any valid one.
 
-Every file that a stranger may have made is read through here.
+Every file that a stranger may have made is read through here. `replace_file` writes one, whole or not at all.
 """
 
 import os
 import stat
+from contextlib import suppress
+from pathlib import Path
 
 from miro_exact.bad_input import BadInput
 
@@ -83,3 +85,20 @@ def _check_ends(path: str | os.PathLike[str]) -> None:
 def _too_long(path: str | os.PathLike[str], limit: int) -> InputError:
     size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
     return InputError(str(path), f"holds more than {size}", "is this the right file?")
+
+
+def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Puts `content` in the place of whatever is at `path`: old content or new. Raises OSError."""
+    import tempfile  # slow to load
+
+    target = Path(path)
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(name, 0o644)  # mkstemp's 0600 is for secrets
+        os.replace(name, target)
+    except BaseException:
+        with suppress(FileNotFoundError):
+            os.unlink(name)
+        raise

@@ -17,10 +17,9 @@ from miro_exact.clock import CAMERA_FRAME_TICKS
 from miro_exact.inputs import check_regular
 from mirotwin.camera import picture
 from mirotwin.camera.picture import SUFFIXES, Picture
-from mirotwin.recording.channels import ImageMessage
+from mirotwin.recording.channels import ImageMessage, image_topic
 from mirotwin.recording.container import BrokenOff
 from mirotwin.recording.messages import Messages
-from mirotwin.recording.topics import image_topic
 
 _OF_NETWORK = re.compile(r"net([0-9]{1,9})-frame-.*")
 

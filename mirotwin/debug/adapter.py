@@ -17,8 +17,7 @@ from typing import Any
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
-from miro_robot.mcs51.names import BITS, SFRS
-from miro_robot.mcs51.opcodes import LENGTH, disassemble
+from miro_robot.mcs51.opcodes import BITS, LENGTH, SFRS, disassemble
 from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import Breakpoint, Debugger
 from mirotwin.debug.expression import Value, children, content, expression

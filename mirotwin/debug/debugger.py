@@ -17,8 +17,7 @@ from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.names import SFRS
-from miro_robot.mcs51.opcodes import LENGTH, is_call
+from miro_robot.mcs51.opcodes import LENGTH, SFRS, is_call
 from mirotwin.debug.expression import NoValue, Term, Value, expression, names_in, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap

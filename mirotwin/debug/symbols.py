@@ -21,7 +21,7 @@ from miro_robot.inspect.tap import CpuTap, port_pins
 from miro_robot.inspect.values import bytes_at
 from miro_robot.inspect.writes import instructions_of
 from miro_robot.lm629.chip import Lm629
-from miro_robot.mcs51.names import BITS, SFRS
+from miro_robot.mcs51.opcodes import BITS, SFRS
 from mirotwin.debug.expression import NoValue, Value
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of

@@ -23,7 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
-from miro_protocol import files
+from miro_exact.inputs import replace_file
 from mirotwin.shell.outputs import OutputError, entries, not_empty, some, told_when_full
 
 FOLDERS = ("crashes", "unconfirmed", "covering", "corpus", "seeds", "engine")
@@ -76,7 +76,7 @@ class CampaignFolder:
     def write(self, folder: str, name: str, data: bytes | str) -> Path:
         """Writes a file whole or not at all; returns where it is."""
         path = (self.folder(folder) if folder else self.path) / name
-        files.replace(path, data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data)
+        replace_file(path, data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data)
         return path
 
     @contextmanager

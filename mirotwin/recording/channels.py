@@ -1,12 +1,17 @@
 """The channels of a recording: their messages, and how records become messages and back.
 
-Every message carries its tick; a period's messages are closed by its `/period` message.
+Every message carries its tick; a period's messages are closed by its `/period` message. The topics:
 
-Where a channel stands: `topics`.
+/period                  a control period of the whole world
+/net0/wire               the characters on the air of network 0
+/net0/actions            what was done to its robots and its radio
+/net0/camera/image       the frames of its camera
+/net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
 
+import re
 from functools import cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -18,7 +23,48 @@ from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, RobotPeriod
-from mirotwin.recording import topics
+
+PERIOD = "/period"
+WIRE = "wire"
+ACTIONS = "actions"
+IMAGE = "camera/image"
+_TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{IMAGE})")
+
+
+class Topic(NamedTuple):
+    """What a topic names. `network`, `slot`: -1 where it is of the world, or of a whole network."""
+
+    channel: str
+    network: int = -1
+    slot: int = -1
+
+
+def robot_topic(network: int, slot: int, channel: str) -> str:
+    return f"/net{network}/robot{slot}/{channel}"
+
+
+def wire_topic(network: int) -> str:
+    return f"/net{network}/{WIRE}"
+
+
+def actions_topic(network: int) -> str:
+    return f"/net{network}/{ACTIONS}"
+
+
+def image_topic(network: int) -> str:
+    return f"/net{network}/{IMAGE}"
+
+
+def topic_of(topic: str) -> Topic | None:
+    """What `topic` names; None if it has not the form of one of ours."""
+    if topic == PERIOD:
+        return Topic(PERIOD)
+    found = _TOPIC.fullmatch(topic)
+    if found is None:
+        return None
+    network, slot, channel = found.groups()
+    return Topic(channel, int(network), -1 if slot is None else int(slot))
+
 
 IMAGE_SCHEMA_NAME = "foxglove.CompressedImage"
 SECOND_NS = 1_000_000_000
@@ -263,14 +309,14 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
 
 
 OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
-    topics.PERIOD: PeriodMessage,
-    topics.WIRE: WireMessage,
-    topics.ACTIONS: ActionMessage,
-    topics.IMAGE: ImageMessage,
+    PERIOD: PeriodMessage,
+    WIRE: WireMessage,
+    ACTIONS: ActionMessage,
+    IMAGE: ImageMessage,
 }
 
 
-def message_type(topic: topics.Topic) -> type[msgspec.Struct] | None:
+def message_type(topic: Topic) -> type[msgspec.Struct] | None:
     """The struct of the messages there, or None if there is no such channel."""
     if topic.slot >= 0:
         return ROBOT_CHANNELS.get(topic.channel)

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import seconds
-from mirotwin.recording.topics import PERIOD, robot_topic
+from mirotwin.recording.channels import PERIOD, robot_topic
 
 WORDS = ("recorded", "replayed")
 """What the two sides of a replay are called; `mirotwin diff` calls them by its arguments."""

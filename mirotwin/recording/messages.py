@@ -8,6 +8,7 @@ from mcap.records import Attachment, Channel, Message, Metadata
 
 from miro_exact.bad_input import one_line, shortened
 from mirotwin.recording import channels
+from mirotwin.recording.channels import Topic, topic_of
 from mirotwin.recording.container import ByteSource, RecordingError, records
 from mirotwin.recording.recorder import (
     BROKEN_OFF,
@@ -18,7 +19,6 @@ from mirotwin.recording.recorder import (
     SCENARIO_ATTACHMENT,
     SYMBOLS_ATTACHMENT,
 )
-from mirotwin.recording.topics import Topic, topic_of
 
 ATTACHMENTS = (SCENARIO_ATTACHMENT, FIRMWARE_ATTACHMENT, SYMBOLS_ATTACHMENT)
 AGAIN = "record the run again"

@@ -17,7 +17,7 @@ from miro_protocol.actions import Action
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import channels
-from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS, ImageMessage, TheoryMessage
+from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS, ImageMessage, TheoryMessage, Topic
 from mirotwin.recording.container import Cut, RecordingError
 from mirotwin.recording.messages import AGAIN, ATTACHMENTS, Messages, brief
 from mirotwin.recording.recorder import (
@@ -27,7 +27,6 @@ from mirotwin.recording.recorder import (
     SYMBOLS_ATTACHMENT,
     RunSource,
 )
-from mirotwin.recording.topics import Topic
 
 NOT_READ = (ImageMessage, TheoryMessage)
 KINDS = tuple(kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values()) if kind not in NOT_READ)

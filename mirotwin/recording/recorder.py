@@ -18,7 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
-from mirotwin.recording import channels, topics
+from mirotwin.recording import channels
 from mirotwin.recording.channels import ControlMessage, TheoryMessage, image_message
 from mirotwin.recording.rows import Message, Rows
 from mirotwin.recording.writer import McapWriter, Writable
@@ -154,7 +154,7 @@ class Recorder:
     def write_theories(self, found: Iterable[tuple[int, int, TheoryMessage]]) -> None:
         """Adds what the theory says of robots (network, slot) in the control period that was written last."""
         for network, slot, message in found:
-            self._waiting.append((topics.robot_topic(network, slot, "theory"), message.tick, message))
+            self._waiting.append((channels.robot_topic(network, slot, "theory"), message.tick, message))
 
     def _write_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
@@ -162,18 +162,18 @@ class Recorder:
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
-        self.write((topics.robot_topic(network, slot, "samples"), sample.tick, sample))
+        self.write((channels.robot_topic(network, slot, "samples"), sample.tick, sample))
 
     def write_faults(self, network: int, slot: int, faults: Sequence[FirmwareFault]) -> None:
         """Adds a robot's firmware faults."""
-        topic = topics.robot_topic(network, slot, "fault")
+        topic = channels.robot_topic(network, slot, "fault")
         for fault in faults:
             message = channels.FaultMessage(fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault))
             self.write((topic, fault.tick, message))
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
         """Adds a frame of a network's camera, after all that was added before."""
-        self.write((topics.image_topic(network), tick, image_message(network, tick, png)))
+        self.write((channels.image_topic(network), tick, image_message(network, tick, png)))
 
     def _add_channel(self, topic: str, message: msgspec.Struct) -> int:
         """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""

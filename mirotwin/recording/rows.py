@@ -13,8 +13,8 @@ from msgspec.structs import astuple
 
 from miro_host.eye.track import Sighting
 from miro_sim.periods import Axis, Period, RobotPeriod
-from mirotwin.recording import topics
 from mirotwin.recording.channels import (
+    PERIOD,
     CommandMessage,
     ControlMessage,
     DutyMessage,
@@ -28,6 +28,9 @@ from mirotwin.recording.channels import (
     TruthMessage,
     WireMessage,
     action_message,
+    actions_topic,
+    robot_topic,
+    wire_topic,
 )
 
 Message = tuple[str, int, msgspec.Struct]
@@ -190,9 +193,9 @@ class Rows:
             message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
             self._add(_wire_topic(sent.network), sent.tick * 125 // 3, message)
         for action in period.actions:
-            topic = topics.actions_topic(action.network)
+            topic = actions_topic(action.network)
             self._add(topic, action.tick * 125 // 3, action_message(action))
-        self._add(topics.PERIOD, time_ns, PeriodMessage(tick, period.index, period.digest))
+        self._add(PERIOD, time_ns, PeriodMessage(tick, period.index, period.digest))
 
     def _robot(self, robot: RobotPeriod, tick: int, time_ns: int) -> None:
         """All messages of one robot."""
@@ -235,7 +238,7 @@ def _duty(axis: Axis) -> DutyMessage:
 def _robot_topics(network: int, slot: int) -> list[str]:
     """Of the messages that a robot has in each period, in their order."""
     names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
-    return [topics.robot_topic(network, slot, name) for name in names]
+    return [robot_topic(network, slot, name) for name in names]
 
 
-_wire_topic = cache(topics.wire_topic)
+_wire_topic = cache(wire_topic)

@@ -16,7 +16,7 @@ import os
 import struct
 from collections.abc import Iterable, Iterator
 
-from miro_protocol import files
+from miro_exact.inputs import replace_file
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission
 
@@ -45,7 +45,7 @@ def render(packets: Iterable[Transmission]) -> bytes:
 
 def write(path: str | os.PathLike[str], packets: Iterable[Transmission]) -> None:
     """Writes the whole file or none; OSError when it cannot be written."""
-    files.replace(path, render(packets))
+    replace_file(path, render(packets))
 
 
 def blocks(packets: Iterable[Transmission]) -> Iterator[bytes]:

@@ -21,8 +21,8 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from miro_exact.inputs import read_input
-from miro_protocol import files, stream_header
+from miro_exact.inputs import read_input, replace_file
+from miro_protocol import stream_header
 from miro_protocol.actions import WHO_CAN, Action, ScriptItem
 from miro_protocol.stream_header import PREFIX, Header
 from miro_protocol.stream_line import (
@@ -160,4 +160,4 @@ def write(
     path: str | os.PathLike[str], lines: Iterable[Entry | StreamItem], header: Header | None = None
 ) -> None:
     """Writes a stream file whole or not at all: a reader finds the old content or the new."""
-    files.replace(path, format_stream(lines, header).encode())
+    replace_file(path, format_stream(lines, header).encode())

@@ -4,7 +4,6 @@ import msgspec
 
 from miro_host.eye.track import Sighting
 from mirotwin.recording import channels as ch
-from mirotwin.recording import topics
 
 
 def messages(period):
@@ -12,13 +11,13 @@ def messages(period):
     found = []
     for robot in period.robots:
         for name, message in of_robot(robot, period.tick):
-            found.append((topics.robot_topic(robot.network, robot.slot, name), period.tick, message))
+            found.append((ch.robot_topic(robot.network, robot.slot, name), period.tick, message))
     for sent in period.wire:
         message = ch.WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-        found.append((topics.wire_topic(sent.network), sent.tick, message))
+        found.append((ch.wire_topic(sent.network), sent.tick, message))
     for action in period.actions:
-        found.append((topics.actions_topic(action.network), action.tick, ch.action_message(action)))
-    found.append((topics.PERIOD, period.tick, ch.PeriodMessage(period.tick, period.index, period.digest)))
+        found.append((ch.actions_topic(action.network), action.tick, ch.action_message(action)))
+    found.append((ch.PERIOD, period.tick, ch.PeriodMessage(period.tick, period.index, period.digest)))
     return [(topic, tick, msgspec.json.encode(message)) for topic, tick, message in found]
 
 

@@ -20,11 +20,10 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording import channels, reader
-from mirotwin.recording.channels import ImageMessage
+from mirotwin.recording.channels import IMAGE, PERIOD, ImageMessage, Topic, image_topic, topic_of
 from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
-from mirotwin.recording.topics import IMAGE, PERIOD, Topic, image_topic, topic_of
 from mirotwin.recording.writer import McapWriter, Writable
 from mirotwin.report.foxglove import derived, messages
 from mirotwin.report.foxglove.derived import Derived, Said

@@ -26,7 +26,8 @@ import msgspec
 import tomli_w
 
 from miro_exact.bad_input import one_line
-from miro_protocol import files, stream, stream_header
+from miro_exact.inputs import replace_file
+from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN
 from miro_robot.image import Image
@@ -137,7 +138,7 @@ def case_of_checks(world: World, trace: Trace, checks: Checks) -> str:
 
 def write_case(path: str | os.PathLike[str], text: str) -> None:
     """Writes it whole or not at all."""
-    files.replace(Path(path), text.encode())
+    replace_file(Path(path), text.encode())
 
 
 def is_case(path: str | Path) -> bool:

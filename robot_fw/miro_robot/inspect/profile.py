@@ -8,7 +8,7 @@ from miro_robot.image import Image
 from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.stack_depth import StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_robot.mcs51.names import INTERRUPTS
+from miro_robot.mcs51.opcodes import INTERRUPTS
 
 
 class FunctionProfile(msgspec.Struct, frozen=True):

@@ -6,8 +6,7 @@ import bisect
 
 from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo
-from miro_robot.mcs51.names import BITS, INTERRUPTS, SFRS, Names
-from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, target
+from miro_robot.mcs51.opcodes import BITS, INTERRUPTS, LENGTH, SFRS, Names, goes_on, is_call, target
 
 _NOP = 0x00
 _VECTORS = (0, *(8 * number + 3 for number in range(len(INTERRUPTS))))

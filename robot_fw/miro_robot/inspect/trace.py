@@ -8,8 +8,7 @@ from miro_exact.bad_input import amount
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.names import INTERRUPTS
-from miro_robot.mcs51.opcodes import disassemble
+from miro_robot.mcs51.opcodes import INTERRUPTS, disassemble
 
 HEADING = f"{'tick':>12}  addr  {'place':<28}  {'instruction':<30}  changed registers"
 _STATIC_KEPT = 65536

@@ -6,8 +6,7 @@ Numbers are decimal or end in h; names of registers and bits are those of the AT
 
 import re
 
-from miro_robot.mcs51.names import BITS, SFRS
-from miro_robot.mcs51.opcodes import TABLE
+from miro_robot.mcs51.opcodes import BITS, SFRS, TABLE
 
 KEYWORDS = {"A", "C", "AB", "DPTR", "@DPTR", "@A+DPTR", "@A+PC"}
 

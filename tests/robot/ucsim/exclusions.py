@@ -5,8 +5,7 @@ The names in the comments are those of the list in `tests/vectors/README.md`.
 
 from functools import cache
 
-from miro_robot.mcs51.names import SFRS
-from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, TABLE
+from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, SFRS, TABLE
 
 (
     P0, SP, DPL, DPH, PCON, TCON, TMOD, TL0, TL1, TH0, TH1, P1, SCON, SBUF, P2, IE, P3, IP,
