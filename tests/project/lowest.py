@@ -23,7 +23,7 @@ PACKAGE_FOLDERS = ("exact", "protocol", "robot_fw", "host", "sim")
 ENGINES = ("*.so", "*.pyd")
 REQUIREMENT = re.compile(r"(?P<name>[\w.-]+)>=(?P<bound>[\w.]+)(,<[\w.]+)?")
 SMOKE = (
-    "tests/protocol/test_weights.py",
+    "tests/protocol/test_undetected.py",
     "tests/protocol/test_frames.py",
     "tests/protocol/test_pcapng.py",
     "tests/sim/test_scenario.py",
