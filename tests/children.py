@@ -13,6 +13,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -41,6 +42,11 @@ def uncompiled(code):
     code = f"from miro_exact import engine; engine.select('python'); {code}"
     command = [sys.executable, "-c", code]
     return run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+
+
+def pool(count=None):
+    """`ProcessPoolExecutor`, with default signals."""
+    return ProcessPoolExecutor(count, initializer=reset_signals)
 
 
 def fork():

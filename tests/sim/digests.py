@@ -12,7 +12,6 @@ import argparse
 import json
 import re
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -121,7 +120,7 @@ def main():
         if options.name:
             return 0
         wanted = list(names())
-        with ProcessPoolExecutor(initializer=children.reset_signals) as pool:
+        with children.pool() as pool:
             digests = pool.map(partial(_digest, options.engine), wanted)
             found = dict(zip(wanted, digests, strict=True))
     except engine.EngineError as error:

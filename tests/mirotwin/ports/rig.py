@@ -54,7 +54,7 @@ def sent_bytes(path, network=0):
 class Served:
     """A running `mirotwin serve`: its process, and by kind of port where they are."""
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[str]  # noqa: TID251
     ports: dict[str, list[str]] = field(default_factory=dict)
     code: int | None = None
     err: str = ""

@@ -11,7 +11,6 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from miro_robot.bare.machine import BareMachine, Ended
@@ -80,7 +79,7 @@ def main():
     options = parser.parse_args()
     begin = time.monotonic()
     counts = Counter()
-    with ProcessPoolExecutor(initializer=children.reset_signals) as executor:
+    with children.pool() as executor:
         seed = options.first
         while counts[EQUAL] + counts["different"] < options.programs:
             some = range(seed, seed + min(64, options.programs))

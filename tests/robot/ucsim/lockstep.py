@@ -10,7 +10,6 @@ import argparse
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
 from miro_robot.mcs51.opcodes import disassemble
@@ -85,7 +84,7 @@ def main():
     begin = time.monotonic()
     totals = [0] * 256
     differing = 0
-    with ProcessPoolExecutor(options.jobs, initializer=children.reset_signals) as pool:
+    with children.pool(options.jobs) as pool:
         for done, outcome in enumerate(pool.map(compare, seeds, [options.walk] * walks), 1):
             totals = [total + count for total, count in zip(totals, outcome.opcodes, strict=True)]
             if outcome.difference:
