@@ -9,7 +9,7 @@
 
 A comment in front of a block says what a reader need not know:
 
-    <!-- not run: REASON -->     it is not run; all of these stand in `test_blocks`
+    <!-- not run: REASON -->     it is not run; `test_blocks` counts these
     <!-- slow: REASON -->        only `python -m tests.docs.first_use` runs it
     <!-- file: NAME -->          its text is written to that file: before anything runs, and on the pages that a
                                  newcomer follows (`sandbox.FIRST_USE`) when the reader comes to it
@@ -37,10 +37,7 @@ ELSEWHERE = {
     ("README.md", ".venv/bin/pip"): ".ci/run does it",
     ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
     ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",
-    (
-        "examples/fuzz-slip/README.md",
-        "pip install",
-    ): "needs the package index, and fuzzing goes on for 30 seconds",
+    ("examples/fuzz-slip/README.md", "pip install"): "needs the package index, and fuzzes for 30 seconds",
 }
 """Why a block is not run, by document and the start of its text, where a comment would be in the way of a reader."""
 SLOW_ELSEWHERE = {

@@ -1,9 +1,7 @@
 """The example of a foreign firmware: SLIP frames with a checksum, its format and its check as plug-ins."""
 
-import os
 import shutil
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -12,12 +10,12 @@ from hypothesis import strategies as st
 from miro_protocol.protocol import Damage, Frame
 from miro_robot.image import load_hex
 from tests import children
+from tests.examples.rig import EXAMPLES, MIROTWIN, run
 from tests.mutants.sdcc import needs_sdcc
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "fuzz-slip"
+EXAMPLE = EXAMPLES / "fuzz-slip"
 CRYSTAL_HZ = 11_059_200
 CHECK = f"{EXAMPLE / 'dimmer_check.py'}:lamps_as_told"
-PROGRAM = "from mirotwin.entry import main; main()"
 CASES = sorted((EXAMPLE / "cases").glob("*.stream"))
 
 
@@ -115,23 +113,9 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
     """Its finds are given as seeds, so that a second is enough."""
     for name, code in (("dimmer", 1), ("mended", 0)):
         out = tmp_path / name
-        image = images[name].path
-        options = [
-            "--bare",
-            "--crystal",
-            CRYSTAL_HZ,
-            "--check",
-            CHECK,
-            "--check-all",
-            "--corpus",
-            EXAMPLE / "cases",
-        ]
-        command = [sys.executable, "-c", PROGRAM, "fuzz", image, *options, "--time", "1s", "--out", out]
-        environment = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join([str(EXAMPLE), os.environ.get("PYTHONPATH", "")]),
-        }
-        done = children.run([*map(str, command)], env=environment, capture_output=True, text=True)
+        options = ["--bare", "--crystal", CRYSTAL_HZ, "--check", CHECK, "--check-all", "--time", "1s"]
+        options += ["--corpus", EXAMPLE / "cases", "--out", out]
+        done = run(EXAMPLE, MIROTWIN, "fuzz", images[name].path, *options)
         assert done.returncode == code, done.stdout + done.stderr
         found = {path.name.partition("-")[0] for path in out.glob("crashes/*.stream")}
         assert found == ({"lamps_as_told", "no_fault"} if code else set())

@@ -2,11 +2,8 @@
 
 import json
 import math
-import os
-import shutil
 import sys
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
@@ -16,12 +13,11 @@ from miro_host.posture import Posture
 from miro_host.references.line import StraightLine
 from miro_sim.scenario.file import ScenarioError, parse
 from mirotwin.recording.reader import read
-from tests import children
+from tests.examples.rig import EXAMPLES, MIROTWIN, installed, run
 
 pytestmark = pytest.mark.slow
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "laws"
-MIROTWIN = Path(sys.executable).with_name("mirotwin")
+EXAMPLE = EXAMPLES / "laws"
 SHORTENED = {
     name: (EXAMPLE / f"{name}.toml")
     .read_text(encoding="utf-8")
@@ -50,12 +46,7 @@ FINISH = "while not world.finished:\n    world.step()\nprint(world.digest)"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder with the example as pip installs it."""
-    folder = tmp_path_factory.mktemp("site")
-    source = shutil.copytree(EXAMPLE, folder / "source")
-    options = ["--quiet", "--no-index", "--no-build-isolation", "--no-deps", "--target", folder / "installed"]
-    children.run([sys.executable, "-m", "pip", "install", *options, source], check=True)
-    return folder / "installed"
+    return installed("laws", tmp_path_factory.mktemp("site"))
 
 
 def short_of(name, folder):
@@ -74,27 +65,14 @@ def here(site, monkeypatch):
         sys.modules.pop(name, None)
 
 
-def environment(site):
-    """This process's, with `site` before what else modules are looked up in (CONTRIBUTING.md: another checkout)."""
-    paths = [str(site), os.environ.get("PYTHONPATH", "")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
-
-
-def python(site, code, *arguments, check=True):
-    done = children.run(
-        [sys.executable, "-c", code, *arguments],
-        env=environment(site),
-        capture_output=True,
-        text=True,
-        check=check,
-    )
+def python(site, code, *arguments):
+    done = run(site, sys.executable, "-c", code, *arguments)
+    assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
 
 def mirotwin(site, *arguments):
-    return children.run(
-        [MIROTWIN, *arguments], env=environment(site), capture_output=True, text=True, check=False
-    )
+    return run(site, MIROTWIN, *arguments)
 
 
 @pytest.mark.parametrize("name", SHORTENED)

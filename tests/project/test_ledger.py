@@ -12,7 +12,6 @@ CHIP = ROOT / "robot_fw" / "miro_robot" / "mcs51"
 LM629 = ROOT / "robot_fw" / "miro_robot" / "lm629" / "README.md"
 PAGES = (LEDGER, ROOT / "docs" / "theory.md", CHIP / "README.md", ROOT / "tests" / "vectors" / "README.md")
 NAMED = re.compile(r"`([\w./]*test_\w+\.py)(?:::(\w+))?`")
-LINK = re.compile(r"\]\(([^)#:]+)\)")
 RULE = re.compile(r"^\| ([A-Z][0-9]+) \|", re.M)
 STANDINGS = ("exact", "chosen", "thinner", "absent", "")
 
@@ -34,12 +33,6 @@ def test_every_test_that_a_page_names_is_there(page):
         path = next((folder / file for folder in folders if (folder / file).exists()), None)
         assert path, file
         assert not test or test in functions_of(path), f"{file}::{test}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_link_of_a_page_leads_somewhere(page):
-    for link in LINK.findall(page.read_text()):
-        assert (page.parent / link).exists(), link
 
 
 def test_each_row_of_the_ledger_has_a_standing_and_a_test_or_a_reason():
