@@ -1,12 +1,11 @@
-"""What the tests of the commands share: a short scenario, and a way to call the program in this process."""
+"""What the tests of the commands share: the program, a short scenario, and a run of it."""
 
 import io
 
 import pytest
-from click.testing import CliRunner
 from intelhex import IntelHex
 
-from mirotwin.commands import main
+from tests.mirotwin import program
 
 SHORT = """# half a dozen control periods
 name = "short"
@@ -30,15 +29,7 @@ reference.kind = "arc"
 
 @pytest.fixture(scope="session")
 def mirotwin():
-    """Calls the command; gives exit code, stdout and stderr. Anything but a clean exit fails the test."""
-
-    def call(*arguments):
-        result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result.exit_code, result.stdout, result.stderr
-
-    return call
+    return program.mirotwin
 
 
 @pytest.fixture(scope="session")
@@ -53,19 +44,18 @@ def short(tmp_path_factory):
 def finished(mirotwin, short):
     """The folder of a finished run of the short scenario with seed 5."""
     folder = short.parent / "finished"
-    code, _, err = mirotwin("run", short, "--seed", 5, "--out", folder)
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("run", short, "--seed", 5, "--out", folder)
     return folder
 
 
-def hex_text(code):
-    """Intel HEX of `code`, from address 0 on."""
+def hex_text(code, at=0):
+    """Intel HEX of `code` at an address."""
     file, text = IntelHex(), io.StringIO()
-    file.frombytes(code)
+    file.frombytes(code, at)
     file.write_hex_file(text)
     return text.getvalue()
 
 
-def hex_file(path, code):
-    path.write_text(hex_text(code))
+def hex_file(path, code, at=0):
+    path.write_text(hex_text(code, at))
     return path
