@@ -45,8 +45,7 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
     first = Path("short-4-net0-frame-000003.png").read_bytes()
     assert mirotwin("camera", "look", short, "--at", "2880000t", "--seed", 4, "--force")[0] == 0
     assert Path("short-4-net0-frame-000003.png").read_bytes() == first
-    code, _, err = mirotwin("camera", "look", short, "--at", "0.12s", "--seed", 4)
-    assert (code, "is there already" in err) == (2, True)
+    assert "is there already" in mirotwin.refuses("camera", "look", short, "--at", "0.12s", "--seed", 4)
 
 
 @pytest.mark.parametrize("plain", [True, False])
@@ -107,18 +106,15 @@ def test_what_cannot_be_looked_at_is_refused_with_the_remedy(
     mirotwin, short, tmp_path, monkeypatch, options, expected
 ):
     monkeypatch.chdir(tmp_path)
-    code, out, err = mirotwin("camera", "look", short, *options)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"mirotwin: error: {expected.format(short=short)}")
-    assert err.count("\n") == 1
+    assert mirotwin.refuses("camera", "look", short, *options).startswith(expected.format(short=short))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_that_a_fault_stops_before_is_not_drawn(mirotwin, short, tmp_path):
     image = hex_file(tmp_path / "faulty.ihx", b"\xa5")
     out = tmp_path / "frame.png"
-    code, _, err = mirotwin("camera", "look", short, "--at", "0.1s", "--firmware", image, "--out", out)
-    assert (code, out.exists()) == (3, False)
+    err = mirotwin.ends(3, "camera", "look", short, "--at", "0.1s", "--firmware", image, "--out", out)
+    assert not out.exists()
     assert "firmware fault: net0/robot0" in err
 
 

@@ -4,12 +4,9 @@ import io
 import os
 import re
 import shutil
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
-from intelhex import IntelHex
 
 from miro_exact.clock import (
     CONTROL_PERIOD_TICKS,
@@ -24,11 +21,11 @@ from miro_robot.inspect.waveform import Waveform
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
 from tests import children
+from tests.mirotwin import program
 from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.reading import read
 from tests.robot.mcs51.asm import assemble
 
-MIROTWIN = Path(sys.executable).with_name("mirotwin")
 QUIET = """name = "quiet"
 title = "A radio without noise"
 duration_s = 0.3
@@ -84,8 +81,7 @@ def characters(vcd, wire, baud=9600):
 
 def test_sigrok_reads_the_bytes_that_the_link_carried(mirotwin, quiet, tmp_path):
     out = tmp_path / "quiet.vcd"
-    code, _, err = mirotwin("fw", "vcd", quiet, "--seed", 3, "--out", out)
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("fw", "vcd", quiet, "--seed", 3, "--out", out)
     scenario = scenario_file.load(str(quiet)).scenario
     world = World(scenario, 3, load_hex(image_path()))
     wire = []
@@ -114,16 +110,10 @@ def test_sigrok_reads_the_bytes_that_the_link_carried(mirotwin, quiet, tmp_path)
 
 
 def test_sigrok_reads_what_a_bare_processor_hears_and_says(mirotwin, tmp_path):
-    image = tmp_path / "echo.ihx"
-    program = IntelHex()
-    program.frombytes(assemble(ECHO))
-    program.write_hex_file(str(image))
+    image = hex_file(tmp_path / "echo.ihx", assemble(ECHO))
     (tmp_path / "in").write_bytes(b"Hello, sigrok\n")
     out = tmp_path / "echo.vcd"
-    code, _, err = mirotwin(
-        "fw", "vcd", image, "--stdin", tmp_path / "in", "--max-cycles", 100_000, "--out", out
-    )
-    assert code == 42, err
+    mirotwin.ends(42, "fw", "vcd", image, "--stdin", tmp_path / "in", "--max-cycles", 100_000, "--out", out)
     for wire in ("rxd", "txd"):
         assert bytes(byte for _, byte in characters(out, wire, 9615)) == b"Hello, sigrok\n"
     vcd = read(out.read_bytes())
@@ -146,14 +136,10 @@ def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path)
 
 
 @pytest.mark.slow
-def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(mirotwin, short, tmp_path):
+def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(short, tmp_path):
     def written(name, *options):
         out = tmp_path / f"{name}.vcd"
-        command = ["fw", "vcd", short, "--slot", "0", "--out", out, *options]
-        if "--engine" in options:
-            children.run([MIROTWIN, *command], check=True, capture_output=True)
-        else:
-            assert mirotwin(*command)[0] == 0
+        program.run("fw", "vcd", short, "--slot", "0", "--out", out, *options, check=True)
         return out.read_bytes()
 
     window = ("--from", "150ms", "--to", "156ms")
@@ -177,52 +163,42 @@ def test_a_faulty_firmware_leaves_its_waveform_up_to_the_fault(mirotwin, tmp_pat
     image = hex_file(
         tmp_path / "bad.ihx", b"\xb2\x90\xb2\x90\xa5"
     )  # CPL P1.0 twice, then the undefined opcode
-    code, _, err = mirotwin("fw", "vcd", image, "--out", tmp_path / "bad.vcd")
-    assert code == 3
-    assert "undefined opcode" in err
+    assert "undefined opcode" in mirotwin.ends(3, "fw", "vcd", image, "--out", tmp_path / "bad.vcd")
     assert read((tmp_path / "bad.vcd").read_bytes()).wires["p1_0"] == [(0, 1), (12, 0), (24, 1)]
 
 
-def refused(result, message):
-    code, out, err = result
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert re.search(message, err), err
-
-
-def test_what_cannot_be_written_is_refused_and_nothing_is_left(mirotwin, short, tmp_path):
-    out = tmp_path / "x.vcd"
-
-    def vcd(*arguments):
-        return mirotwin("fw", "vcd", *arguments)
-
-    refused(vcd(short, "--from", "5ms", "--to", "5ms", "--out", out), "the window is empty")
-    refused(vcd(short, "--from", "9s", "--out", out), "the run ends at tick 4804800; look earlier")
-    refused(vcd(short), "Missing option '-o' / '--out'")
-    refused(vcd(short, "--out", tmp_path / "no" / "x.vcd"), "there is no folder")
-    refused(vcd(short, "--out", tmp_path), "is a folder")
-    refused(vcd(short, "--out", tmp_path / "x.gtkw"), "name of the GTKWave save file")
-    refused(vcd(tmp_path / "no.ihx", "--out", out), "there is no such file")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("short", "--from", "5ms", "--to", "5ms", "--out", "x.vcd"), "the window is empty"),
+        (("short", "--from", "9s", "--out", "x.vcd"), "the run ends at tick 4804800; look earlier"),
+        (("short",), "Missing option '-o' / '--out'"),
+        (("short", "--out", "x.gtkw"), "name of the GTKWave save file"),
+        (("no.ihx", "--out", "x.vcd"), "there is no such file"),
+        (("stops.ihx", "--from", "20s", "--out", "x.vcd"), "--from 480000000t: the run ended .*; look earlier"),
+        (("stops.ihx", "--from", "24000t", "--out", "x.vcd"), "look earlier"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_written_is_refused_and_nothing_is_left(
+    mirotwin, short, tmp_path, monkeypatch, words, said
+):
+    monkeypatch.chdir(tmp_path)
     image = hex_file(tmp_path / "stops.ihx", b"\x00\x80\xfe")
-    refused(vcd(image, "--from", "20s", "--out", out), "--from 480000000t: the run ended .*; look earlier")
-    refused(vcd(image, "--from", "24000t", "--out", out), "look earlier")
-    assert [path.name for path in tmp_path.iterdir()] == ["stops.ihx"]
+    assert re.search(
+        said, mirotwin.refuses("fw", "vcd", *(short if word == "short" else word for word in words))
+    )
+    assert list(tmp_path.iterdir()) == [image]
 
 
 @pytest.mark.parametrize("there", ["x.vcd", "x.gtkw"])
 def test_what_is_there_stays_unless_it_is_to_be_replaced(mirotwin, short, tmp_path, there):
     (tmp_path / there).write_text("mine")
     command = ("fw", "vcd", short, "--to", "1ms", "--out", tmp_path / "x.vcd")
-    refused(mirotwin(*command), f"{there}: is there already; .* --force")
+    assert f"{there}: is there already; " in mirotwin.refuses(*command)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(there, "mine")]
     assert mirotwin(*command, "--force")[0] == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.gtkw", "x.vcd"]
     assert "mine" not in (tmp_path / there).read_text()
-
-
-def test_a_device_is_not_replaced(mirotwin, short):
-    refused(mirotwin("fw", "vcd", short, "--force", "--out", os.devnull), "is not a regular file")
-    assert not os.path.isfile(os.devnull)
 
 
 @pytest.mark.slow

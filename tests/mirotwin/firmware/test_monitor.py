@@ -3,26 +3,19 @@
 The monitor measures the bit rate of the first character before it switches its receiver on (tests/robot/monitor).
 """
 
-import os
-import pty
-import select
 import signal
-import subprocess
-import sys
-import termios
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from mirotwin.commands import main
-from tests import children
+from tests.mirotwin import program
 from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.terminal import terminal
 from tests.robot.inspect.programs import build
 
-MIROTWIN = Path(sys.executable).with_name("mirotwin")
 MONITOR = Path(__file__).parents[2] / "robot" / "monitor" / "monitor.c"
 COMMANDS = "= 2+3*4\r= (7-10)*-3/2\rm 1234 5A\rd 1230\rx\rq\r"
 DIALOGUE = """
@@ -40,7 +33,6 @@ Monitor ready
 > q
 bye
 """.replace("\n", "\r\n")
-PATIENCE_S = 60
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +92,8 @@ def test_without_a_rate_the_monitor_hears_nothing(monitor):
 
 
 def test_standard_input_is_sent_too(monitor):
-    command = [MIROTWIN, "fw", "run", monitor, "--baud", "9600", "--stdin", "-", "--stdin-gap", "20ms"]
-    done = children.run(command, input=b" = 1+1\rq\r", capture_output=True, timeout=PATIENCE_S)
+    options = ("--baud", 9600, "--stdin", "-", "--stdin-gap", "20ms")
+    done = program.run("fw", "run", monitor, *options, input=b" = 1+1\rq\r", text=False)
     assert (done.returncode, done.stdout) == (0, b"\r\nMonitor ready\r\n> = 1+1\r\n2\r\n> q\r\nbye\r\n")
 
 
@@ -113,88 +105,47 @@ def test_the_look_commands_take_the_same_dialogue(monitor, mirotwin):
     assert "monitor.c" in out or "program.c" in out
 
 
-class Talk:
-    """The far end of a terminal at which `fw run --terminal` runs."""
-
-    def __init__(self, master, child):
-        self.master = master
-        self.child = child
-        self.seen = b""
-
-    def type(self, keys):
-        os.write(self.master, keys.encode())
-
-    def until(self, text):
-        """Reads on until `text` was shown since the last call."""
-        deadline = time.monotonic() + PATIENCE_S
-        while text.encode() not in self.seen:
-            assert time.monotonic() < deadline, self.seen
-            if select.select([self.master], [], [], 0.1)[0]:
-                self.seen += os.read(self.master, 1024)
-            else:
-                assert self.child.poll() is None, self.seen
-        self.seen = self.seen[self.seen.index(text.encode()) + len(text) :]
-
-
-@contextmanager
-def terminal(*arguments):
-    """Starts `fw run --terminal` in a terminal of its own, which must come out as it went in."""
-    master, slave = pty.openpty()
-    before = termios.tcgetattr(slave)
-    command = [str(MIROTWIN), "fw", "run", "--terminal", *map(str, arguments)]
-    child = children.start(command, stdin=slave, stdout=slave, stderr=subprocess.PIPE)
-    try:
-        yield Talk(master, child)
-        child.wait(PATIENCE_S)
-        assert termios.tcgetattr(slave) == before
-    finally:
-        child.kill()
-        child.communicate()
-        os.close(master)
-        os.close(slave)
+LIVE = (*program.COMMAND, "fw", "run", "--terminal")
 
 
 def test_a_person_at_a_terminal_is_answered_and_leaves(monitor):
-    with terminal(monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
+    with terminal(*LIVE, monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
         talk.until("Monitor ready\r\n> ")
         talk.type("= 12*12\r")
         talk.until("= 12*12\r\n144\r\n> ")
         talk.type("\x03\r")  # Ctrl-C is a key as any other
         talk.until("?\r\n> ")
         talk.type("\x1d")
-    assert talk.child.returncode == 0
+    assert talk.process.returncode == 0
 
 
 def test_the_key_that_is_measured_may_be_typed(monitor):
-    with terminal(monitor, "--baud", 9600) as talk:
+    with terminal(*LIVE, monitor, "--baud", 9600) as talk:
         time.sleep(1)
         talk.type(" ")
         talk.until("Monitor ready\r\n> ")
         talk.type("q\r")
         talk.until("bye\r\n")
-    assert talk.child.returncode == 0
+    assert talk.process.returncode == 0
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_gives_the_terminal_back(monitor, number, code):
-    with terminal(monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
+    with terminal(*LIVE, monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
         talk.until("> ")
-        talk.child.send_signal(number)
-    assert talk.child.returncode == code
+        talk.process.send_signal(number)
+    assert talk.process.returncode == code
 
 
 def test_a_fault_gives_the_terminal_back(tmp_path):
-    with terminal(hex_file(tmp_path / "a.ihx", b"\xa5")) as talk:
+    with terminal(*LIVE, hex_file(tmp_path / "a.ihx", b"\xa5")) as talk:
         pass
-    assert talk.child.returncode == 3
+    assert talk.process.returncode == 3
 
 
 def test_without_a_terminal_there_is_no_live_one(mirotwin, tmp_path):
-    code, out, err = mirotwin("fw", "run", hex_file(tmp_path / "a.ihx", b"\x80\xfe"), "--terminal")
-    assert (code, out) == (2, "")
-    assert err == (
-        "mirotwin: error: --terminal: standard input is no terminal; run it in one, or give input with --stdin\n"
-    )
+    err = mirotwin.refuses("fw", "run", hex_file(tmp_path / "a.ihx", b"\x80\xfe"), "--terminal")
+    assert err == ("--terminal: standard input is no terminal; run it in one, or give input with --stdin")
 
 
 def test_a_program_with_more_than_8_kb_keeps_its_external_ram_apart(mirotwin, tmp_path):
@@ -220,8 +171,7 @@ void main(void)
     image = build(tmp_path, program, "--model-large")
     assert "does not fit 8192 bytes" in mirotwin("fw", "run", image)[2]
     dump = tmp_path / "dump.json"
-    code, _, _ = mirotwin("fw", "run", image, "--code-size", "64k", "--dump", dump)
-    assert code == 0
+    mirotwin.ends(0, "fw", "run", image, "--code-size", "64k", "--dump", dump)
     assert '"90": 1,' in dump.read_text()
     shared = mirotwin("fw", "run", image, "--code-in-xram", "--max-cycles", 2_000_000)
     assert "--code-in-xram: the program has overwritten " in shared[2]
@@ -232,8 +182,7 @@ def test_sizes_of_a_program_are_checked(mirotwin, tmp_path):
     assert mirotwin("fw", "run", image, "--code-size", "3")[0] == 0
     assert "does not fit 2 bytes" in mirotwin("fw", "run", image, "--code-size", "2")[2]
     for size in ("0", "65k", "65537", "8 k", "-1", ""):
-        code, _, err = mirotwin("fw", "run", image, f"--code-size={size}")
-        assert (code, err.count("\n")) == (2, 1)
+        mirotwin.refuses("fw", "run", image, f"--code-size={size}")
     both = mirotwin("fw", "run", image, "--code-size", "64k", "--code-in-xram")
     assert both[0] == 2
     assert "leave one of the two out" in both[2]
