@@ -1,8 +1,8 @@
-"""What the tests of plugs get: the command line in this process, and a world with ports."""
+"""A world with ports."""
 
 import pytest
 
-from tests.mirotwin.ports.ports import Rig
+from tests.mirotwin.ports.rig import Rig
 
 
 @pytest.fixture

@@ -1,26 +1,31 @@
-"""What the tests of plugs share: a served session, frames, and whether a recording replays to its own digests."""
+"""What the tests of ports share: a served session, a world with ports in this process, frames, and replaying."""
 
 import signal
+import socket
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
+from selectors import DefaultSelector
 from types import SimpleNamespace
 
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.scenario.file import parse
+from miro_sim.scenario.file import live_scenario, parse
 from miro_sim.world.world import World
+from mirotwin.ports.endpoint import PortContext
+from mirotwin.ports.radio_port import RadioPort
 from mirotwin.recording import reader
 from mirotwin.rerun.job import script_of
+from mirotwin.rerun.pacing import Pace
 from tests import children
+from tests.mirotwin.program import COMMAND
 
 ROOT = Path(__file__).parents[3]
-PROGRAM = "from mirotwin.entry import main; main()"
-CLEAN = ("network.radio.bit_error_rate=0",)
-"""Settings with which no answer is lost."""
+CLEAN = ("--set", "network.radio.bit_error_rate=0")
+"""With it no answer is lost."""
 ANSWER_BYTES = 19
 
 
@@ -50,14 +55,12 @@ def sent_bytes(path, network=0):
     return b"".join(one.data for one in found if one.network == network)
 
 
-@dataclass
 class Served:
     """A running `mirotwin serve`: its process, and by kind of port where they are."""
 
-    process: subprocess.Popen[str]  # noqa: TID251
-    ports: dict[str, list[str]] = field(default_factory=dict)
-    code: int | None = None
-    err: str = ""
+    def __init__(self, process):
+        self.process = process
+        self.ports = {}
 
     def number(self, kind="tcp"):
         return int(self.ports[kind][0].rpartition(":")[2])
@@ -75,10 +78,9 @@ class Served:
 @contextmanager
 def served(*arguments, **more):
     """A session, ready for clients; ended at the end if it has not."""
-    command = [sys.executable, "-c", PROGRAM, "serve", *map(str, arguments)]
+    command = [*COMMAND, "serve", *map(str, arguments)]
     process = children.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
     found = Served(process)
-    assert process.stdout is not None
     try:
         for line in process.stdout:
             if line == "serving\n":
@@ -101,24 +103,17 @@ def python(code, *arguments, **more):
     return children.run([sys.executable, "-c", code, *map(str, arguments)], **named)
 
 
-def fake_pace(factor=1.0):
-    """A pace whose wall clock stands wherever a test puts `now`; looking at it takes `per_look` ticks."""
-    from mirotwin.rerun.pacing import Pace
+class FakePace(Pace):
+    """Its wall clock stands wherever a test puts `now`; looking at it takes `per_look` ticks."""
 
-    class Faked(Pace):
-        def __init__(self):
-            super().__init__(factor)
-            self.now = 0
-            self.per_look = 0
+    now = per_look = 0
 
-        def start(self, tick):
-            self.now = tick
+    def start(self, tick):
+        self.now = tick
 
-        def tick(self):
-            self.now += self.per_look
-            return self.now
-
-    return Faked()
+    def tick(self):
+        self.now += self.per_look
+        return self.now
 
 
 NO_SELECTOR = SimpleNamespace(
@@ -127,3 +122,49 @@ NO_SELECTOR = SimpleNamespace(
     unregister=lambda *_: None,
     modify=lambda *_: None,
 )
+
+
+def soon(port, wanted):
+    """What the port receives until `wanted`, in at most 5 s."""
+    got, until_s = b"", time.monotonic() + 5
+    while not wanted():
+        assert time.monotonic() < until_s, port.client
+        got += port.receive()
+        port.push()
+        time.sleep(0.001)
+    return got
+
+
+def connected(port):
+    client = socket.create_connection(("127.0.0.1", int(port.where.rpartition(":")[2])), timeout=5)
+    soon(port, lambda: port.client)
+    return client
+
+
+class Rig:
+    """A world and what is needed to open ports of its radio; `told` is what the user would read."""
+
+    def __init__(self):
+        self.world = World(live_scenario("fig6").scenario, 1, own_image())
+        self.selector = DefaultSelector()
+        self.told = []
+        self.context = PortContext(RadioPort(self.world), self.selector, self.told.append)
+        self.open = []
+
+    def opened(self, kind, *where):
+        port = kind(self.context, *where)
+        self.open.append(port)
+        return port
+
+    def connected(self, kind):
+        """A port of TCP, and a client."""
+        port = self.opened(kind, "127.0.0.1", 0)
+        client = connected(port)
+        self.open.insert(0, client)
+        return port, client
+
+    def close(self):
+        for one in self.open:
+            one.close()
+        assert not self.selector.get_map()
+        self.selector.close()

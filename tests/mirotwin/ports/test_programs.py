@@ -2,8 +2,6 @@
 
 import json
 import os
-import pty
-import select
 import shutil
 import sys
 import time
@@ -14,9 +12,7 @@ import serial
 
 from tests import children
 from tests.mirotwin.ports.rig import ANSWER_BYTES, CLEAN, ROOT, python, question, replays, sent_bytes, served
-
-PARTS = ["case.part.stream", "run.part.mcap", "summary.part.json"]
-SETTINGS = [word for setting in CLEAN for word in ("--set", setting)]
+from tests.mirotwin.terminal import terminal
 
 A_PROGRAM = """
 import sys, serial
@@ -35,9 +31,8 @@ ANSWERED = "19 55555555ff2d\n" * 4
 def site(tmp_path):
     """pyserial with our handler beside its own, as an installation lays them out."""
     folder = tmp_path / "site"
-    shutil.copytree(
-        Path(serial.__file__).parent, folder / "serial", ignore=shutil.ignore_patterns("__pycache__")
-    )
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(serial.__file__).parent, folder / "serial", ignore=ignored)
     handler = ROOT / "sim/plugs/serial/urlhandler/protocol_miro.py"
     shutil.copy(handler, folder / "serial/urlhandler/protocol_miro.py")
     return folder
@@ -45,6 +40,10 @@ def site(tmp_path):
 
 def with_site(site):
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), *filter(None, sys.path)])}
+
+
+def option_of(kind, folder):
+    return ("--pty", folder / "radio") if kind == "pty" else (f"--{kind}", 0)
 
 
 def questions():
@@ -64,8 +63,8 @@ def test_importing_pyserial_loads_nothing_of_ours(site):
 
 @pytest.mark.parametrize("kind", ["pty", "tcp", "rfc2217"])
 def test_the_same_program_talks_to_a_served_robot(kind, tmp_path):
-    option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
-    with served("fig6", *option, *SETTINGS, "--once", "--pace", 2, "--out", tmp_path / "out") as session:
+    option = option_of(kind, tmp_path)
+    with served("fig6", *option, *CLEAN, "--once", "--pace", 2, "--out", tmp_path / "out") as session:
         done = python(A_PROGRAM, session.ports[kind][0], *questions())
         assert (done.returncode, done.stdout, done.stderr) == (0, ANSWERED, "")
         session.wait()
@@ -77,53 +76,23 @@ def test_the_same_program_talks_to_a_served_robot(kind, tmp_path):
     assert plug == {"clients": 1, "refused": 0, "bytes_in": 92, "bytes_out": 76, "dropped": 0}
 
 
-class Terminal:
-    """A program on a terminal of its own, as somebody would use it."""
-
-    def __init__(self, command, **more):
-        self.master, slave = pty.openpty()
-        named = {"stdin": slave, "stdout": slave, "stderr": slave, "start_new_session": True, **more}
-        self.process = children.start([str(word) for word in command], **named)
-        os.close(slave)
-        self.shown = b""
-
-    def type(self, text):
-        os.write(self.master, text.encode())
-
-    def until(self, wanted):
-        until_s = time.monotonic() + 20
-        while wanted not in self.shown:
-            assert time.monotonic() < until_s, self.shown
-            if select.select([self.master], [], [], 0.1)[0]:
-                self.shown += os.read(self.master, 4096)
-
-    def close(self):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
-        os.close(self.master)
-
-
 @pytest.mark.parametrize("kind", ["miro", "pty", "tcp", "rfc2217"])
 def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(kind, site, tmp_path):
     def use(url):
         command = [sys.executable, "-m", "serial.tools.miniterm", "--encoding", "hexlify", url]
-        terminal = Terminal(command, env=with_site(site))
-        try:
-            terminal.until(b"Help:")
+        with terminal(*command, env=with_site(site), start_new_session=True) as miniterm:
+            miniterm.until("Help:")
             time.sleep(0.3)  # it makes the terminal its own after that line
-            terminal.type(question(0).hex(" ").upper() + " ")
-            terminal.until(b"55 55 55 55 FF 2D D4 ")
-            terminal.type("\x1d")
-            assert terminal.process.wait(20) == 0
-        finally:
-            terminal.close()
+            miniterm.type(question(0).hex(" ").upper() + " ")
+            miniterm.until("55 55 55 55 FF 2D D4 ")
+            miniterm.type("\x1d")
+        assert miniterm.process.returncode == 0
 
     if kind == "miro":
         use("miro://fig6?realtime=1&set=network.radio.bit_error_rate=0")
         return
-    option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
-    with served("fig6", *option, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
+    option = option_of(kind, tmp_path)
+    with served("fig6", *option, *CLEAN, "--once", "--out", tmp_path / "out") as session:
         use(session.ports[kind][0])
         session.wait()
     assert session.code == 0
@@ -134,8 +103,8 @@ def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(kind, sit
 @pytest.mark.skipif(shutil.which("socat") is None, reason="needs socat")
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
 def test_socat_talks_to_a_robot(kind, tmp_path):
-    option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
-    with served("fig6", *option, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
+    option = option_of(kind, tmp_path)
+    with served("fig6", *option, *CLEAN, "--once", "--out", tmp_path / "out") as session:
         where = f"TCP:127.0.0.1:{session.number()}" if kind == "tcp" else f"{tmp_path / 'radio'},raw,echo=0"
         command = ["socat", "-t", "0.4", "-", where]
         done = children.run(command, input=question(0), capture_output=True, timeout=60, check=False)
@@ -146,7 +115,7 @@ def test_socat_talks_to_a_robot(kind, tmp_path):
 
 def test_two_programs_on_two_ports_both_send_and_both_hear(tmp_path):
     ports = ("--tcp", 0, "--pty", tmp_path / "radio")
-    with served("fig6", *ports, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
+    with served("fig6", *ports, *CLEAN, "--once", "--out", tmp_path / "out") as session:
         one = serial.serial_for_url(session.ports["tcp"][0], timeout=2)
         other = serial.serial_for_url(str(tmp_path / "radio"), timeout=2)
         time.sleep(0.1)

@@ -7,8 +7,13 @@ from itertools import pairwise
 
 import pytest
 import serial
+from hypothesis import given
+from hypothesis import strategies as st
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import HOST_CHARACTER_TICKS, ticks
+from mirotwin.ports.url import UrlOptions, parse_url
+from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.ports.rig import ANSWER_BYTES, python, question, replays, sent_bytes
 
 URL = "miro://fig6?set=network.radio.bit_error_rate=0"
@@ -190,9 +195,8 @@ def test_lines_that_a_radio_does_not_have_are_there_and_do_nothing(miro):
 
 def test_a_limit_ends_a_read_that_would_wait_for_ever(miro):
     port = miro(URL + "&limit_s=0.5", timeout=None)
-    with pytest.raises(
-        serial.SerialException, match=r"the limit of 0.5 s of virtual time is reached \(limit_s\)"
-    ):
+    reached = r"the limit of 0.5 s of virtual time is reached \(limit_s\)"
+    with pytest.raises(serial.SerialException, match=reached):
         port.read(1)
     with pytest.raises(serial.SerialException, match="limit"):
         port.write(b"x")
@@ -200,8 +204,7 @@ def test_a_limit_ends_a_read_that_would_wait_for_ever(miro):
 
 
 def test_a_firmware_fault_ends_every_call_with_its_name(miro, tmp_path):
-    image = tmp_path / "undefined.ihx"
-    image.write_text(":01000000A55A\n:00000001FF\n")
+    image = hex_file(tmp_path / "undefined.ihx", b"\xa5")
     port = miro(f"miro://fig6?firmware={image}", timeout=1)
     with pytest.raises(serial.SerialException, match="the run has stopped: firmware fault: "):
         port.read(1)
@@ -214,7 +217,6 @@ def test_a_firmware_fault_ends_every_call_with_its_name(miro, tmp_path):
         ("miro://fig6?firmware=/no/such.ihx", "there is no such file; build it, or give the path of an .ihx"),
         ("miro://fig6?network=1", "there is no network 1"),
         ("miro://fig6?set=duratio_s=3", "duratio_s"),
-        ("miro://fig6?speed=9600", "is no option of the URL"),
     ],
 )
 def test_what_cannot_be_opened_is_a_serial_exception_of_one_line(miro, url, said):
@@ -280,3 +282,55 @@ def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_pat
     assert done.stdout == f"{said}\n"
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.part.mcap"]
     assert replays(tmp_path / "out" / "run.part.mcap") > 3
+
+
+# ---- what stands in a URL ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("url", "target"),
+    [
+        ("miro://fig6", UrlOptions("fig6")),
+        ("miro://fig6/", UrlOptions("fig6")),
+        ("MIRO://fig6?seed=7", UrlOptions("fig6", seed=7)),
+        ("miro://my/own.toml?network=1", UrlOptions("my/own.toml", network=1)),
+        ("miro:///tmp/a%20b.toml", UrlOptions("/tmp/a b.toml")),
+        ("miro://fig6?set=a.b=1&set=c=%22x+y%22", UrlOptions("fig6", settings=("a.b=1", 'c="x+y"'))),
+        ("miro://fig6?firmware=C:%5Cx.ihx&realtime=0.5", UrlOptions("fig6", firmware="C:\\x.ihx", realtime=0.5)),
+        ("miro://fig6?limit_s=10&out=runs/x", UrlOptions("fig6", limit_s=10.0, out="runs/x")),
+    ],
+)  # fmt: skip
+def test_a_url_says_what_to_open(url, target):
+    assert parse_url(url) == target
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("miro://", "names no scenario; give miro://fig6, for example"),
+        ("loop://", "is no miro:// URL"),
+        ("miro://fig6?sed=7", "sed: is no option of the URL; there are set, seed, firmware, network"),
+        ("miro://fig6?seed=7&seed=8", "seed: stands twice"),
+        ("miro://fig6?seed=-1", "seed: '-1' is no whole number from 0 to 9223372036854775807"),
+        ("miro://fig6?seed=1e3", "seed: '1e3' is no whole number"),
+        ("miro://fig6?network=32", "network: '32' is no whole number from 0 to 31"),
+        ("miro://fig6?realtime=0", "realtime: '0' is no number above 0 and up to 1000"),
+        ("miro://fig6?realtime=nan", "realtime: 'nan' is no number"),
+        ("miro://fig6?limit_s=86401", "limit_s: '86401' is no number above 0 and up to 86400"),
+        ("miro://fig6?out=", "out: '' is empty"),
+    ],
+)
+def test_one_that_cannot_be_used_is_named_with_the_place_and_a_remedy(url, said):
+    with pytest.raises(BadInput) as raised:
+        parse_url(url)
+    assert f"{url}: " in str(raised.value)
+    assert said in str(raised.value)
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_a_target_or_bad_input(text):
+    for url in (text, f"miro://{text}", f"miro://fig6?{text}"):
+        try:
+            assert parse_url(url).scenario
+        except BadInput as error:
+            assert "\n" not in str(error)  # noqa: PT017

@@ -9,7 +9,7 @@ from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.session import Session
 from mirotwin.rerun.job import script_of
-from tests.mirotwin.ports.rig import NO_SELECTOR, fake_pace, own_image, question
+from tests.mirotwin.ports.rig import NO_SELECTOR, FakePace, own_image, question
 
 
 class Scripted(Endpoint):
@@ -38,8 +38,9 @@ def session_of(*sends, ports=1, **more):
     told = []
     context = PortContext(RadioPort(world), NO_SELECTOR, told.append)
     found = [Scripted(context, list(sends) if index == 0 else []) for index in range(ports)]
-    pace = fake_pace()
-    session = Session(world, pace, NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more})
+    session = Session(
+        world, FakePace(1.0), NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more}
+    )
     return session, found, told
 
 
