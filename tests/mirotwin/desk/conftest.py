@@ -1,11 +1,8 @@
-"""What the tests of real ports get: the command line, and a stream that drives one robot of three."""
+"""A stream that drives one robot of three."""
 
 import pytest
 
-from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.desk.rig import stream_text
-
-__all__ = ["drive", "mirotwin"]
 
 
 @pytest.fixture

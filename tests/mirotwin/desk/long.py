@@ -7,8 +7,6 @@ a process of this machine, which no load must slow down: it gets real-time prior
 a frame was lost, a rule failed, or a difference is not due to a robot that was behind. `--smoke` takes a minute.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -21,12 +19,11 @@ from pathlib import Path
 from miro_protocol.transmission import Transmission
 from mirotwin.recording import reader
 from mirotwin.rerun.job import script_of
-from tests import children
-from tests.mirotwin.desk.rig import as_hardware, stream_text
-from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
+from tests.mirotwin import program
+from tests.mirotwin.desk.rig import QUIET, as_hardware, stream_text
+from tests.mirotwin.ports.rig import sent_bytes, served
 from tests.mirotwin.ports.sessions import load
 
-SETTINGS = ("--set", "network.radio.bit_error_rate=0", "--set", 'camera={kind="gaussian"}')
 FRAMES_A_MINUTE = 1798
 STOP_BYTES = 3 * 23
 LATE_TICKS = 10 * 24_000
@@ -35,17 +32,16 @@ NEAR = 4
 QUICK = ("P05", "P07", "P17", "P41", "P50")
 
 
-def mirotwin(folder: Path, *words: str) -> tuple[int, str, str]:
-    command = [sys.executable, "-c", PROGRAM, *words]
-    done = children.run(command, cwd=folder, capture_output=True, text=True)
+def mirotwin(folder, *words):
+    done = program.run(*words, cwd=folder)
     return done.returncode, done.stdout, done.stderr
 
 
-def replayed(folder: Path, robot: Path, minutes: float) -> bool:
+def replayed(folder, robot, minutes):
     """Whether nothing is lost and nothing differs."""
     (folder / "drive.stream").write_text(stream_text(round(FRAMES_A_MINUTE * minutes)))
     link, out = folder / "radio", robot / "session"
-    with served("fig6", "--pty", link, "--once", *SETTINGS, "--out", out, preexec_fn=as_hardware) as session:
+    with served("fig6", "--pty", link, "--once", *QUIET, "--out", out, preexec_fn=as_hardware) as session:
         options = ("--port", "radio", "--allow-motion", "--json", "--all", "-q", "--out", "desk")
         code, found, err = mirotwin(folder, "replay", "drive.stream", *options)
         session.wait()
@@ -68,12 +64,12 @@ def replayed(folder: Path, robot: Path, minutes: float) -> bool:
     return not lost and not ours
 
 
-def frames(recording: Path) -> list[int]:
+def frames(recording):
     """When each frame was sent, as the recording says."""
     return [one.tick for one in script_of(reader.read(recording).periods) if isinstance(one, Transmission)]
 
 
-def behind_at(ticks: list[int], sent: list[int], came: list[int]) -> list[int]:
+def behind_at(ticks, sent, came):
     """How far the robot was behind around each of these: frames came to it at an earlier tick of its own clock."""
     apart = [theirs - mine for mine, theirs in zip(sent, came, strict=False)]
     found = []
@@ -83,11 +79,11 @@ def behind_at(ticks: list[int], sent: list[int], came: list[int]) -> list[int]:
     return found
 
 
-def tried(folder: Path, robot: Path, times: int, rules: tuple[str, ...]) -> bool:
+def tried(folder, robot, times, rules):
     """Whether no rule failed."""
-    verdicts: Counter[str] = Counter()
+    verdicts = Counter()
     link, out = folder / "tried", robot / "trials"
-    with served("fig6", "--pty", link, *SETTINGS, "--out", out, preexec_fn=as_hardware) as session:
+    with served("fig6", "--pty", link, *QUIET, "--out", out, preexec_fn=as_hardware) as session:
         for number in range(times):
             ids = (word for rule in rules for word in ("--rule", rule))
             code, found, err = mirotwin(folder, "conform", "--port", "tried", "--json", "-q", *ids)
@@ -106,10 +102,8 @@ def tried(folder: Path, robot: Path, times: int, rules: tuple[str, ...]) -> bool
     return not verdicts["failed"]
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=30.0, help="of replay")
     parser.add_argument("--times", type=int, default=20, help="conform")
     parser.add_argument("--smoke", action="store_true", help="10 s of replay, five rules once")

@@ -9,7 +9,8 @@ PERIOD = 800_800
 CLEAN = "set=network.radio.bit_error_rate=0"
 ROBOT = f"miro://fig6?{CLEAN}"
 """The shipped robot in slot 0, with an ideal radio."""
-
+QUIET = ("--set", "network.radio.bit_error_rate=0", "--set", 'camera={kind="gaussian"}')
+"""The same for `serve`, with a camera that takes no time."""
 
 ABOVE_THE_PC = 2
 

@@ -8,9 +8,10 @@ from mirotwin.desk.robot_port import RobotPort
 from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
 from mirotwin.verify.conform.rules import ALL, RULES
 from tests.mirotwin.desk.rig import ROBOT
-from tests.mutants.build import build, compiler
+from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
+from tests.mutants.sdcc import needs_sdcc
 
 QUICK = "set=camera={kind=%22gaussian%22}"
 SEEN = [rule.id for rule in RULES if rule.id not in NOT_OBSERVABLE]
@@ -71,7 +72,7 @@ def test_of_several_robots_at_a_port_one_is_tried_and_named(mirotwin, two_robots
     assert err == f"mirotwin: {two_robots}: robots 0 and 1 answer; robot 0 is tried\n"
 
 
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@needs_sdcc
 def test_another_robot_at_the_port_hides_no_mistake(mirotwin, two_robots):
     robots = f"{two_robots}?firmware={built('answers frames that ask nobody')}"
     assert verdicts(mirotwin, robots, ["P43"])["P43"]["verdict"] == "failed"
@@ -90,13 +91,12 @@ def test_verdicts_are_counted(mirotwin):
 
 def test_where_nobody_answers_both_sizes_of_networks_are_named(mirotwin, monkeypatch):
     monkeypatch.setattr(RobotPort, "_take", lambda port, data: None)
-    code, _, err = mirotwin("conform", "--port", ROBOT)
-    assert (code, "no robot of a network of 3 or 5 answers: nothing comes" in err) == (2, True)
+    err = mirotwin.refuses("conform", "--port", ROBOT)
+    assert "no robot of a network of 3 or 5 answers: nothing comes" in err
 
 
 def test_options_of_the_twin_are_refused(mirotwin):
-    code, _, err = mirotwin("conform", "--port", ROBOT, "--seed", 3)
-    assert (code, "--seed: is not for a robot at a port" in err) == (2, True)
+    assert "--seed: is not for a robot at a port" in mirotwin.refuses("conform", "--port", ROBOT, "--seed", 3)
 
 
 FOUND = {
@@ -113,15 +113,6 @@ FOUND = {
     "tells what happened again and again": "P45",
 }
 """Mistakes that answers show, and the rule that finds them."""
-UNSEEN = {
-    "stops by opening the loops": "P31",
-    "takes bad stop bits": "P09",
-    "takes the velocities of the robot before it": "P22",
-    "does not look at spacings": "P10",
-    "takes gaps of 90 us": "P10",
-    "stops for a service frame": "P34",
-}
-"""Mistakes that answers do not show, and the rule that they break."""
 
 
 def built(name):
@@ -134,7 +125,7 @@ def robot_with(name):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@needs_sdcc
 @pytest.mark.parametrize("name", FOUND)
 def test_a_mistake_that_answers_show_is_found(mirotwin, name):
     rule = FOUND[name]
@@ -142,27 +133,20 @@ def test_a_mistake_that_answers_show_is_found(mirotwin, name):
     assert (found["verdict"], bool(found["first"]["wanted"])) == ("failed", True)
 
 
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@needs_sdcc
 def test_a_rule_that_presupposes_a_failed_one_is_not_judged(mirotwin):
     found = verdicts(mirotwin, robot_with("takes frames with a bad CRC"), ["P08", "P07"])
     assert found["P07"]["verdict"] == "failed"
     assert (found["P08"]["verdict"], found["P08"]["cause"]) == ("not judged", "P07")
 
 
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
-@pytest.mark.parametrize("name", UNSEEN)
-def test_a_mistake_that_answers_do_not_show_passes_nothing_that_it_breaks(mirotwin, name):
-    rule = UNSEEN[name]
-    assert verdicts(mirotwin, robot_with(name), [rule])[rule]["verdict"] == "not observable"
-
-
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@needs_sdcc
 def test_without_noise_in_pauses_the_counters_tell_who_does_not_look_at_spacings(mirotwin):
     robot = f"{robot_with('does not look at spacings')}&set=network.radio.squelch=true"
     assert verdicts(mirotwin, robot, ["P49"])["P49"]["verdict"] == "failed"
 
 
-@pytest.mark.skipif(not compiler(), reason="needs SDCC")
+@needs_sdcc
 def test_what_was_found_before_a_robot_fell_silent_is_told(mirotwin, tmp_path):
     robot = robot_with("loses sync for good after a bad CRC")
     rules = ("--rule", "P05", "--rule", "P07", "--rule", "P16")

@@ -16,10 +16,10 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from tests import children
-from tests.mirotwin.desk.rig import as_hardware, stream_text
-from tests.mirotwin.ports.rig import PROGRAM, served
+from tests.mirotwin import program
+from tests.mirotwin.desk.rig import QUIET, as_hardware, stream_text
+from tests.mirotwin.ports.rig import served
 
-SETTINGS = ("--set", "network.radio.bit_error_rate=0", "--set", 'camera={kind="gaussian"}')
 FRAMES = 20
 BRIDGE = """
 import socket, sys, threading, serial, serial.rfc2217
@@ -162,15 +162,13 @@ def test_nothing_differs_but_times(tmp_path, between):
     (tmp_path / "drive.stream").write_text(stream_text(FRAMES))
     with (
         served(
-            *("fig6", "--tcp", 0, "--pty", tmp_path / "pty", *SETTINGS, "--out", tmp_path / "session"),
+            *("fig6", "--tcp", 0, "--pty", tmp_path / "pty", *QUIET, "--out", tmp_path / "session"),
             preexec_fn=as_hardware,
         ) as session,
         between(session, tmp_path) as url,
     ):
-        command = [sys.executable, "-c", PROGRAM, "replay", "drive.stream", "--port", url]
-        done = children.run(
-            [*command, "--allow-motion", "--json", "--all"], cwd=tmp_path, capture_output=True, text=True
-        )
+        options = ("--allow-motion", "--json", "--all")
+        done = program.run("replay", "drive.stream", "--port", url, *options, cwd=tmp_path)
     assert done.returncode in (0, 4), done.stderr
     assert f"{FRAMES} transmissions sent, 99 % less than" in done.stderr
     found = json.loads(done.stdout)["differences"]

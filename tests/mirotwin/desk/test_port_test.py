@@ -22,6 +22,7 @@ wait_for = "answer"
 within_ms = 80
 accepted = 1
 """
+SECOND, WRONG = (POLL.replace("accepted = 1", f"accepted = {count}") for count in (2, 3))
 INSIDE = """
 [[step]]
 send = "ping"
@@ -43,6 +44,9 @@ silence_for_ms = 20
 """
 
 
+UNSEEN = "steps and expectations are not observable on a port"
+
+
 @pytest.fixture
 def at_port(mirotwin, tmp_path):
     def run(steps, *options):
@@ -61,17 +65,14 @@ def test_steps_that_a_pc_can_do_and_see_pass(at_port):
 
 
 def test_an_answer_that_is_not_what_was_wanted_fails(at_port):
-    code, out, _ = at_port(POLL.replace("accepted = 1", "accepted = 3"))
+    code, out, _ = at_port(WRONG)
     assert code == 1
     assert "step failed: step 2: wait_for answer" in out
 
 
 def test_waits_inside_the_robot_are_passed_over_and_counted(at_port):
-    code, out, _ = at_port(INSIDE + POLL.replace("accepted = 1", "accepted = 2"))
-    assert (code, out.splitlines()[-1]) == (
-        0,
-        "1 passed; 2 steps and expectations are not observable on a port",
-    )
+    code, out, _ = at_port(INSIDE + SECOND)
+    assert (code, out.splitlines()[-1]) == (0, f"1 passed; 2 {UNSEEN}")
     assert "step 2: wait_for command: not observable on a port: it is inside the robot" in out
 
 
@@ -83,10 +84,7 @@ def test_a_file_of_which_nothing_can_be_seen_does_not_pass(at_port):
 
 def test_behind_a_switch_that_no_port_has_nothing_is_judged(at_port):
     code, out, _ = at_port(POLL + SWITCH)
-    assert (code, out.splitlines()[-1]) == (
-        0,
-        "1 passed; 3 steps and expectations are not observable on a port",
-    )
+    assert (code, out.splitlines()[-1]) == (0, f"1 passed; 3 {UNSEEN}")
     assert at_port(SWITCH)[1].startswith("not observable ")
 
 
@@ -106,14 +104,12 @@ def test_a_step_that_moves_is_refused_unless_it_is_allowed(at_port):
 
 def test_a_controller_needs_more_than_a_port(at_port):
     code, out, _ = at_port("", "--set", 'network.host="controller"')
-    assert (code, out.splitlines()[1]) == (
-        5,
-        "    a controller, which needs a camera: not observable on a port",
-    )
+    said = "    a controller, which needs a camera: not observable on a port"
+    assert (code, out.splitlines()[1]) == (5, said)
 
 
 def test_the_recording_of_a_test_is_compared_with_its_twin(at_port, mirotwin, tmp_path):
-    at_port(POLL + POLL.replace("accepted = 1", "accepted = 2"), "--artifacts", tmp_path / "left")
+    at_port(POLL + SECOND, "--artifacts", tmp_path / "left")
     (folder,) = (tmp_path / "left").iterdir()
     code, out, err = mirotwin("replay", folder)
     assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
@@ -123,15 +119,13 @@ def test_a_port_that_is_not_there_leaves_no_folder(mirotwin, tmp_path):
     path = tmp_path / "poll.scenario.toml"
     path.write_text(HEAD + POLL)
     code, out, _ = mirotwin("test", path, "--port", "/dev/nope", "--artifacts", tmp_path / "left")
-    assert (code, out.splitlines()[1]) == (
-        2,
-        "    /dev/nope: there is no such port; `python -m serial.tools.list_ports` lists those there are",
-    )
+    said = "    /dev/nope: there is no such port; `python -m serial.tools.list_ports` lists those there are"
+    assert (code, out.splitlines()[1]) == (2, said)
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_case_of_an_earlier_failure_is_not_told_of_a_robot(at_port, mirotwin, tmp_path):
-    wrong = POLL.replace("accepted = 1", "accepted = 3")
+    wrong = WRONG
     at_port(wrong, "--artifacts", tmp_path / "left")
     mirotwin("test", tmp_path / "poll.scenario.toml", "--artifacts", tmp_path / "left")
     assert (found := list(tmp_path.glob("left/*/case.stream")))
@@ -140,11 +134,8 @@ def test_the_case_of_an_earlier_failure_is_not_told_of_a_robot(at_port, mirotwin
 
 
 def test_a_seed_is_refused_for_a_robot(at_port):
-    assert at_port(POLL, "--seed", 4) == (
-        2,
-        "",
-        "mirotwin: error: --seed: is not for a robot at a port; leave it out\n",
-    )
+    said = "mirotwin: error: --seed: is not for a robot at a port; leave it out\n"
+    assert at_port(POLL, "--seed", 4) == (2, "", said)
 
 
 TESTS = """
@@ -210,8 +201,7 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
 
 @pytest.mark.parametrize("command", ["replay", "test", "conform"])
 def test_a_port_without_a_name_does_not_mean_the_twin(mirotwin, pytester, command):
-    code, _, err = mirotwin(command, "some.file", "--port", "")
-    assert (code, "'--port': the path is empty" in err) == (2, True)
+    assert "'--port': the path is empty" in mirotwin.refuses(command, "some.file", "--port", "")
     found = pytester.runpytest_inprocess("--mirotwin-port=")
     found.stderr.fnmatch_lines(["ERROR: --mirotwin-port: is empty; name the port of the robots*"])
 
@@ -239,7 +229,7 @@ def test_a_case_is_refused_before_anything_is_sent(mirotwin, at_port, tmp_path):
 
 
 def test_the_page_of_a_failure_shows_the_robot_beside_its_twin(at_port, tmp_path):
-    wrong = POLL.replace("accepted = 1", "accepted = 3")
+    wrong = WRONG
     code, out, _ = at_port(wrong, "--artifacts", tmp_path / "left", "--pages")
     (page,) = (tmp_path / "left").rglob("report.html")
     assert (code, f"    left in {page.parent}" in out.splitlines()) == (1, True)

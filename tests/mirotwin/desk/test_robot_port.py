@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import tty
 from contextlib import suppress
@@ -22,7 +21,8 @@ from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.desk.rig import ROBOT, stream_text
-from tests.mirotwin.ports.rig import PROGRAM, sent_bytes, served
+from tests.mirotwin.ports.rig import sent_bytes, served
+from tests.mirotwin.program import COMMAND
 
 MS = 24_000
 SCENARIO = silent_scenario(())
@@ -244,7 +244,7 @@ def test_a_signal_stops_the_robot_and_leaves_what_was_recorded(tmp_path, number,
     (tmp_path / "drive.stream").write_text(stream_text(2000))
     with served("fig6", "--tcp", 0, "--out", tmp_path / "session", "--once") as session:
         url = f"socket://127.0.0.1:{session.number()}"
-        command = [sys.executable, "-c", PROGRAM, "replay", "drive.stream", "--port", url, "--allow-motion"]
+        command = [*COMMAND, "replay", "drive.stream", "--port", url, "--allow-motion"]
         process = children.start(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
         for line in process.stderr:
             if "all times are" in line:
