@@ -51,14 +51,6 @@ def history(run, until_tick):
     return watcher.moments
 
 
-def last_change(moments, now, first, count):
-    """The moment before the last instruction that changed these bytes, before moment `now`; None where none did."""
-    for at in range(now, 0, -1):
-        if moments[at].ram[first : first + count] != moments[at - 1].ram[first : first + count]:
-            return moments[at - 1]
-    return None
-
-
 def next_line(moments, now, starts, line_of):
     """Where `next` stops: the moment at which another line begins in this function, or any in its caller."""
     here = moments[now]

@@ -1,5 +1,5 @@
 // Drives the real adapter with @vscode/debugadapter-testsupport: each request that the capabilities announce is used and judged.
-// Called by test_dap_client.py: node dap_client.js PYTHON SERVER SOURCES
+// Called by test_editors.py: node dap_client.js PYTHON SERVER SOURCES
 const assert = require('node:assert');
 const path = require('node:path');
 const { DebugClient } = require('@vscode/debugadapter-testsupport');

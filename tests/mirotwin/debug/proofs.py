@@ -10,6 +10,7 @@ import random
 import sys
 import tempfile
 import time
+from itertools import pairwise
 from pathlib import Path
 
 from miro_exact.clock import CYCLE_TICKS
@@ -23,7 +24,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
 from mirotwin.rerun.inspected_run import BareRun
 from tests import children
-from tests.mirotwin.debug.runs import debugger_of, robot_run
+from tests.mirotwin.debug.runs import ASM, debugger_of, robot_run
 
 JBC = 0x10
 MIX = Path(__file__).parents[2] / "robot" / "ucsim" / "programs" / "mix.c"
@@ -65,21 +66,19 @@ def wrong_writers(begin_tick, end_tick, count, seed=0):
     debugger = debugger_of(robot_run())
     stack = debugger.symbols.image.symbols.stack[0]
     writes = written_bytes(robot_run(), begin_tick, end_tick, 0x20, stack)
-    variables = [
-        one for one in debugger.symbols.variables_in("") if one.space == "iram" and one.address >= 0x20
-    ]
+    known = debugger.symbols.variables_in("")
+    variables = [one for one in known if one.space == "iram" and one.address >= 0x20]
     ever = set().union(*(written for _, written in writes))
     often = [one for one in variables if not ever.isdisjoint(range(one.address, one.address + one.type.size))]
     chance, wrong, asked = random.Random(seed), [], 0
     for _ in range(count):
-        variable, at = (
-            chance.choice(chance.choice((often, often, variables))),
-            chance.randrange(1, len(writes)),
-        )
+        variable = chance.choice(chance.choice((often, often, variables)))
+        at = chance.randrange(1, len(writes))
         places = range(variable.address, variable.address + variable.type.size)
         before = [cycle for cycle, written in writes[:at] if not written.isdisjoint(places)]
         debugger.timeline.go_to(writes[at][0] * CYCLE_TICKS)
         found = debugger.last_writer(debugger.bytes_of(variable.name))
+        assert debugger.cpu.cycles == writes[at][0]
         cycle = None if found is None else found[0] // CYCLE_TICKS
         asked += bool(before)
         if (before and cycle != before[-1]) or (not before and cycle is not None and cycle >= writes[0][0]):
@@ -92,7 +91,7 @@ class Shadow(Watcher):
 
     def __init__(self, image, share, seed=0):
         self.unwinder = Unwinder(image, SymbolNames(image))
-        self.calls = []  # (address of return, SP when it was pushed)
+        self.calls = []  # (address of return, SP when it was pushed, whether by an interrupt)
         self.share, self.chance = share, random.Random(seed)
         self.compared, self.wrong = 0, []
 
@@ -100,20 +99,21 @@ class Shadow(Watcher):
         if self.chance.random() < self.share:
             frames = self.unwinder.frames(cpu)
             self.compared += 1
-            calls = [back for back, _ in reversed(self.calls)]
-            if [frame.pc for frame in frames[1:]] != calls or not frames[-1].known:
+            found = [(inner.by_interrupt, outer.pc) for inner, outer in pairwise(frames)]
+            calls = [(interrupt, back) for back, _, interrupt in reversed(self.calls)]
+            if found != calls or not frames[-1].known:
                 self.wrong.append(cpu.pc)
 
     def executed(self, cpu, pc, start):
         opcode = cpu.code_at(pc)
         if is_call(opcode):
-            self.calls.append((pc + LENGTH[opcode], cpu.sp))
+            self.calls.append((pc + LENGTH[opcode], cpu.sp, False))
         while self.calls and self.calls[-1][1] > cpu.sp:
             self.calls.pop()  # a RET alone may be a jump: SDCC goes so to what a pointer names
         self.compare(cpu)
 
     def interrupted(self, cpu, source, pc, start):
-        self.calls.append((pc, cpu.sp))
+        self.calls.append((pc, cpu.sp, True))
         self.compare(cpu)
 
 
@@ -150,8 +150,6 @@ def main():
         f"last writers: {given.writers} asked, {asked} of them with one in the window; {len(wrong)} wrong {wrong[:5]}"
     )
     bad = bool(wrong)
-    from tests.mirotwin.debug.test_debug_command import ASM
-
     with tempfile.TemporaryDirectory() as folder:
         runs = {
             "the robot's own": robot_run("sine"),

@@ -13,6 +13,28 @@ from mirotwin.shell.firmware_image import load_firmware
 from tests.sim.digests import GOLDEN
 
 SECOND = 24_000_000
+ASM = """
+LJMP main
+ORG 0Bh
+INC 30h
+RETI
+ORG 30h
+main:
+MOV SP,#50h
+MOV IE,#82h
+MOV TMOD,#02h
+SETB TR0
+again:
+LCALL twice
+INC 31h
+SJMP again
+twice:
+PUSH ACC
+INC 32h
+POP ACC
+RET
+"""
+"""A program for the bare processor: calls within calls, and a timer that interrupts them."""
 
 
 def robot_run(scenario="fig6", seed=7, firmware=None, index=0, settings=()):

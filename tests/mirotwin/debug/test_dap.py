@@ -2,13 +2,13 @@
 
 import json
 import socket
-import sys
 
 import pytest
 
 from tests import children
+from tests.mirotwin.program import COMMAND
 
-MIROTWIN = [sys.executable, "-c", "from mirotwin.commands import main; main()", "debug"]
+NO_MESSAGE = "mirotwin: error: --dap: the client sends no message of the protocol"
 
 
 class Client:
@@ -25,9 +25,8 @@ class Client:
 
     def send(self, command, **arguments):
         self.seq += 1
-        data = json.dumps(
-            {"seq": self.seq, "type": "request", "command": command, "arguments": arguments}
-        ).encode()
+        request = {"seq": self.seq, "type": "request", "command": command, "arguments": arguments}
+        data = json.dumps(request).encode()
         self.raw(b"Content-Length: %d\r\n\r\n" % len(data) + data)
 
     def message(self):
@@ -56,7 +55,7 @@ class Client:
 
 @pytest.fixture
 def adapter():
-    process = children.start([*MIROTWIN, "--dap"], stdin=-1, stdout=-1, stderr=-1)
+    process = children.start([*COMMAND, "debug", "--dap"], stdin=-1, stdout=-1, stderr=-1)
     yield process, Client(process.stdout, process.stdin)
     process.kill()
     process.communicate()
@@ -83,9 +82,8 @@ def test_garbage_ends_it_with_one_line(adapter, garbage):
     process, client = adapter
     client.raw(garbage)
     code, err = ended(process)
-    assert code == 2
-    assert err.startswith("mirotwin: error: --dap: the client sends no message of the protocol")
-    assert err.count("\n") == 1
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.startswith(NO_MESSAGE)
 
 
 @pytest.mark.parametrize("move", ["continue", "evaluate"])
@@ -96,7 +94,7 @@ def test_garbage_during_a_run_ends_it_with_one_line(adapter, move):
     client.raw(b"GET / HTTP/1.1\r\n\r\n")
     code, err = ended(process)
     assert (code, err.count("\n")) == (2, 1)
-    assert err.startswith("mirotwin: error: --dap: the client sends no message of the protocol")
+    assert err.startswith(NO_MESSAGE)
 
 
 def test_a_client_that_dies_leaves_no_process(adapter):
@@ -115,13 +113,9 @@ def test_what_comes_during_a_run_gets_an_answer_each(adapter):
     client.send("setFunctionBreakpoints", breakpoints=[])
     client.send("pause", threadId=1)
     answers = [client.until(type="response") for _ in range(5)]
-    assert [(one["command"], one["success"]) for one in answers] == [
-        ("continue", True),
-        ("threads", True),
-        ("stackTrace", False),
-        ("setFunctionBreakpoints", True),
-        ("pause", True),
-    ]
+    asked = ["continue", "threads", "stackTrace", "setFunctionBreakpoints", "pause"]
+    assert [one["command"] for one in answers] == asked
+    assert [one["success"] for one in answers] == [True, True, False, True, True]
     assert answers[2]["message"] == "the run is under way: pause it first"
     assert client.until(event="stopped")["body"]["reason"] == "pause"
     client.ask("disconnect")
@@ -250,7 +244,7 @@ def test_a_launch_that_cannot_be_done_says_why_and_another_one_may_follow(adapte
 
 
 def test_it_listens_on_a_port_of_this_machine_alone():
-    process = children.start([*MIROTWIN, "--listen", "0"], stdout=-1, stderr=-1)
+    process = children.start([*COMMAND, "debug", "--listen", "0"], stdout=-1, stderr=-1)
     port = int(process.stderr.readline().rpartition(b":")[2])
     with socket.create_connection(("127.0.0.1", port)) as connection, connection.makefile("rwb") as stream:
         client = Client(stream, stream)

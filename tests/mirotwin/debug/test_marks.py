@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from miro_exact.state import Flat
 from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.marks import MarkInspector
-from tests.mirotwin.debug.test_debug_command import ASM
+from tests.mirotwin.debug.runs import ASM
 from tests.mirotwin.verify.bare.firmwares import image
 
 CYCLES = 2000

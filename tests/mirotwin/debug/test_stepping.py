@@ -1,4 +1,4 @@
-"""Steps, stacks and writers are those that a list of all moments of the run tells."""
+"""Going forward and back through a run: steps, stacks and writers are right, and nothing changes by it."""
 
 import random
 import sys
@@ -7,11 +7,16 @@ from itertools import pairwise
 import pytest
 
 from miro_exact.clock import CYCLE_TICKS
+from mirotwin.debug import timeline as timelines
 from mirotwin.debug.console import Console
+from mirotwin.debug.timeline import Timeline, Trap
 from mirotwin.shell.progress import ProgressBar
-from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
-from tests.mirotwin.shell.test_progress import Screen
-from tests.naive.debugger import history, last_change, next_line
+from tests.mirotwin.debug.proofs import LIBRARY, MIX, assembled, compiled, stacks, wrong_writers
+from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
+from tests.mirotwin.debug.walks import differences, walk
+from tests.mirotwin.shell.test_screen import Screen
+from tests.mutants.sdcc import needs_sdcc
+from tests.naive.debugger import history, next_line
 
 END = SECOND // 16
 
@@ -33,16 +38,6 @@ def stand(debugger, moment):
 
 def some(moments, count, seed):
     return sorted(random.Random(seed).sample(range(len(moments) // 2), count))
-
-
-def test_stacks_are_those_of_the_calls_that_were_made(moments, debugger):
-    for at in some(moments, 60, 1):
-        stand(debugger, moments[at])
-        frames = debugger.frames()
-        assert [frame.pc for frame in frames[1:]] == [back for back, _, _ in reversed(moments[at].calls)]
-        assert [frame.by_interrupt for frame in frames[:-1]] == [
-            one for _, _, one in reversed(moments[at].calls)
-        ]
 
 
 def test_next_stops_where_another_line_of_the_function_or_its_caller_begins(moments, debugger):
@@ -97,23 +92,6 @@ def test_an_instruction_forward_and_back_are_neighbours(moments, debugger):
         assert slept or (debugger.cpu.cycles, debugger.cpu.pc) == moments[at][:2]
         debugger.step("into", by_instruction=True)
         assert slept or (debugger.cpu.cycles, debugger.cpu.pc) == moments[at + 1][:2]
-
-
-def test_the_last_writer_is_the_last_instruction_that_changed_it_or_a_later_one_that_did_not(
-    moments, debugger
-):
-    names = [one for one in debugger.symbols.variables_in("") if one.space == "iram"]
-    chance = random.Random(6)
-    for at in some(moments, 25, 6):
-        variable = chance.choice(names)
-        stand(debugger, moments[at])
-        found = debugger.last_writer(debugger.bytes_of(variable.name))
-        changed = last_change(moments, at, variable.address, variable.type.size)
-        assert debugger.cpu.cycles == moments[at].cycle
-        assert changed is None or (found is not None and found[0] >= changed.cycle * CYCLE_TICKS)
-        if found is not None:
-            writer = next(one for one in moments if one.cycle * CYCLE_TICKS == found[0])
-            assert found[1][0].pc == writer.pc
 
 
 def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
@@ -171,3 +149,90 @@ def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypa
     assert Console(debugger).run("continue")
     assert "continue" in screen.getvalue()
     assert "the run ends here" in capsys.readouterr().out
+
+
+# A part of what `python -m tests.mirotwin.debug.proofs` compares with brute force
+
+
+def test_the_last_writer_is_that_of_brute_force():
+    wrong, asked = wrong_writers(SECOND // 50, SECOND // 40, 40)
+    assert wrong == []
+    assert asked > 10
+
+
+PROGRAMS = {"the robot": (), "mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
+
+
+@needs_sdcc
+@pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS)
+def test_stacks_are_those_of_the_calls_and_interrupts(tmp_path, program):
+    shadow = stacks(compiled(tmp_path, *program) if program else robot_run(), SECOND // 10, 0.1)
+    assert shadow.compared > 1000
+    assert shadow.wrong == []
+
+
+def test_stacks_of_a_firmware_in_assembler_are_those_of_the_calls():
+    shadow = stacks(assembled(ASM), SECOND // 50, 0.1)
+    assert shadow.compared > 1000
+    assert shadow.wrong == []
+
+
+# Each moment is that of a run that never stopped
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_states_of_a_random_walk_are_those_of_an_unbroken_run(seed):
+    debugger = debugger_of(robot_run())
+    stops = list(walk(debugger, 80, SECOND // 2, seed))
+    assert len(stops) == 80
+    assert differences(stops, robot_run()) == []
+
+
+def test_the_digest_at_the_end_of_a_walk_is_the_golden_one():
+    debugger = debugger_of(robot_run(settings=["duration_s=0.5"]))
+    list(walk(debugger, 20, SECOND // 4, 3))
+    debugger.go_to(debugger.timeline.run.end_tick)
+    assert debugger.timeline.run.world.digest == golden_digest("fig6 0.5 s seed 7")
+
+
+def test_checkpoints_stay_within_their_budget_and_any_moment_can_be_gone_to(monkeypatch):
+    monkeypatch.setattr(timelines, "BUDGET_BYTES", 40_000)
+    timeline = Timeline(robot_run())
+    timeline.find({}, SECOND)
+    assert timeline.kept_bytes <= 40_000
+    stops = []
+    for tick in (20 * SECOND // 21, SECOND // 3, 0, SECOND // 2):
+        timeline.go_to(tick)
+        stops.append((timeline.tick, timeline.state()))
+    assert differences(stops, robot_run()) == []
+
+
+def test_a_step_back_from_a_sleep_is_its_begin_and_a_step_leads_to_what_wakes():
+    debugger = debugger_of(robot_run())
+    timeline, cpu = debugger.timeline, debugger.cpu
+    debugger.go_to(SECOND // 10)
+    timeline.step()
+    while not cpu.idle:
+        timeline.step()
+    asleep, begun = cpu.pc, timeline.tick
+    timeline.step()
+    assert cpu.pc in debugger.symbols.unwinder.vectors
+    timeline.step_back()
+    assert (cpu.pc, timeline.tick, bool(cpu.idle)) == (asleep, begun, True)
+
+
+def test_a_search_is_interrupted_between_two_pieces():
+    timeline = Timeline(robot_run(), lambda: True)
+    assert timeline.find({0: Trap((0x1FFF,), lambda core: True)}) is None
+    assert 0 < timeline.tick < SECOND // 10
+
+
+def test_steps_leave_chips_and_encoders_where_a_straight_run_has_them():
+    timeline = Timeline(robot_run())
+    timeline.go_to(14_075_000)
+    stops = []
+    for _ in range(400):
+        timeline.step()
+        stops.append((timeline.tick, timeline.state()))
+    assert differences(stops, robot_run()) == []

@@ -1,10 +1,12 @@
-"""Editors' own client drives the adapter: `@vscode/debugadapter-testsupport`, with which adapters are tested.
+"""Editors and the adapter: the client with which adapters are tested, nvim without a screen, and files for VS Code.
 
     npm install --prefix build/npm @vscode/debugadapter-testsupport@1.68.0
 
 What the adapter sends is compared with the published schema of the protocol, which the package debugpy carries.
+nvim-dap is in no package registry: its test is run where nvim finds it, or where NVIM_DAP names its folder.
 """
 
+import json
 import os
 import re
 import shutil
@@ -15,11 +17,16 @@ import msgspec
 import pytest
 
 from miro_robot.firmware import source_folder
+from mirotwin.debug.subject import DebugSubject, launched
 from tests import children
 
 ROOT = Path(__file__).parents[3]
 MODULES = ROOT / "build" / "npm" / "node_modules"
 HERE = Path(__file__).parent
+EXAMPLES = ROOT / "examples"
+EXTENSION = json.loads((EXAMPLES / "vscode" / "package.json").read_text())
+LAUNCH = json.loads((EXAMPLES / "hil" / ".vscode" / "launch.json").read_text())
+VALUES = {"string": "1s", "integer": 1, "array": ["one"]}
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +83,51 @@ def test_each_message_is_valid_against_the_published_schema(sent):
 def test_a_message_that_is_wrong_would_be_found():
     validator, document = schema()
     checker = validator({**document, "$ref": "#/definitions/StoppedEvent"})
-    assert list(
-        checker.iter_errors({"seq": 1, "type": "event", "event": "stopped", "body": {"threadId": "one"}})
+    wrong = {"seq": 1, "type": "event", "event": "stopped", "body": {"threadId": "one"}}
+    assert list(checker.iter_errors(wrong))
+
+
+def nvim(*words, **environment):
+    """What nvim says, and its exit code."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    plugin = f"let &runtimepath .= ',' . '{os.environ.get('NVIM_DAP', '')}'"
+    command = ["nvim", "--headless", "-n", "-i", "NONE", "--cmd", plugin, *words]
+    done = children.run(
+        command, env={**os.environ, "PATH": path, **environment}, capture_output=True, text=True, timeout=120
     )
+    return done.returncode, done.stderr
+
+
+@pytest.fixture
+def configuration():
+    """The text of the documentation, where nvim and the plug-in are there."""
+    if shutil.which("nvim") is None or nvim("-c", "lua require('dap')", "-c", "qall!") != (0, ""):
+        pytest.skip("nvim, or nvim-dap on its runtime path or in the folder NVIM_DAP, is not there")
+    howto = (ROOT / "docs" / "howto" / "debug.md").read_text()
+    return re.search(r"For nvim-dap .*:\n\n```text\n(.*?)```", howto, re.DOTALL)[1]
+
+
+def test_nvim_steps_both_ways_and_shows_variables(configuration, tmp_path):
+    source = source_folder() / "failsafe.c"
+    script = f"luafile {HERE / 'nvim_dap.lua'}"
+    code, said = nvim("-c", script, source, CONFIGURATION=configuration, XDG_CACHE_HOME=str(tmp_path))
+    assert (code, said.splitlines()[-1:]) == (0, ["done"]), said
+
+
+def test_the_extension_starts_the_adapter():
+    (debugger,) = EXTENSION["contributes"]["debuggers"]
+    assert [debugger["runtime"], *debugger["args"]] == ["mirotwin", "debug", "--dap"]
+
+
+def test_each_key_of_the_extension_is_one_that_a_launch_takes():
+    keys = EXTENSION["contributes"]["debuggers"][0]["configurationAttributes"]["launch"]["properties"]
+    for key, about in keys.items():
+        if key != "stopOnEntry":  # the adapter's own
+            assert launched({key: VALUES[about["type"]]}) != DebugSubject()
+
+
+@pytest.mark.parametrize("configuration", LAUNCH["configurations"], ids=lambda one: one["name"])
+def test_configurations_of_a_project_have_keys_that_the_extension_names(configuration):
+    launch = EXTENSION["contributes"]["debuggers"][0]["configurationAttributes"]["launch"]
+    assert configuration.keys() - {"type", "request", "name"} <= launch["properties"].keys()
+    assert "subject" in configuration
