@@ -3,7 +3,7 @@
 from functools import cache
 from pathlib import Path
 
-import msgspec
+from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.frames import encode
@@ -74,21 +74,17 @@ def with_byte(image, address, value):
     """The image with another byte of code, its symbols, and no debug files."""
     code = bytearray(image.code)
     code[address] = value
-    return msgspec.structs.replace(image, code=bytes(code), sha256="", path=Path("nowhere/patched.ihx"))
+    return replace(image, code=bytes(code), sha256="", path=Path("nowhere/patched.ihx"))
 
 
 BUILDS = {
     "late": ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"),
-    "late and moved": (
-        "failsafe.c",
-        "age == FAILSAFE_STOP_MS)",
-        "age == FAILSAFE_STOP_MS + 15 + (ticks & 0))",
-    ),
+    "late and moved": ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15 + (ticks & 0))"),
     "slower": (
         *("telemetry.c", "        return;\n    begin();"),
         '        return;\n    for (low = 130; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
     ),
-}
+}  # fmt: skip
 
 
 def built(folder, name):

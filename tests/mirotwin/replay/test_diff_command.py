@@ -3,10 +3,9 @@
 import json
 import math
 
-import msgspec
 import pytest
+from msgspec.structs import replace
 
-from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import load
@@ -23,17 +22,15 @@ def runs(mirotwin, short, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     patched = folder / "patched.ihx"
     patched.write_text(with_stop_after(125))
-    for name, options in (
-        ("same", ()),
-        ("seed", ("--seed", 6)),
-        ("gain", ("--set", "network.robot.0.controller.gamma1_per_s=0.5")),
-        ("longer", ("--set", "duration_s=0.3")),
-        ("firmware", ("--firmware", patched)),
-        ("expecting", ("--expect", "frames_accepted_min=1")),
-    ):
-        seed = () if name == "seed" else ("--seed", 5)
-        out = ("--out", folder / name, "-q", "--no-figure")
-        assert mirotwin("run", short, *seed, *options, *out)[0] == 0
+    changes = {
+        "same": (),
+        "seed": ("--seed", 6),
+        "gain": ("--set", "network.robot.0.controller.gamma1_per_s=0.5"),
+        "longer": ("--set", "duration_s=0.3"),
+        "expecting": ("--expect", "frames_accepted_min=1"),
+    }
+    for name, options in changes.items():
+        mirotwin.succeeds("run", short, "--seed", 5, *options, "--out", folder / name, "-q", "--no-figure")
     return folder
 
 
@@ -52,8 +49,7 @@ def with_stop_after(ms):
 
 
 def test_two_runs_of_the_same_hold_the_same(mirotwin, finished, runs):
-    code, out, err = mirotwin("diff", finished / "run.mcap", runs / "same" / "run.mcap")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("diff", finished / "run.mcap", runs / "same" / "run.mcap")
     assert out == "the recordings hold the same in all 6 control periods\n"
 
 
@@ -91,8 +87,7 @@ def test_runs_of_other_sources_may_hold_the_same(mirotwin, finished, runs):
 
 
 def test_a_longer_run_differs_in_its_length_alone(mirotwin, finished, runs):
-    code, _, err = mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap")
-    assert code == 4
+    err = mirotwin.ends(4, "diff", finished / "run.mcap", runs / "longer" / "run.mcap")
     assert err == "mirotwin: A has 6 control periods, B has 9\n"
     assert mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap", "--to", "100ms")[0] == 0
 
@@ -135,8 +130,7 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
     with path.open("wb") as stream, Recorder(stream, source) as recorder:
         while not world.finished:
             recorder.write(world.step())
-    code, _, err = mirotwin("diff", finished / "run.mcap", path, "-q")
-    assert code == 4
+    err = mirotwin.ends(4, "diff", finished / "run.mcap", path, "-q")
     assert "the recordings differ in control period 3, tick 3203200 (0.133467 s), /period digest" in err or (
         what == "float" and "the recordings differ in control period 3, tick" in err
     )
@@ -146,13 +140,12 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
 def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(mirotwin, finished, tmp_path):
     def change(period):
         digest = f"{period.index:064x}"
-        robot = msgspec.structs.replace(period.robots[0], accepted=9)
+        robot = replace(period.robots[0], accepted=9)
         changed = period.robots if period.index < 2 else (robot, *period.robots[1:])
-        return msgspec.structs.replace(period, digest=digest, robots=changed)
+        return replace(period, digest=digest, robots=changed)
 
     path = rewritten(finished / "run.mcap", tmp_path / "edited.mcap", change)
-    code, _, err = mirotwin("diff", finished / "run.mcap", path, "-q", "--from", "60ms")
-    assert code == 4
+    err = mirotwin.ends(4, "diff", finished / "run.mcap", path, "-q", "--from", "60ms")
     assert "/net0/robot0/firmware accepted: A " in err
 
 
@@ -160,23 +153,20 @@ def test_robots_that_only_one_has_are_named_and_the_others_compared(mirotwin, fi
     alone = tmp_path / "alone.toml"
     alone.write_text(SHORT.partition("[[network.robot]]\nslot = 2")[0])
     assert mirotwin("run", alone, "--seed", 5, "--out", tmp_path / "out", "-q", "--no-figure")[0] == 0
-    code, _, err = mirotwin("diff", finished / "run.mcap", tmp_path / "out" / "run.mcap", "-q")
-    assert code == 4
+    err = mirotwin.ends(4, "diff", finished / "run.mcap", tmp_path / "out" / "run.mcap", "-q")
     assert "only A has net0/robot2" in err
     assert "the digests are not compared: their states have another form" in err
     other = tmp_path / "other.toml"
     other.write_text(SHORT.replace("slot = 0", "slot = 1").partition("[[network.robot]]\nslot = 2")[0])
     assert mirotwin("run", other, "--seed", 5, "--out", tmp_path / "other", "-q", "--no-figure")[0] == 0
-    code, _, err = mirotwin("diff", tmp_path / "out" / "run.mcap", tmp_path / "other" / "run.mcap")
-    assert code == 2
+    err = mirotwin.refuses("diff", tmp_path / "out" / "run.mcap", tmp_path / "other" / "run.mcap")
     assert "the recordings have no robot in common" in err
 
 
 def test_half_a_recording_is_compared_as_far_as_it_goes(mirotwin, finished, tmp_path):
     data, half = (finished / "run.mcap").read_bytes(), tmp_path / "half.mcap"
     half.write_bytes(data[: len(data) * 3 // 4])
-    code, _, err = mirotwin("diff", finished / "run.mcap", half)
-    assert code == 4
+    err = mirotwin.ends(4, "diff", finished / "run.mcap", half)
     assert "it was cut short" in err
     assert "A has 6 control periods, B has " in err
 
@@ -194,9 +184,8 @@ def test_what_is_no_recording_is_refused_on_either_side(mirotwin, finished, tmp_
     path = tmp_path / "file"
     path.write_bytes(content)
     for pair in ((path, finished / "run.mcap"), (finished / "run.mcap", path)):
-        code, out, err = mirotwin("diff", *pair)
-        assert (code, out) == (2, "")
-        assert err.startswith(f"mirotwin: error: {path}")
+        err = mirotwin.refuses("diff", *pair)
+        assert err.startswith(str(path))
         assert expected in err
 
 
@@ -204,36 +193,31 @@ def test_a_window_in_which_one_of_them_has_nothing_is_refused(mirotwin, finished
     assert mirotwin("run", short, "--seed", 5, "--to", "100ms", "--out", tmp_path / "part", "-q")[0] == 0
     whole, part = finished / "run.mcap", tmp_path / "part" / "run.mcap"
     for given in ((whole, whole, "--from", "90s"), (whole, part, "--from", "110ms", "--to", "150ms")):
-        code, out, err = mirotwin("diff", *given)
-        assert (code, out) == (2, "")
+        err = mirotwin.refuses("diff", *given)
         assert "the recording ends at tick" in err
-        assert err.endswith("; look earlier\n")
+        assert err.endswith("; look earlier")
 
 
-def test_the_periods_of_the_window_are_counted(mirotwin, finished):
+@pytest.mark.parametrize(
+    ("window", "count"),
+    [(("--from", "1601600t"), "4 control periods"), (("--to", "801t"), "1 control period")],
+)
+def test_the_periods_of_the_window_are_counted(mirotwin, finished, window, count):
     run = finished / "run.mcap"
-    for window, count in (
-        (("--from", "1601600t"), 4),
-        (("--from", "1s", "--to", "1s"), 0),
-        (("--to", "801t"), 1),
-    ):
-        code, out, _ = mirotwin("diff", run, run, *window)
-        assert (code, f"in all {amount(count, 'control period')}" in out) == (
-            (0, True) if count else (2, False)
-        )
-        code, out, _ = mirotwin("replay", run, *window, "-q")
-        assert (code, f"in all {amount(count, 'control period')}" in out) == (
-            (0, True) if count else (2, False)
-        )
+    for command in (("diff", run, run), ("replay", run, "-q")):
+        assert f"in all {count}" in mirotwin.succeeds(*command, *window)
+
+
+def test_an_empty_window_is_refused(mirotwin, finished):
+    run = finished / "run.mcap"
+    assert "the window is empty" in mirotwin.refuses("diff", run, run, "--from", "1s", "--to", "1s")
 
 
 def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path):
     (tmp_path / "run.part.mcap").write_bytes((finished / "run.mcap").read_bytes())
-    code, out, err = mirotwin("diff", finished, tmp_path)
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("diff", finished, tmp_path)
     assert "the recordings hold the same in all 6 control periods" in out
 
 
 def test_a_folder_without_a_recording_is_refused(mirotwin, finished, tmp_path):
-    code, _, err = mirotwin("diff", finished, tmp_path)
-    assert (code, err) == (2, f"mirotwin: error: {tmp_path}: is a folder; name a file in it\n")
+    assert mirotwin.refuses("diff", finished, tmp_path) == f"{tmp_path}: is a folder; name a file in it"

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-import msgspec
-import pytest
+from msgspec.structs import replace
 
 from miro_robot.image import Symbols
 from mirotwin.recording.compare import CompareRule, differences
@@ -11,35 +10,26 @@ from mirotwin.recording.sequences import characters
 from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
 from mirotwin.replay.firmwares import first_instruction, moved
 from mirotwin.replay.state_fields import extents, name_of_byte
-from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
+from tests.mirotwin.replay.rig import STOP_AT, periods, with_byte, world
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 from tests.mutants.draw import SOURCE
 
 END = 9_600_000
 
 
-def apart(other, folder=None, until_tick=END):
-    annotated = (
-        AnnotatedImage(own_image(), [SOURCE]),
-        AnnotatedImage(other, [] if folder is None else [folder]),
-    )
-    return first_instruction(world, *annotated, until_tick)
+def apart(other, until_tick=END, sources=()):
+    one = AnnotatedImage(own_image(), [SOURCE])
+    return first_instruction(world, one, AnnotatedImage(other, sources), until_tick)
 
 
-@pytest.fixture(scope="module")
-def images(tmp_path_factory):
-    found = {}
-    for name in ("late", "late and moved", "slower"):
-        folder = tmp_path_factory.mktemp("build")
-        found[name] = built(folder, name), folder / "firmware"
-    return found
+def sources_of(image):
+    return [image.path.parents[1] / "firmware"]
 
 
 @needs_sdcc
 def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(images):
-    image, folder = images["late"]
-    found = apart(image, folder)
-    assert found.changed is not None
+    image = images["late"]
+    found = apart(image, END, sources_of(image))
     one, other = found.changed.one, found.changed.other
     assert (one.pc, one.symbol, one.tick) == (other.pc, other.symbol, other.tick)
     assert one.symbol.startswith("_failsafe_tick+")
@@ -55,31 +45,27 @@ def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(im
 
 @needs_sdcc
 def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(images):
-    image, folder = images["late"]
-    found = apart(image, folder).effect
-    assert found is not None
+    image = images["late"]
+    found = apart(image, END, sources_of(image)).effect
     replayed = differences(periods(world()), periods(world(image)), CompareRule(kind="commands"))
-    assert replayed[0].recorded is not None
     assert replayed[0].recorded.startswith("LTRJ 1Fh 0400 at tick ")  # the smooth stop
     assert 0 < replayed[0].tick - found.one.tick < 24_000  # in the failsafe's own millisecond
-    assert found.parted is not None
     assert found.parted.symbol.startswith("_failsafe_tick+")
     assert found.parted.text.startswith("CJNE A,_age,")
 
 
 @needs_sdcc
 def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(images):
-    image, folder = images["late and moved"]
+    image = images["late and moved"]
     assert not same_layout(own_image(), image)
     first = differences(periods(world()), periods(world(image)), CompareRule(kind="commands"))[0]
-    found = apart(image, folder, first.tick + 24_000)
+    found = apart(image, first.tick + 24_000, sources_of(image))
     assert (found.changed, found.effect) == (None, None)
     assert "lies at other addresses" in found.notes[0]
     state = next(one for one in found.variables if one.name == "_state")
     assert (state.one, state.other) == (2, 1)  # stopped, driving
     writer, nobody = state.writers
     assert nobody is None
-    assert writer is not None
     assert writer.symbol.startswith("_motion_stop")
     assert writer.source == "state = STATE_STOPPED;"
     assert writer.line.startswith("motion.c:")
@@ -88,7 +74,7 @@ def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
 
 @needs_sdcc
 def test_builds_that_differ_in_speed_alone_send_the_same_commands(images):
-    image, _ = images["slower"]
+    image = images["slower"]
     assert not same_layout(own_image(), image)
     recorded, replayed = periods(world()), periods(world(image))
     heard, later = characters(recorded, 0), characters(replayed, 0)
@@ -104,9 +90,7 @@ def test_builds_that_differ_in_speed_alone_send_the_same_commands(images):
 def test_without_a_compiler_a_patched_constant_is_found_too():
     image = with_byte(own_image(), STOP_AT, 125)
     found = apart(image)
-    assert found.changed is not None
     assert (found.changed.one.pc, found.changed.other.text) == (STOP_AT - 1, "MOV A,#7Dh")
-    assert found.effect is not None
     assert found.effect.network == 0
     assert found.effect.slot == 1
 
@@ -117,7 +101,6 @@ def test_data_that_no_instruction_lies_in_is_found_by_its_effect():
     table = own.symbols.names["_crc_nibble_low"].address
     found = apart(with_byte(own, table + 5, own.code[table + 5] ^ 1))
     assert found.changed is None
-    assert found.effect is not None
     assert found.effect.one.text.startswith("MOVC A,@A+")
     assert found.effect.one.text == found.effect.other.text
     assert "no changed instruction is executed: what differs is data in code memory" in found.notes
@@ -125,16 +108,14 @@ def test_data_that_no_instruction_lies_in_is_found_by_its_effect():
 
 def test_what_is_never_executed_has_no_effect():
     own = own_image()
-    found = apart(
-        with_byte(own, 0x0003, 0x22), until_tick=2_400_000
-    )  # the vector of an interrupt that is off
+    found = apart(with_byte(own, 0x0003, 0x22), 2_400_000)  # the vector of an interrupt that is off
     assert (found.changed, found.effect) == (None, None)
     assert "no instruction has a lasting effect" in found.notes[0]
 
 
 def test_an_image_without_symbols_is_told_to_have_none():
     own = own_image()
-    bare = msgspec.structs.replace(
+    bare = replace(
         with_byte(own, STOP_AT, 125), symbols=Symbols({}), path=Path("nowhere/bare.ihx"), used=((0, 10),)
     )
     found = apart(bare, until_tick=100_000)
@@ -164,16 +145,15 @@ def test_bytes_of_internal_ram_have_names():
 def test_where_the_last_variable_ends_is_not_guessed():
     own = own_image()
     names = {name: at for name, at in own.symbols.names.items() if name != "__start__stack"}
-    stackless = msgspec.structs.replace(own, symbols=Symbols(names), path=Path("nowhere/a.ihx"))
+    stackless = replace(own, symbols=Symbols(names), path=Path("nowhere/a.ihx"))
     last = max((at.address, name) for name, at in names.items() if at.space == "iram")
     assert extents(stackless)[last[1]] == (last[0], 1)
 
 
 @needs_sdcc
 def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instruction_is_named(images):
-    image, folder = images["late and moved"]
-    found = apart(image, folder)
-    assert found.mapped is not None
+    image = images["late and moved"]
+    found = apart(image, END, sources_of(image))
     one, other = found.mapped.one, found.mapped.other
     assert one.symbol.startswith("_failsafe_tick+")
     assert other.symbol.startswith("_failsafe_tick+")
@@ -186,8 +166,8 @@ def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instructi
 
 @needs_sdcc
 def test_code_that_only_moved_counts_as_the_same(images):
-    image, folder = images["slower"]
-    map_ = moved(AnnotatedImage(own_image(), [SOURCE]), AnnotatedImage(image, [folder]))
+    image = images["slower"]
+    map_ = moved(AnnotatedImage(own_image(), [SOURCE]), AnnotatedImage(image, sources_of(image)))
     assert len(map_.same) > 30
     assert set(map_.places)
     assert {own_image().symbols.name_at(at) for at in map_.places} == set(map_.changed)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import mirotwin
 from miro_sim.scenario.file import parse
 from mirotwin.replay import first_difference
-from tests.mirotwin.replay.rig import Planted, planted_world, scenario, world
+from tests.mirotwin.replay.rig import TEXT, planted_world, scenario, world
 from tests.mirotwin.verify.checks.rig import own_image
 
 LAST_LEFT = own_image().symbols.names["_last_left"].address
@@ -42,21 +42,18 @@ def test_two_runs_of_the_same_never_differ():
 
 def test_a_bit_in_ram_is_named_by_tick_address_and_variable():
     found = first_difference(world(), planted_world(1_234_567, flipped(LAST_LEFT + 1)))
-    assert found is not None
     assert (found.tick, found.period) == (1_234_567, 1)
     (field,) = found.fields
     assert field.path == f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
     assert field.symbol == "_last_left+1"
     assert field.one ^ field.other == 1
-    assert str(found).startswith(
-        "tick 1234567 (0.051440 s), control period 1: networks[0].robots[0].board.cpu"
-    )
+    where = "tick 1234567 (0.051440 s), control period 1: networks[0].robots[0].board.cpu"
+    assert str(found).startswith(where)
 
 
 @pytest.mark.parametrize("name", ["x_m", "theta_rad"])
 def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name):
     found = first_difference(world(), planted_world(3_333_333, nudged(name)))
-    assert found is not None
     assert found.tick == 3_333_333
     assert [field.path for field in found.fields] == [f"{BODY}.{name}"]
     (field,) = found.fields
@@ -68,7 +65,6 @@ def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name):
 @given(st.integers(24_000, 9_000_000), st.integers(0, 7))
 def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick, bit):
     found = first_difference(world(), planted_world(tick, flipped(0xF0, bit)))  # deep in the stack
-    assert found is not None
     assert found.tick == tick
     assert [field.path for field in found.fields] == ["networks[0].robots[0].board.cpu.iram[F0h]"]
     assert found.fields[0].symbol == "stack"
@@ -86,20 +82,14 @@ def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough():
         one.run_to(tick - 10)
         other.run_to(tick - 10)
         found = first_difference(one, other, tick + 1000, look_ticks)
-        assert found is not None
         assert found.tick == tick
         assert [field.path for field in found.fields] == ["networks[0].robots[0].board.cpu.a"]
 
 
 def test_worlds_that_differ_from_the_beginning_differ_at_tick_0():
-    other = parse(
-        'name = "pair"\nduration_s = 0.4\n[[network]]\n[[network.robot]]\nslot = 1\nreference.kind = "line"\n'
-        "start_error_x_cm = 1.0\n",
-        "other",
-    )
+    other = parse(f"{TEXT}start_error_x_cm = 1.0\n", "other")
     one, two = (mirotwin.World(each, 3, world().image) for each in (scenario(), other))
     found = first_difference(one, two)
-    assert found is not None
     assert found.tick == 0
     assert f"{BODY}.x_m" in [field.path for field in found.fields]
 
@@ -130,14 +120,7 @@ def test_a_step_that_is_none_is_refused(step):
 
 def test_its_json_holds_tick_path_and_both_values():
     found = first_difference(world(), planted_world(24_000, flipped(LAST_LEFT + 1)))
-    assert found is not None
     document = found.as_json()
+    path = f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
     assert document["tick"] == 24_000
-    assert document["fields"] == [
-        {
-            "path": f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]",
-            "symbol": "_last_left+1",
-            "values": [0, 1],
-        }
-    ]
-    assert isinstance(planted_world(1, flipped(1)), Planted)
+    assert document["fields"] == [{"path": path, "symbol": "_last_left+1", "values": [0, 1]}]

@@ -2,10 +2,10 @@
 
 from itertools import pairwise
 
-import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Power, RadioState, Reset
@@ -19,42 +19,39 @@ RUN = list(periods(6, [(0, 0), (0, 2)]))
 MS = 24_000
 
 
+def changed(change):
+    """The run with other robots: `change` is given each of them, and its period."""
+    return [replace(period, robots=tuple(change(robot, period) for robot in period.robots)) for period in RUN]
+
+
 def with_commands(ticks, data="0400"):
     """The run with commands to the left LM629 of the first robot at these ticks and nothing else."""
-    changed = []
-    before = -1
-    for period in RUN:
-        mine = tuple((tick, 0x1F, data) for tick in ticks if before < tick <= period.tick)
-        before = period.tick
-        robots = tuple(
-            msgspec.structs.replace(
-                robot,
-                left=msgspec.structs.replace(robot.left, commands=mine if index == 0 else ()),
-                right=msgspec.structs.replace(robot.right, commands=()),
-            )
-            for index, robot in enumerate(period.robots)
+
+    def change(robot, period):
+        before = period.tick - CONTROL_PERIOD_TICKS
+        mine = tuple((tick, 0x1F, data) for tick in ticks if before < tick <= period.tick and robot.slot == 0)
+        return replace(
+            robot, left=replace(robot.left, commands=mine), right=replace(robot.right, commands=())
         )
-        changed.append(msgspec.structs.replace(period, robots=robots))
-    return changed
+
+    return changed(change)
 
 
 def with_answers(*answers):
-    return [
-        msgspec.structs.replace(
-            period, wire=tuple(one for one in answers if one.tick // CONTROL_PERIOD_TICKS == period.index)
-        )
-        for period in RUN
-    ]
+    def wire(index):
+        return tuple(one for one in answers if one.tick // CONTROL_PERIOD_TICKS == index)
+
+    return [replace(period, wire=wire(period.index)) for period in RUN]
 
 
 def with_position(offset, name="real_position"):
-    changed = []
-    for period in RUN:
-        robot = period.robots[1]
-        right = msgspec.structs.replace(robot.right, **{name: getattr(robot.right, name) + offset})
-        moved = msgspec.structs.replace(robot, right=right)
-        changed.append(msgspec.structs.replace(period, robots=(period.robots[0], moved)))
-    return changed
+    """The run with another position of the right wheel of the second robot."""
+
+    def change(robot, period):
+        moved = replace(robot.right, **{name: getattr(robot.right, name) + offset})
+        return replace(robot, right=moved) if robot.slot else robot
+
+    return changed(change)
 
 
 @pytest.mark.parametrize("kind", ["bits", "bytes", "commands", "wheels"])
@@ -81,11 +78,8 @@ def test_another_value_at_the_same_time_is_a_difference_under_commands():
 
 def test_a_missing_command_shifts_none_behind_it():
     every = list(range(100_000, 4_000_000, 100_000))
-    (found,) = differences(
-        with_commands(every),
-        with_commands([tick for tick in every if tick != 1_000_000]),
-        CompareRule(kind="commands"),
-    )
+    without = with_commands([tick for tick in every if tick != 1_000_000])
+    (found,) = differences(with_commands(every), without, CompareRule(kind="commands"))
     assert (found.tick, found.replayed) == (1_000_000, None)
 
 
@@ -105,10 +99,8 @@ def test_positions_may_differ_by_the_tolerance_and_no_count_more(name, within):
 
 def test_desired_velocities_may_differ_by_the_tolerance():
     for offset, count in ((16_384, 0), (16_385, len(RUN))):
-        assert (
-            len(differences(RUN, with_position(offset, "desired_velocity"), CompareRule(kind="wheels")))
-            == count
-        )
+        moved = with_position(offset, "desired_velocity")
+        assert len(differences(RUN, moved, CompareRule(kind="wheels"))) == count
     rule = CompareRule(kind="wheels", within_counts_per_sample=1.0)
     assert differences(RUN, with_position(65_536, "desired_velocity"), rule) == []
 
@@ -152,10 +144,10 @@ def test_only_differences_in_the_window_are_told():
 
 def test_the_hosts_values_and_actions_are_compared_on_request():
     actions = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
-    robots = (msgspec.structs.replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
-    changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, actions=actions), *RUN[3:]]
-    assert differences(RUN, changed) == []
-    found = differences(RUN, changed, CompareRule(host=True))
+    robots = (replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
+    other = [*RUN[:2], replace(RUN[2], robots=robots, actions=actions), *RUN[3:]]
+    assert differences(RUN, other) == []
+    found = differences(RUN, other, CompareRule(host=True))
     named = {one.channel for one in found}
     assert {"control v_m_s", "control inner.u1", "actions"} <= named
     assert [one.replayed for one in found if one.channel == "actions"] == [
@@ -165,9 +157,9 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
 
 
 def test_a_digest_alone_is_a_difference_at_the_end_of_its_period():
-    changed = [*RUN[:3], msgspec.structs.replace(RUN[3], digest="00" * 32), *RUN[4:]]
-    assert differences(RUN, changed) == []
-    (found,) = differences(RUN, changed, CompareRule(digests=True))
+    other = [*RUN[:3], replace(RUN[3], digest="00" * 32), *RUN[4:]]
+    assert differences(RUN, other) == []
+    (found,) = differences(RUN, other, CompareRule(digests=True))
     assert (found.tick, found.period, found.channel) == (4 * CONTROL_PERIOD_TICKS, 3, "digest")
     assert str(found).startswith("tick 3203200 (0.133467 s), /period digest: recorded ")
     assert found.as_json()["replayed"] == "00" * 32
@@ -217,32 +209,17 @@ def test_a_difference_has_a_line_for_people_and_json_for_programs():
     found = Difference(24_000, 0, 1, 2, "pwm left sign", 1, None)
     assert str(found) == "tick 24000 (0.001000 s), /net1/robot2/pwm left sign: recorded 1, replayed nothing"
     assert found.said(("A", "B")).endswith("A 1, B nothing")
-    assert found.as_json(("a", "b")) == {
-        "tick": 24_000,
-        "t_s": 0.001,
-        "period": 0,
-        "network": 1,
-        "slot": 2,
-        "channel": "pwm left sign",
-        "a": 1,
-        "b": None,
-    }
+    place = {"tick": 24_000, "t_s": 0.001, "period": 0, "network": 1, "slot": 2, "channel": "pwm left sign"}
+    assert found.as_json(("a", "b")) == {**place, "a": 1, "b": None}
 
 
 def test_what_a_chip_answers_is_no_part_of_a_command():
     def reading(data):
-        return [
-            msgspec.structs.replace(
-                period,
-                robots=tuple(
-                    msgspec.structs.replace(
-                        robot, left=msgspec.structs.replace(robot.left, commands=((period.tick, 0x0A, data),))
-                    )
-                    for robot in period.robots
-                ),
+        return changed(
+            lambda robot, period: replace(
+                robot, left=replace(robot.left, commands=((period.tick, 0x0A, data),))
             )
-            for period in RUN
-        ]
+        )
 
     one, other = reading("00000a3d"), reading("00000a46")
     assert differences(one, other, CompareRule(kind="commands")) == []
