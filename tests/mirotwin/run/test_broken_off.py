@@ -6,7 +6,6 @@ import os
 import re
 import resource
 import signal
-import subprocess
 import sys
 
 import pytest
@@ -18,17 +17,26 @@ from mirotwin.recording import reader as recording_reader
 from mirotwin.run import run_command, run_files
 from mirotwin.shell.outputs import OutputFolder
 from tests import children
+from tests.mirotwin import program
 
 PARTS = ["run.part.mcap", "summary.part.json"]
-PROGRAM = "from mirotwin.commands import main; main()"
+REPORT = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
+ROOM = "make room, or choose another folder with --out"
+
+
+HANDLERS = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+    signal.SIGHUP: signal.SIG_DFL,
+}
 
 
 @pytest.fixture(autouse=True)
-def _default_interrupt():
-    """A program that a shell put into the background ignores SIGINT, and so would the tests in this process."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+def _default_signals():
+    """A program in the background of a shell ignores SIGINT, one under nohup SIGHUP: so would the tests here."""
+    before = {number: signal.signal(number, handler) for number, handler in HANDLERS.items()}
     yield
-    signal.signal(signal.SIGINT, before)
+    assert {number: signal.signal(number, handler) for number, handler in before.items()} == HANDLERS
 
 
 def at_period(monkeypatch, index, act):
@@ -54,34 +62,17 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-CASES = [
-    ("Ctrl-C", lambda: signal.raise_signal(signal.SIGINT), 130, "mirotwin: interrupted"),
-    ("SIGTERM", lambda: signal.raise_signal(signal.SIGTERM), 143, "mirotwin: ended by SIGTERM"),
-    (
-        "a mistake in the program",
-        raising(ValueError("angle")),
-        70,
-        "mirotwin: internal error: ValueError: angle; please report this line with the command"
-        " (MIROTWIN_TRACEBACK=1 shows the place)",
-    ),
-    (
-        "parameters",
-        raising(DomainError("angle")),
-        2,
-        "angle; the parameters are far outside those of a real robot",
-    ),
-    (
-        "a full disk",
-        raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))),
-        2,
-        "No space left on device; make room, or choose another folder with --out",
-    ),
-]
+ENDINGS = {
+    "Ctrl-C": (lambda: signal.raise_signal(signal.SIGINT), 130, "mirotwin: interrupted"),
+    "SIGTERM": (lambda: signal.raise_signal(signal.SIGTERM), 143, "mirotwin: ended by SIGTERM"),
+    "SIGHUP": (lambda: signal.raise_signal(signal.SIGHUP), 129, "mirotwin: ended by SIGHUP"),
+    "a mistake in the program": (raising(ValueError("angle")), 70, f"internal error: ValueError: angle; {REPORT}"),
+    "parameters": (raising(DomainError("angle")), 2, "angle; the parameters are far outside those of a real robot"),
+    "a full disk": (raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))), 2, f"No space left on device; {ROOM}"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("act", "code", "said"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
-)
+@pytest.mark.parametrize(("act", "code", "said"), ENDINGS.values(), ids=ENDINGS)
 def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
     mirotwin, finished, short, tmp_path, monkeypatch, act, code, said
 ):
@@ -141,8 +132,7 @@ def cut(path, size):
 
 
 def test_the_next_run_names_the_parts_and_replaces_them_by_force(mirotwin, parts, short, finished):
-    code, _, err = mirotwin("run", short, "--seed", 5, "--out", parts)
-    assert code == 2
+    err = mirotwin.refuses("run", short, "--seed", 5, "--out", parts)
     assert f"{parts}: the folder holds parts of an interrupted command ({', '.join(PARTS)}); " in err
     assert "with --force" in err
     (parts / "thesis.tex").write_text("years of work")
@@ -165,8 +155,7 @@ def test_decode_and_export_read_it_and_say_so(mirotwin, parts, tmp_path, target)
     assert (code, err) == (0, note)
     assert "team_ask" in out
     out_file = tmp_path / f"x.{target}"
-    code, _, err = mirotwin("export", parts / "run.part.mcap", "--out", out_file, "-q")
-    assert (code, err) == (0, note)
+    assert mirotwin.ends(0, "export", parts / "run.part.mcap", "--out", out_file, "-q") == note
     assert out_file.stat().st_size > 0
 
 
@@ -201,26 +190,19 @@ def test_a_second_interruption_waits_until_the_files_are_closed(mirotwin, short,
         assert mirotwin("run", short, "--out", tmp_path / "out", "-q")[0] == 143
     assert names(tmp_path / "out") == PARTS
     assert len(recording_reader.read(tmp_path / "out" / "run.part.mcap").periods) == 3
-    code, _, err = mirotwin("run", short, "--out", tmp_path / "whole", "-q")  # it was complete by then
-    assert (code, err) == (130, "\nmirotwin: interrupted\n")
+    assert mirotwin.ends(130, "run", short, "--out", tmp_path / "whole", "-q") == "\nmirotwin: interrupted\n"
     assert names(tmp_path / "whole") == ["figure.svg", "run.mcap", "summary.json"]
 
 
 def test_two_runs_into_one_folder_the_second_is_refused(mirotwin, short, tmp_path):
     with OutputFolder(tmp_path / "out"):
         for more in ((), ("--force",)):
-            code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "-q", *more)
-            assert code == 2
+            err = mirotwin.refuses("run", short, "--out", tmp_path / "out", "-q", *more)
             assert (
                 "another process is writing into the folder; wait until it has finished, or choose another"
                 in err
             )
     assert names(tmp_path) == []
-
-
-def started(arguments, **more):
-    command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
-    return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)
 
 
 def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finished, short, tmp_path):
@@ -231,9 +213,9 @@ def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finish
     def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
-    done = started(["run", short, "--out", tmp_path, "--force", "-q"], preexec_fn=limited)
+    done = program.run("run", short, "--out", tmp_path, "--force", "-q", preexec_fn=limited)
     assert done.returncode == 2
-    assert f"error: {tmp_path}: File too large; make room, or choose another folder with --out" in done.stderr
+    assert f"error: {tmp_path}: File too large; {ROOM}" in done.stderr
     for path in finished.iterdir():
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
     assert recording_reader.read(tmp_path / "run.part.mcap").periods
@@ -241,11 +223,8 @@ def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finish
 
 
 def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(finished, short, tmp_path):
-    command = f'exec "$0" -c "{PROGRAM}" run "$1" --seed 5 --out "$2" 2>&-'
-    arguments = ["sh", "-c", command, sys.executable, str(short), str(tmp_path / "out")]
-    done = children.run(arguments, stdout=subprocess.PIPE, timeout=300, check=False)
-    assert done.returncode == 0
-    assert b"digest" in done.stdout
+    done = program.run("run", short, "--seed", 5, "--out", tmp_path / "out", preexec_fn=lambda: os.close(2))
+    assert (done.returncode, "digest" in done.stdout) == (0, True)
     assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
 
 
@@ -259,12 +238,7 @@ def test_an_internal_error_shows_its_place_when_asked(mirotwin, short, tmp_path,
 
 @pytest.mark.slow
 def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most():
-    done = children.run(
-        [sys.executable, "-m", "tests.mirotwin.shell.killed", "--times", "3"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    words = [sys.executable, "-m", "tests.mirotwin.shell.killed", "--times", "3"]
+    done = children.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "3 runs killed, 3 recordings readable" in done.stdout

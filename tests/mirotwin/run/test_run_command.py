@@ -1,7 +1,6 @@
 """`mirotwin run`: the files it writes, and that nothing is half-written whatever happens."""
 
 import json
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +12,6 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
-from mirotwin.recording import runner
 from tests import children
 from tests.mirotwin.conftest import SHORT, hex_file
 
@@ -55,36 +53,27 @@ def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
 
 
 def test_the_table_names_what_matters(mirotwin, short, tmp_path):
-    code, out, err = mirotwin("run", short, "--out", tmp_path / "[out]")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("run", short, "--out", tmp_path / "[out]")
     for word in ("short, seed 0", "real time", "frames sent", "instructions", "digest", "[out]"):
         assert word in out
 
 
-def test_the_folder_is_named_after_scenario_and_seed(mirotwin, short, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert mirotwin("run", short, "--seed", 3, "-q")[0] == 0
-    assert (tmp_path / "runs" / "short-3" / "run.mcap").exists()
-
-
-def test_a_finished_run_in_the_default_folder_is_replaced_and_nothing_else(
+def test_a_finished_run_in_the_folder_of_its_scenario_and_seed_is_replaced_and_nothing_else(
     mirotwin, short, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    folder = tmp_path / "runs" / "short-0"
-    assert mirotwin("run", short, "-q")[0] == 0
+    folder = tmp_path / "runs" / "short-3"
+    again = ("run", short, "--seed", 3, "-q")
+    assert mirotwin(*again)[0] == 0
     (folder / "notes.txt").write_text("mine")
-    assert mirotwin("run", short, "-q", "--no-figure")[0] == 0
+    assert mirotwin(*again, "--no-figure")[0] == 0
     assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "run.mcap", "summary.json"]
-    code, _, err = mirotwin("run", short, "-q", "--out", folder)
-    assert (code, "the folder is not empty" in err) == (2, True)
+    assert "the folder is not empty" in mirotwin.refuses(*again, "--out", folder)
     (folder / "run.mcap").rename(folder / "run.part.mcap")
-    code, _, err = mirotwin("run", short, "-q")
-    assert (code, "parts of an interrupted command (run.part.mcap)" in err) == (2, True)
+    assert "parts of an interrupted command (run.part.mcap)" in mirotwin.refuses(*again)
     (folder / "run.part.mcap").unlink()
-    code, _, err = mirotwin("run", short, "-q")
-    assert (code, "the folder is not empty (notes.txt, summary.json)" in err) == (2, True)
-    assert mirotwin("run", short, "-q", "--force")[0] == 0
+    assert "the folder is not empty (notes.txt, summary.json)" in mirotwin.refuses(*again)
+    assert mirotwin(*again, "--force")[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -101,17 +90,14 @@ def test_firmware_that_is_none_is_refused_before_anything_is_written(
 ):
     image = tmp_path / "broken.ihx"
     image.write_text(content)
-    code, out, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out")
-    assert (code, out) == (2, "")
-    assert f"mirotwin: error: {image}{expected}" in err
-    assert err.count("\n") == 1
+    err = mirotwin.refuses("run", short, "--firmware", image, "--out", tmp_path / "out")
+    assert f"{image}{expected}" in err
     assert [path.name for path in tmp_path.iterdir()] == ["broken.ihx"]
 
 
 def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(mirotwin, short, tmp_path):
     image = hex_file(tmp_path / "faulty.ihx", UNDEFINED_OPCODE)
-    code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
-    assert code == 3
+    err = mirotwin.ends(3, "run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
     assert "mirotwin: firmware fault: net0/robot0: firmware executed the undefined opcode A5 at 0x" in err
     recording = recording_reader.read(tmp_path / "out" / "run.mcap")
     assert len(recording.periods) == 1
@@ -140,34 +126,11 @@ def test_a_scenario_may_count_faults_and_go_on(mirotwin, short, tmp_path):
     patient = tmp_path / "patient.toml"
     patient.write_text(short.read_text().replace("duration_s", "stop_on_fault = false\nduration_s"))
     image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
-    code, _, err = mirotwin("run", patient, "--firmware", image, "--out", tmp_path / "out", "-q")
-    assert (code, err.count("tick 36")) == (3, 2)  # both robots
+    err = mirotwin.ends(3, "run", patient, "--firmware", image, "--out", tmp_path / "out", "-q")
+    assert err.count("tick 36") == 2
     summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
     assert summary["firmware"]["faults"] == 2
     assert summary["simulated_s"] > 0.2
-
-
-def test_an_interrupted_run_leaves_nothing_behind(mirotwin, short, tmp_path, monkeypatch):
-    def interrupted(*arguments):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(runner, "run", interrupted)
-    code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
-    assert (code, out, err.strip()) == (130, "", "mirotwin: interrupted")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
-def test_a_terminated_run_leaves_nothing_behind(mirotwin, short, tmp_path, monkeypatch, number, expected):
-    monkeypatch.setattr(runner, "run", lambda *arguments: signal.raise_signal(number))
-    before = signal.signal(number, signal.SIG_DFL)  # a run leaves a signal alone that it finds ignored
-    try:
-        code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
-        assert signal.getsignal(number) is signal.SIG_DFL
-    finally:
-        signal.signal(number, before)
-    assert (code, out, err) == (expected, "", f"mirotwin: ended by {number.name}\n")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
@@ -210,17 +173,12 @@ def test_the_shortest_duration_is_one_control_period(mirotwin, tmp_path):
         (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
         (["--out", ""], "Invalid value for '-o' / '--out': the path is empty."),
         (["--firmware", ""], "Invalid value for '--firmware': the path is empty."),
-        (
-            ["--firmware", "no.ihx"],
-            "no.ihx: there is no such file; build it, or give the path of an .ihx or .hex file",
-        ),
+        (["--firmware", "no.ihx"], "no.ihx: there is no such file; build it, or give the path of an .ihx or .hex file"),
         (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
     ],
-)
+)  # fmt: skip
 def test_an_option_that_means_nothing_is_refused_in_plain_words(mirotwin, short, arguments, expected):
-    code, out, err = mirotwin("run", short, *arguments)
-    assert (code, out) == (2, "")
-    assert expected in err
+    assert expected in mirotwin.refuses("run", short, *arguments)
 
 
 @pytest.mark.parametrize("arguments", [["info"], ["scenarios"]])
@@ -235,7 +193,6 @@ def test_a_run_that_takes_the_default_place_of_another_one_says_so(mirotwin, tmp
     short = ("run", "fig6", "-q", "--no-figure", "--set", "duration_s=0.2")
     assert mirotwin(*short) == (0, "", "")
     assert mirotwin(*short) == (0, "", "")
-    code, _, err = mirotwin(*short, "--set", "network.radio.bit_error_rate=0.01")
-    assert code == 0
+    err = mirotwin.ends(0, *short, "--set", "network.radio.bit_error_rate=0.01")
     assert err.startswith("mirotwin: note: runs/fig6-0 held a run with other bits (digest ")
     assert err.endswith("..), now replaced; --out keeps both\n")

@@ -37,10 +37,7 @@ def test_frames_of_several_networks_have_the_network_in_their_names(mirotwin, tm
         + '[[network]]\nhost = "silent"\n[[network.robot]]\nslot = 1\nstart_error_x_cm = 60.0\n'
         + 'reference.kind = "line"\n'
     )
-    code, _, err = mirotwin(
-        "run", two, "--out", tmp_path / "out", "--frames", tmp_path / "out" / "frames", "-q"
-    )
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("run", two, "--out", tmp_path / "out", "--frames", tmp_path / "out" / "frames", "-q")
     assert names(tmp_path / "out" / "frames") == [
         *("net0-frame-000000.png", "net0-frame-000001.png"),
         *("net1-frame-000000.png", "net1-frame-000001.png"),
@@ -84,9 +81,8 @@ def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
     mirotwin, short, tmp_path, monkeypatch, options, expected
 ):
     monkeypatch.chdir(tmp_path)
-    code, out, err = mirotwin("run", short, *(option.format(short=short) for option in options))
-    assert (code, out) == (2, "")
-    assert err.startswith(f"mirotwin: error: {expected.format(short=short)}")
+    err = mirotwin.refuses("run", short, *(option.format(short=short) for option in options))
+    assert err.startswith(expected.format(short=short))
     assert names(tmp_path) == []
 
 

@@ -5,16 +5,17 @@ import json
 import pytest
 
 from mirotwin.recording.reader import read
-from tests.mirotwin.conftest import SHORT
 
 QUIET = ("--no-figure", "-q")
 
 
-@pytest.fixture
-def short(tmp_path):
-    path = tmp_path / "short.toml"
-    path.write_text(SHORT)
-    return path
+@pytest.fixture(scope="module")
+def halves(mirotwin, short, tmp_path_factory):
+    """The folders of a run that saved its world at 100 ms, and of one that went on from there."""
+    whole, rest = (tmp_path_factory.mktemp(name) for name in ("whole", "rest"))
+    mirotwin.succeeds("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
+    mirotwin.succeeds("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
+    return whole, rest
 
 
 @pytest.mark.parametrize("at", ["2402400t", "2500001t", "100ms"])
@@ -27,8 +28,7 @@ def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(mirotwin, tmp_p
     assert more[1:] == periods[more[1].index :]
     assert more[0].digest == periods[more[0].index].digest
     assert more[0].index in (3, 4)
-    code, _, err = mirotwin("replay", rest / "run.mcap", "-q")
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("replay", rest / "run.mcap", "-q")
 
 
 @pytest.mark.parametrize("to", ["4000000t", "4004000t", "4804800t"])
@@ -41,8 +41,7 @@ def test_a_resumed_run_that_is_told_where_to_end_has_the_digest_of_an_unbroken_o
     assert mirotwin("run", short, "--out", rest, "--resume", saved, "--to", to, *QUIET)[0] == 0
     digests = [json.loads((run / "summary.json").read_text())["digest"] for run in (whole, rest)]
     assert digests[0] == digests[1]
-    code, _, err = mirotwin("replay", rest / "run.mcap", "-q")
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("replay", rest / "run.mcap", "-q")
 
 
 def test_figures_of_a_resumed_run_say_what_time_they_cover(mirotwin, tmp_path, short):
@@ -60,29 +59,23 @@ def test_figures_of_a_resumed_run_say_what_time_they_cover(mirotwin, tmp_path, s
     assert summary["realtime_factor"] == (summary["simulated_s"] - summary["resumed_s"]) / summary["wall_s"]
 
 
-def test_a_resumed_run_is_not_compared_with_a_whole_one(mirotwin, tmp_path, short):
-    whole, rest = tmp_path / "whole", tmp_path / "rest"
-    mirotwin("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
-    mirotwin("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
-    code, out, err = mirotwin("diff", whole / "run.mcap", rest / "run.mcap")
-    assert (code, out) == (2, "")
-    assert "a run that was resumed: it begins with control period 3" in err
+def test_a_resumed_run_is_not_compared_with_a_whole_one(mirotwin, halves):
+    said = mirotwin.refuses("diff", *(run / "run.mcap" for run in halves))
+    assert "a run that was resumed: it begins with control period 3" in said
 
 
-def test_what_was_before_a_resumed_run_cannot_be_looked_at(mirotwin, tmp_path, short):
-    whole, rest = tmp_path / "whole", tmp_path / "rest"
-    mirotwin("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
-    mirotwin("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
-    for words in (
-        ["replay"],
-        ["fw", "trace"],
-        ["fw", "coverage"],
-        ["fw", "vcd", "--out", tmp_path / "a.vcd"],
-    ):
-        code, out, err = mirotwin(*words, rest / "run.mcap", "--to", "100ms")
-        assert (code, out) == (2, "")
-        assert err.endswith(": --to 2400000t: the run begins at tick 2402400; look later\n")
-    assert mirotwin("replay", rest / "run.mcap", "--to", "2402401t")[0] == 0
+@pytest.mark.parametrize(
+    "command",
+    [["replay"], ["fw", "trace"], ["fw", "coverage"], ["fw", "vcd", "--out", "a.vcd"]],
+    ids=" ".join,
+)
+def test_what_was_before_a_resumed_run_cannot_be_looked_at(mirotwin, halves, command):
+    said = mirotwin.refuses(*command, halves[1] / "run.mcap", "--to", "100ms")
+    assert said.endswith(": --to 2400000t: the run begins at tick 2402400; look later")
+
+
+def test_a_resumed_run_is_looked_at_from_its_begin_on(mirotwin, halves):
+    assert mirotwin("replay", halves[1] / "run.mcap", "--to", "2402401t")[0] == 0
 
 
 def test_a_run_ends_where_it_is_told_to(mirotwin, tmp_path, short):
@@ -114,42 +107,25 @@ def test_a_run_that_is_cut_short_does_not_fail_by_frames_to_come(
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        (
-            ("--save-at", "1s"),
-            "--save-at 24000000t: the run goes from tick 0 to tick 4804800; give a tick between",
-        ),
+        (("--save-at", "1s"), "--save-at 24000000t: the run goes from tick 0 to tick 4804800; give a tick between"),
         (("--to", "0t"), "--to 0t: the run goes from tick 0 to tick 4804800; give a tick between"),
-        (
-            ("--save-at", "2s", "--to", "100ms"),
-            "--save-at 48000000t: the run goes from tick 0 to tick 2400000",
-        ),
-        (
-            ("--resume", "{saved}", "--seed", "6"),
-            "cannot be resumed: the saved world has seed 5, this world has 6",
-        ),
-        (
-            ("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"),
-            "the run goes from tick 2402400 to tick",
-        ),
-        (
-            ("--resume", "{short}"),
-            "cannot be resumed: not a saved world, or one of a version of this program",
-        ),
+        (("--save-at", "2s", "--to", "100ms"), "--save-at 48000000t: the run goes from tick 0 to tick 2400000"),
+        (("--resume", "{saved}", "--seed", "6"), "cannot be resumed: the saved world has seed 5, this world has 6"),
+        (("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"), "the run goes from tick 2402400 to tick"),
+        (("--resume", "{short}"), "cannot be resumed: not a saved world, or one of a version of this program"),
         (("--resume", "{saved}.none"), "no such file"),
         (("--save-at", "soon"), "'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks."),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_done_is_refused_and_nothing_is_written(mirotwin, tmp_path, short, arguments, what):
     first = tmp_path / "first"
     mirotwin("run", short, "--out", first, "--seed", 5, "--save-at", "2402400t", *QUIET)
     given = [one.format(saved=first / "at-2402400.world", short=short) for one in arguments]
-    code, _, err = mirotwin("run", short, "--out", tmp_path / "second", *given, *QUIET)
-    assert code == 2
+    err = mirotwin.refuses("run", short, "--out", tmp_path / "second", *given, *QUIET)
     assert what.lower() in err.lower()
     assert not (tmp_path / "second").exists()
 
 
 def test_full_recordings_do_not_stop(mirotwin, tmp_path, short):
-    code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--record", "full", "--to", "1000t")
-    assert code == 2
+    err = mirotwin.refuses("run", short, "--out", tmp_path / "a", "--record", "full", "--to", "1000t")
     assert "do not go with --record full" in err

@@ -18,8 +18,7 @@ def options(settings=SETTINGS):
 def run(mirotwin, short, tmp_path_factory):
     """The folder of a run of the short scenario with settings."""
     folder = tmp_path_factory.mktemp("set") / "out"
-    code, out, err = mirotwin("run", short, *options(), "--no-figure", "--out", folder)
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("run", short, *options(), "--no-figure", "--out", folder)
     assert f"set       {' '.join(SETTINGS)}\n" in out
     return folder
 
@@ -37,17 +36,14 @@ def test_a_run_with_settings_is_the_run_of_the_edited_file(mirotwin, run, tmp_pa
 
 
 def test_its_recording_replays_to_the_same_response(mirotwin, run):
-    code, out, err = mirotwin("replay", run / "run.mcap", "-q")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("replay", run / "run.mcap", "-q")
     assert "equals the recorded one in all 3 control periods" in out
 
 
 def test_a_recording_may_be_replayed_with_other_settings(mirotwin, run):
-    code, _, err = mirotwin("replay", run / "run.mcap", "-q", "--set", "network.robot.1.slot=1")
-    assert code == 4
+    err = mirotwin.ends(4, "replay", run / "run.mcap", "-q", "--set", "network.robot.1.slot=1")
     assert "the replay differs in control period 0" in err
-    code, _, err = mirotwin("replay", run / "run.mcap", "--set", "network.robot.1.slot=7")
-    assert (code, err.count("\n")) == (2, 1)
+    err = mirotwin.refuses("replay", run / "run.mcap", "--set", "network.robot.1.slot=7")
     assert "run.mcap: scenario.toml: --set network.robot.1.slot=7: 7 is out of range; must be <= 4" in err
 
 
@@ -59,8 +55,7 @@ def test_a_stream_runs_in_the_default_scenario_with_its_settings(mirotwin, tmp_p
     ]
     assert heard[0] == mirotwin("replay", path, "-q")
     assert heard[0] != heard[1]
-    code, _, err = mirotwin("replay", path, "--set", "network.radoi.latency_s=0")
-    assert code == 2
+    err = mirotwin.refuses("replay", path, "--set", "network.radoi.latency_s=0")
     assert (
         f"{path}: --set network.radoi.latency_s=0: network[0].radoi: unknown key; did you mean radio?" in err
     )
@@ -69,8 +64,7 @@ def test_a_stream_runs_in_the_default_scenario_with_its_settings(mirotwin, tmp_p
 def test_show_prints_a_file_that_runs_the_same(mirotwin, run, tmp_path):
     short = tmp_path / "short.toml"
     short.write_text(SHORT)
-    code, out, err = mirotwin("scenarios", "show", short, *options())
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("scenarios", "show", short, *options())
     shown = tmp_path / "shown.toml"
     shown.write_text(out)
     assert mirotwin("run", shown, "--no-figure", "--out", tmp_path / "out", "-q")[0] == 0
@@ -102,7 +96,5 @@ def test_the_commands_that_look_into_a_run_take_settings(mirotwin, short, run):
 def test_a_setting_that_cannot_be_is_one_line_and_exit_code_2(mirotwin, tmp_path, monkeypatch, command, said):
     image = hex_file(tmp_path / "a.ihx", b"\x80\xfe")
     monkeypatch.chdir(tmp_path)
-    code, out, err = mirotwin(*(image if word == "IMAGE" else word for word in command))
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert said in err
+    assert said in mirotwin.refuses(*(image if word == "IMAGE" else word for word in command))
     assert list(tmp_path.iterdir()) == [image]

@@ -32,8 +32,7 @@ def counters(out):
 def test_characters_with_a_bad_stop_bit_reach_the_robot_so(mirotwin, tmp_path):
     flawed = Transmission(SENT[1].tick, ">", FRAMES[1], 0, (22,))
     stream.write(tmp_path / "a.stream", [SENT[0], flawed, SENT[2]])
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("replay", tmp_path / "a.stream")
     assert counters(out) == [[str(slot), "2", "0", "0"] for slot in range(3)]
     assert "23 bytes, bad stop bit" in out
 
@@ -41,17 +40,14 @@ def test_characters_with_a_bad_stop_bit_reach_the_robot_so(mirotwin, tmp_path):
 def test_every_network_has_robots_of_its_own(mirotwin, tmp_path):
     five = encode(TeamFrame(0, 9, ((1, 1),) * 5), 5)
     stream.write(tmp_path / "a.stream", [*SENT, Transmission(2_500_000, ">", five, 1)])
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("replay", tmp_path / "a.stream")
     assert [row[1] for row in counters(out)] == ["3"] * 3 + ["1"] * 5
 
 
 def test_the_scenario_of_the_header_runs_with_its_seed(mirotwin, tmp_path):
     header = stream_header.of_text("seed = 3\n" + in_header(SHORT))
     stream.write(tmp_path / "a.stream", SENT, header)
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
-    assert [row[0] for row in counters(out)] == ["0", "2"]
+    assert [row[0] for row in counters(mirotwin.succeeds("replay", tmp_path / "a.stream"))] == ["0", "2"]
     accepted = set()
     for seed in range(6):  # about every second frame is lost
         noisy = in_header(SHORT.replace("2e-3", "5e-3"))
@@ -66,8 +62,7 @@ def test_what_the_header_expects_is_judged(mirotwin, tmp_path):
     assert mirotwin("replay", "-q", tmp_path / "a.stream")[::2] == (0, "")
     missed = "[expect]\nacts_within_ms = true\nwheels_within_m_s = {limit_m_s = 0.04}"
     stream.write(tmp_path / "a.stream", SENT[:1], stream_header.of_text(missed))
-    code, _, err = mirotwin("replay", "-q", tmp_path / "a.stream")
-    assert code == 1
+    err = mirotwin.ends(1, "replay", "-q", tmp_path / "a.stream")
     assert err.splitlines()[0].startswith(
         "mirotwin: expectation failed: wheels_within_m_s: net0/robot0: tick "
     )
@@ -80,17 +75,13 @@ def test_what_the_header_expects_is_judged(mirotwin, tmp_path):
 
 def test_a_built_in_scenario_is_taken_by_its_name(mirotwin, tmp_path):
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text("scenario = 'fig8'"))
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
-    assert [row[0] for row in counters(out)] == ["0"]
+    assert [row[0] for row in counters(mirotwin.succeeds("replay", tmp_path / "a.stream"))] == ["0"]
 
 
 def test_settings_of_the_header_are_made_before_those_of_the_command(mirotwin, tmp_path):
     slots = "set = { network = { robot = { 0 = { slot = 2 } } }, duration_s = 0.5 }"
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(f"scenario = 'fig8'\n{slots}"))
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
-    assert [row[0] for row in counters(out)] == ["2"]
+    assert [row[0] for row in counters(mirotwin.succeeds("replay", tmp_path / "a.stream"))] == ["2"]
     out = mirotwin("replay", tmp_path / "a.stream", "--set", "network.robot.slot=1")[1]
     assert [row[0] for row in counters(out)] == ["1"]
 
@@ -98,55 +89,33 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(mirotwin, t
 @pytest.mark.parametrize(
     ("header", "lines", "what"),
     [
-        (
-            "scenario = 'fig5'",
-            "",
-            "header: scenario: 'fig5' is no built-in scenario; give one of curve, fig6, ",
-        ),
+        ("scenario = 'fig5'", "", "header: scenario: 'fig5' is no built-in scenario; give one of curve, fig6, "),
         ("[scenario]\nname = 'a'\nduration_s = 0.1\nnetwork = []", "", "header: scenario: network: "),
         (in_header(SHORT).replace("duration_s", "duration_x"), "", "duration_x"),
         (in_header(SHORT), "2000000 >@1 55", "tick 2000000: network 1, but the scenario has 1"),
         (in_header(SHORT), "4799000 > 55", "tick 4799000: ends at tick 4824000, but the scenario ends at"),
         ("set = {duration_x = 1}", "", "--set duration_x=1: "),
         ("set = {network.robot = 5}", "", "--set network.robot=5: "),
-        (
-            "[expect]\nno_fault = 3",
-            "",
-            "--expect no_fault=3: expected true or false, got 3; write no_fault = true",
-        ),
-        (
-            "expect = {tracks_within_m = 1}",
-            "",
-            "--expect tracks_within_m=1: there is no such check; use tracks_with",
-        ),
+        ("[expect]\nno_fault = 3", "", "--expect no_fault=3: expected true or false, got 3; write no_fault = true"),
+        ("expect = {tracks_within_m = 1}", "", "--expect tracks_within_m=1: there is no such check; use tracks_with"),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
         (in_header(SHORT), "2000000 *@0/1 reset 1", "tick 2000000: no robot in slot 1; there is 0, 2"),
-        (
-            in_header(SHORT),
-            "4900000 *@0 radio up",
-            "tick 4900000: ends at tick 4900000, but the scenario ends at",
-        ),
+        (in_header(SHORT), "4900000 *@0 radio up", "tick 4900000: ends at tick 4900000, but the scenario ends at"),
         (in_header(SHORT), "2000000 *@1 radio up", "tick 2000000: network 1, but the scenario has 1"),
         ("", "2000000 * P1.0 1", ":6:1: an action, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
-        (
-            "",
-            "1701700 >@1 55\n1702000 >@1 55",
-            "tick 1702000: starts before the transmission of tick 1701700",
-        ),
+        ("", "1701700 >@1 55\n1702000 >@1 55", "tick 1702000: starts before the transmission of tick 1701700"),
     ],
-)
+)  # fmt: skip
 @pytest.mark.parametrize("command", [["replay"], ["fw", "profile"]])
 def test_what_cannot_be_done_is_refused_with_one_line(mirotwin, tmp_path, command, header, lines, what):
     path = tmp_path / "a.stream"
     text = stream.format_stream(SENT, stream_header.of_text(header) if header else None)
     text = text.replace("stream 1", "stream 2") + (lines + "\n" if lines else "")
     path.write_text(text if header else text.replace("\n", "\n#: seed = 1\n", 1))
-    code, out, err = mirotwin(*command, path)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"mirotwin: error: {path}:")
+    err = mirotwin.refuses(*command, path)
+    assert err.startswith(f"{path}:")
     assert what in err
-    assert err.count("\n") == 1
 
 
 def test_another_image_may_be_named(mirotwin, tmp_path):
@@ -154,8 +123,7 @@ def test_another_image_may_be_named(mirotwin, tmp_path):
     stream.write(tmp_path / "own.stream", SENT, stream_header.of_text(f'firmware_sha256 = "{own}"'))
     assert mirotwin("replay", tmp_path / "own.stream", "-q")[::2] == (0, "")
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(f'firmware_sha256 = "{OTHER}"'))
-    code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q", "--firmware", image_path())
-    assert code == 0
+    err = mirotwin.ends(0, "replay", tmp_path / "a.stream", "-q", "--firmware", image_path())
     assert "the stream is for firmware 0123456789ab.., this is" in err
 
 
@@ -163,9 +131,7 @@ def test_another_image_may_be_named(mirotwin, tmp_path):
 def test_decoding_and_exporting_refuse_an_event_after_what_came_before(mirotwin, tmp_path, command):
     path = tmp_path / "a.stream"
     path.write_text(f"{V2}5 > 55\n9 *@0 radio down\n99999 > 55\n")
-    code, _, err = mirotwin(*command, path)
-    assert code == 2
-    assert f"{path}:3:1: an action, which this command does not support" in err
+    assert f"{path}:3:1: an action, which this command does not support" in mirotwin.ends(2, *command, path)
 
 
 def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_through(mirotwin, tmp_path):
@@ -174,12 +140,9 @@ def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_
         + f"2 > {FRAMES[0].hex(' ')}\n800000 *@0/1 reset 1\n800100 *@0/1 reset 0\n800200 *@0/2 power 0\n"
         + f"5000000 > {FRAMES[1].hex(' ')}\n6000000 *@0 radio down\n6400000 > {FRAMES[2].hex(' ')}\n"
     )
-    code, out, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
-    assert [row[1] for row in counters(out)] == ["2", "1", "0"]
+    assert [row[1] for row in counters(mirotwin.succeeds("replay", tmp_path / "a.stream"))] == ["2", "1", "0"]
 
 
 def test_an_action_at_a_network_beyond_the_colours_of_teams_is_done(mirotwin, tmp_path):
     (tmp_path / "a.stream").write_text(V2 + "960000 *@5 radio up\n970000 *@5/0 reset 1\n")
-    code, _, err = mirotwin("replay", tmp_path / "a.stream")
-    assert (code, err) == (0, "")
+    mirotwin.succeeds("replay", tmp_path / "a.stream")
