@@ -5,11 +5,11 @@ import pytest
 from miro_robot.firmware import source_folder
 from miro_robot.inspect import lcov
 from miro_robot.inspect.lcov import FileRecord
+from tests.mirotwin.conftest import hex_file
 
 NASTY = "a\x1b[31m\x07\x9b2J\u202e.c"
 SHOWN = r"a\x1b[31m\x07\x9b2J\u202e.c"
 FORGED = "x\nall  100.0 %  forged"
-LOOP = ":0200000080FE80\n:00000001FF\n"
 
 
 def plain(text):
@@ -19,8 +19,7 @@ def plain(text):
 @pytest.fixture
 def image(tmp_path):
     """An endless loop whose .cdb says that it comes of line 1 of a file with a nasty name and a nasty text."""
-    path = tmp_path / "loop.ihx"
-    path.write_text(LOOP)
+    path = hex_file(tmp_path / "loop.ihx", b"\x80\xfe")
     path.with_suffix(".cdb").write_text(
         f"L:C${NASTY}$1$0$0:0\nL:G$main$0$0:0\nL:XG$main$0$0:0\n", encoding="utf-8"
     )
@@ -29,8 +28,7 @@ def image(tmp_path):
 
 
 def test_a_listing_shows_names_and_sources_escaped(mirotwin, image):
-    code, out, _ = mirotwin("fw", "disasm", image)
-    assert code == 0
+    out = mirotwin.succeeds("fw", "disasm", image)
     assert plain(out)
     assert f"; {SHOWN}:1: for (;;) ;" in " ".join(out.split())
     assert r"\x1b]0;title\x07" in out
@@ -39,8 +37,7 @@ def test_a_listing_shows_names_and_sources_escaped(mirotwin, image):
 def test_a_file_of_another_firmware_is_not_taken_for_that_of_the_robots_own(mirotwin, image):
     image.with_suffix(".cdb").write_text("L:C$main.c$27$0$0:0\nL:G$main$0$0:0\nL:XG$main$0$0:0\n")
     assert (source_folder() / "main.c").read_text().splitlines()[26].strip()
-    code, out, _ = mirotwin("fw", "disasm", image)
-    assert code == 0
+    out = mirotwin.succeeds("fw", "disasm", image)
     assert "; main.c:27\n" in out
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests import children
 
-ROOT = Path(__file__).parents[3]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
 MARK = b"started\n"
 PROGRAM = (
     "import sys, os; import mirotwin.entry as entry; os.write(2, b'started\\n'); sys.argv[0] = 'mirotwin';"
@@ -21,15 +21,10 @@ PROGRAM = (
 LONGEST_S = 1.2
 
 
-def interrupted(delay_s, *arguments):
+def interrupted(delay_s, *words, program=PROGRAM):
     """Exit code, stdout and stderr of the program, which is interrupted so long after our first line of code ran."""
-    with children.start(
-        [sys.executable, "-c", PROGRAM, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    ) as process:
-        assert process.stderr is not None
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": ENVIRONMENT}
+    with children.start([sys.executable, "-c", program, *words], **pipes) as process:
         assert process.stderr.readline() == MARK
         time.sleep(delay_s)
         process.send_signal(signal.SIGINT)
@@ -39,8 +34,7 @@ def interrupted(delay_s, *arguments):
 
 def moments(count, seed):
     draw = random.Random(seed)
-    for _ in range(count):
-        yield draw.uniform(0.0, LONGEST_S)
+    return [draw.uniform(0.0, LONGEST_S) for _ in range(count)]
 
 
 def check(code, out, err):
@@ -52,7 +46,7 @@ def check(code, out, err):
         assert err.strip() == b"mirotwin: interrupted"
 
 
-@pytest.mark.parametrize("delay_s", list(moments(8, 1)))
+@pytest.mark.parametrize("delay_s", moments(8, 1))
 def test_ctrl_c_is_one_line_at_any_moment(delay_s):
     check(*interrupted(delay_s, "info"))
 
@@ -80,27 +74,14 @@ mirotwin.entry.main()
 
 
 def test_ctrl_c_in_a_callback_of_the_interpreter_ends_the_program_after_it():
-    found = children.run(
-        [sys.executable, "-c", IN_A_CALLBACK],
-        capture_output=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    found = children.run([sys.executable, "-c", IN_A_CALLBACK], capture_output=True, env=ENVIRONMENT)
     assert (found.returncode, found.stdout, found.stderr) == (130, b"", b"mirotwin: interrupted\n")
 
 
 def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it():
-    program = ["-c", f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}", "--version"]
-    with children.start(
-        [sys.executable, *program],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    ) as process:
-        assert process.stderr is not None
-        assert process.stderr.readline() == MARK
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (0, b"")
+    ignoring = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}"
+    code, out, err = interrupted(0.0, "--version", program=ignoring)
+    assert (code, err) == (0, b"")
     assert out.startswith(b"mirotwin, version")
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from miro_sim.scenario.file import builtin_text
 from mirotwin.commands import CAMERA, CAMPAIGN, FIRMWARE, SECTIONS
 from mirotwin.shell.program import Lazy
 from tests import children
+from tests.mirotwin.program import COMMAND
 
 LAZY = [
     (name, one)
@@ -33,89 +33,66 @@ def test_help_lists_every_command(mirotwin):
         assert [line.split()[0] for line in listed] == list(section)
 
 
-def test_the_version_loads_no_command_and_nothing_hot():
-    script = (
-        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
-        "print(*sorted(n for n in sys.modules if n.startswith(('numpy', 'mirotwin'))))"
-    )
-    done = children.run(
-        [sys.executable, "-c", script, "--version"], capture_output=True, text=True, check=True
-    )
-    loaded = done.stdout.splitlines()[-1].split()
-    assert loaded == ["mirotwin", "mirotwin.commands", "mirotwin.shell", "mirotwin.shell.program"]
-
-
-def test_a_run_without_a_figure_writes_the_other_files(mirotwin, tmp_path):
-    short = tmp_path / "short.toml"
-    text = builtin_text("fig6").replace("duration_s = 6.0", "duration_s = 0.03", 1)
-    short.write_text(text, encoding="utf-8")
-    code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "--no-figure")
-    assert (code, err) == (0, "")
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["run.mcap", "summary.json"]
-
-
 def test_a_file_that_ends_too_soon_is_no_interruption(mirotwin, monkeypatch):
     def cut_short(name):
         raise EOFError("marshal data too short")
 
     monkeypatch.setattr("mirotwin.shell.program.import_module", cut_short)
-    code, _, err = mirotwin("scenarios")
-    assert code == 70
-    assert err.startswith(
-        "mirotwin: internal error: RuntimeError: a file ends too soon: marshal data too short"
-    )
+    err = mirotwin.ends(70, "scenarios")
+    assert "internal error: RuntimeError: a file ends too soon: marshal data too short" in err
 
 
-def test_help_loads_click_and_nothing_that_is_slow():
-    script = (
-        "import sys\nfrom mirotwin.commands import main\n"
-        "try:\n    main(['--help'])\n"
-        "finally:\n    print('loaded:', *sorted(sys.modules), file=sys.stderr)\n"
-    )
-    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("Usage: mirotwin")
-    loaded = done.stderr.rpartition("loaded: ")[2].split()
-    slow = {"numpy", "msgspec", "rich", "mcap", "hashlib", "tomllib", "importlib.metadata"}
-    assert not slow.intersection(loaded)
-    ours = [name for name in loaded if name.startswith("miro")]
-    assert ours == [
-        "miro_exact",
-        "miro_exact.bad_input",
-        "miro_exact.engine",
-        "mirotwin",
-        "mirotwin.commands",
-        "mirotwin.shell",
-        "mirotwin.shell.program",
-    ]
+LOADED = """
+import sys
+from mirotwin.commands import main
+try:
+    main()
+finally:
+    print("loaded:", *(f"{name}={getattr(one, '__file__', '')}" for name, one in sorted(sys.modules.items())))
+"""
 
 
-@pytest.mark.parametrize("arguments", [["replay", "--help"], ["test", "--help"], ["conform", "--list"]])
-def test_a_command_without_a_port_loads_nothing_for_ports_or_the_bare_processor(arguments):
-    script = (
-        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
-        "print('loaded:', *sorted(sys.modules))"
-    )
-    done = children.run(
-        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
-    )
-    loaded = done.stdout.rpartition("loaded: ")[2].split()
-    assert "mirotwin.desk.guard" in loaded
-    assert not {"serial", "mirotwin.desk.robot_port", "mirotwin.verify.bare"}.intersection(loaded)
+def loaded(*words, **more):
+    """The files of all modules that were loaded by a command, by name."""
+    done = children.run([sys.executable, "-c", LOADED, *words], capture_output=True, text=True, **more)
+    assert done.stderr == ""
+    return dict(one.split("=") for one in done.stdout.rpartition("loaded: ")[2].split())
 
 
-def test_a_command_of_fw_loads_no_other():
-    script = (
-        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
-        "print(*sorted(n for n in sys.modules if '.fw_' in n))"
-    )
-    for arguments, loaded in (
-        (["fw", "--help"], ""),
-        (["fw", "trace", "--help"], "mirotwin.firmware.fw_trace"),
-    ):
-        done = children.run(
-            [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
-        )
-        assert done.stdout.splitlines()[-1] == loaded
+@pytest.mark.parametrize(("word", "more"), [("--help", "importlib.metadata"), ("--version", "numpy")])
+def test_help_and_version_load_click_and_nothing_that_is_slow(word, more):
+    found = loaded(word)
+    ours = ["mirotwin", "mirotwin.commands", "mirotwin.shell", "mirotwin.shell.program"]
+    assert [name for name in found if name.startswith("mirotwin")] == ours
+    others = {name for name in found if name.startswith("miro_")}
+    assert others <= {"miro_exact", "miro_exact.bad_input", "miro_exact.engine"}
+    assert not found.keys() & {"numpy", "msgspec", "rich", "mcap", more}
+    assert word == "--version" or not found.keys() & {"hashlib", "tomllib"}
+
+
+@pytest.mark.parametrize("words", [["replay", "--help"], ["test", "--help"], ["conform", "--list"]])
+def test_a_command_without_a_port_loads_nothing_for_ports_or_the_bare_processor(words):
+    found = loaded(*words)
+    assert "mirotwin.desk.guard" in found
+    assert not {"serial", "mirotwin.desk.robot_port", "mirotwin.verify.bare"} & found.keys()
+
+
+@pytest.mark.parametrize(("words", "ours"), [([], []), (["trace"], ["mirotwin.firmware.fw_trace"])])
+def test_a_command_of_fw_loads_no_other(words, ours):
+    assert [name for name in loaded("fw", *words, "--help") if ".fw_" in name] == ours
+
+
+@pytest.mark.slow
+def test_with_the_python_engine_a_command_loads_sources_alone(tmp_path):
+    command = ("run", "fig6", "--set", "duration_s=0.001", "--engine", "python", "--no-figure", "-q")
+    found = loaded(*command, cwd=tmp_path)
+    for name in ("miro_sim.world.world", "miro_robot.mcs51.cpu", "miro_exact.rng"):
+        assert found[name].endswith(".py")
+
+
+def test_a_quiet_run_with_its_figure_loads_neither_rich_nor_numpy(tmp_path):
+    found = loaded("run", "fig6", "--set", "duration_s=0.05", "-q", cwd=tmp_path)
+    assert not {"rich", "numpy"} & found.keys()
 
 
 @pytest.mark.parametrize(
@@ -138,42 +115,12 @@ def test_the_engine_is_settled_before_a_command_is_loaded(words, engine):
     assert done.stdout == f"{engine}\n"
 
 
-@pytest.mark.slow
-def test_with_the_python_engine_a_command_loads_sources_alone(tmp_path):
-    script = (
-        "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"
-        "for name in 'miro_sim.world.world', 'miro_robot.mcs51.cpu', 'miro_exact.rng':\n"
-        "    print(sys.modules[name].__file__)"
-    )
-    command = ["run", "fig6", "--set", "duration_s=0.001", "--engine", "python", "--no-figure", "-q"]
-    done = children.run(
-        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert [line[-3:] for line in done.stdout.splitlines()[-3:]] == [".py"] * 3
-    assert done.stderr == ""
-
-
-def test_a_quiet_run_with_its_figure_loads_neither_rich_nor_numpy(tmp_path):
-    script = (
-        "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"
-        "print({'rich', 'numpy'}.intersection(sys.modules))"
-    )
-    command = ["run", "fig6", "--set", "duration_s=0.05", "-q"]
-    done = children.run(
-        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert (done.stdout, done.stderr) == ("set()\n", "")
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("words", [["run", "nope"], ["test", "nope"], ["run", "--nope"]])
 def test_the_exit_code_stays_where_stderr_is_full_or_its_reader_has_gone(words):
-    command = [Path(sys.executable).with_name("mirotwin"), *words]
     with open("/dev/full", "w") as full:
-        assert children.run(command, stderr=full, check=False).returncode == 2
+        assert children.run([*COMMAND, *words], stderr=full).returncode == 2
     reader, writer = os.pipe()
     os.close(reader)
-    try:
-        assert children.run(command, stderr=writer, check=False).returncode == 2
-    finally:
-        os.close(writer)
+    with os.fdopen(writer) as gone:
+        assert children.run([*COMMAND, *words], stderr=gone).returncode == 2
