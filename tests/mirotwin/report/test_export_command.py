@@ -50,8 +50,7 @@ def test_the_same_recording_gives_the_same_bytes_in_any_process(finished, tmp_pa
 
 def test_a_stream_and_a_capture_become_each_other(mirotwin, tmp_path):
     (tmp_path / "a.pcapng").write_bytes(render(PACKETS))
-    code, out, err = mirotwin("export", tmp_path / "a.pcapng", "--out", tmp_path / "b.stream")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("export", tmp_path / "a.pcapng", "--out", tmp_path / "b.stream")
     assert "b.stream: 3 transmissions from the host and 0 from robots" in out
     text = (tmp_path / "b.stream").read_text()
     assert text.startswith("# mirotwin stream 1\n")
@@ -64,9 +63,7 @@ def test_a_stream_and_a_capture_become_each_other(mirotwin, tmp_path):
 
 def test_the_stream_of_a_recording_is_taken_by_replay(mirotwin, finished, tmp_path):
     assert mirotwin("export", finished / "run.mcap", "--out", tmp_path / "run.stream")[0] == 0
-    code, out, err = mirotwin("replay", tmp_path / "run.stream")
-    assert (code, err) == (0, "")
-    assert out.splitlines()[-1].split()[1] == "6"  # all six frames: this link has no errors
+    assert mirotwin.succeeds("replay", tmp_path / "run.stream").splitlines()[-1].split()[1] == "6"
 
 
 def test_damage_is_called_so_in_the_comment(mirotwin, tmp_path):
@@ -103,15 +100,13 @@ def test_more_networks_or_bad_stop_bits_make_a_stream_of_version_2(mirotwin, tmp
 
 def test_bad_stop_bits_that_a_capture_cannot_hold_are_counted(mirotwin, tmp_path):
     stream.write(tmp_path / "a.stream", [Transmission(5, ">", b"abc", 0, (0, 2))])
-    code, _, err = mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.pcapng")
-    assert code == 0
+    err = mirotwin.ends(0, "export", tmp_path / "a.stream", "--out", tmp_path / "b.pcapng")
     assert "2 bad stop bits were left out" in err
 
 
 def test_of_an_input_cut_short_all_that_could_be_read_is_written(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(render(PACKETS)[:-5])
-    code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
-    assert code == 2
+    err = mirotwin.refuses("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
     assert "the file ends in the middle of a block" in err
     assert "everything before it was written" in err
     assert (tmp_path / "b.pcapng").read_bytes() == render(PACKETS[:2])
@@ -138,17 +133,14 @@ def test_a_run_longer_than_a_packet_may_be_is_cut(mirotwin, tmp_path):
 )
 def test_what_cannot_be_converted_is_named_and_nothing_is_written(mirotwin, tmp_path, data, message):
     (tmp_path / "a").write_bytes(data)
-    code, out, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.stream")
-    assert (code, out) == (2, "")
-    assert message in err
+    assert message in mirotwin.refuses("export", tmp_path / "a", "--out", tmp_path / "b.stream")
     assert os.listdir(tmp_path) == ["a"]
 
 
 def test_a_file_that_exists_is_replaced_only_if_that_was_meant(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(render(PACKETS))
     (tmp_path / "b.pcapng").write_bytes(b"mine")
-    code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
-    assert code == 2
+    err = mirotwin.refuses("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
     assert "is there already; choose another file with --out, or replace it with --force" in err
     assert (tmp_path / "b.pcapng").read_bytes() == b"mine"
     assert mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng", "--force")[0] == 0
@@ -156,16 +148,14 @@ def test_a_file_that_exists_is_replaced_only_if_that_was_meant(mirotwin, tmp_pat
 
 def test_what_is_no_regular_file_is_never_replaced(mirotwin, finished, tmp_path):
     os.mkfifo(tmp_path / "pipe.pcapng")
-    code, _, err = mirotwin("export", finished / "run.mcap", "--out", tmp_path / "pipe.pcapng", "--force")
-    assert code == 2
+    err = mirotwin.refuses("export", finished / "run.mcap", "--out", tmp_path / "pipe.pcapng", "--force")
     assert "pipe.pcapng" in err
     assert stat.S_ISFIFO((tmp_path / "pipe.pcapng").stat().st_mode)
 
 
 def test_a_network_that_is_not_there_is_an_error_that_names_those_that_are(mirotwin, finished, tmp_path):
     out = tmp_path / "x.pcapng"
-    code, _, err = mirotwin("export", finished / "run.mcap", "--network", 9, "--out", out)
-    assert code == 2
+    err = mirotwin.refuses("export", finished / "run.mcap", "--network", 9, "--out", out)
     assert "--network 9: nothing of it; networks there: 0" in err
     assert not out.exists()
 
@@ -176,9 +166,7 @@ def test_a_recording_with_one_wrong_byte_is_reported_after_all_that_could_be_rea
     data = bytearray((finished / "run.mcap").read_bytes())
     data[200] ^= 0xFF
     (tmp_path / "bad.mcap").write_bytes(data)
-    code, _, err = mirotwin("decode", tmp_path / "bad.mcap")
-    assert code == 2
-    assert "bad.mcap: offset" in err
+    assert "bad.mcap: offset" in mirotwin.refuses("decode", tmp_path / "bad.mcap")
 
 
 def test_the_file_that_is_read_is_never_replaced(mirotwin, finished, tmp_path):
@@ -187,7 +175,6 @@ def test_the_file_that_is_read_is_never_replaced(mirotwin, finished, tmp_path):
     link.symlink_to(path)
     before = path.read_bytes()
     for one, other in ((path, path), (path, link), (link, path)):
-        code, _, err = mirotwin("export", one, "--out", other, "--force")
-        assert code == 2
+        err = mirotwin.refuses("export", one, "--out", other, "--force")
         assert "is the input itself; choose another file with --out" in err
     assert path.read_bytes() == before

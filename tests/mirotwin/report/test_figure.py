@@ -2,10 +2,10 @@
 
 import xml.etree.ElementTree as ElementTree
 
-import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from miro_sim.periods import Control
 from mirotwin.recording.track import Tracks
@@ -33,12 +33,9 @@ def test_the_same_run_gives_the_same_picture_whatever_its_title(tmp_path):
 def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path, count, panels):
     inner = {f"value_{index}": 0.5 * index for index in range(count)}
     run = [
-        msgspec.structs.replace(
+        replace(
             period,
-            robots=tuple(
-                msgspec.structs.replace(robot, control=Control(0.2, 0.0, 1, 1, inner))
-                for robot in period.robots
-            ),
+            robots=tuple(replace(robot, control=Control(0.2, 0.0, 1, 1, inner)) for robot in period.robots),
         )
         for period in periods(5)
     ]

@@ -4,13 +4,8 @@ import json
 
 LEARNING = (
     *("--set", "camera.self_calibration=lines", "--set", "duration_s=2.0"),
-    *(
-        "--set",
-        "network.robot.controller={law = 'body_frame'}",
-        "--set",
-        "network.robot.estimator={kind = 'ekf'}",
-    ),
-)
+    *("--set", "network.robot.controller={law = 'body_frame'}", "--set", "network.robot.estimator={kind = 'ekf'}"),
+)  # fmt: skip
 
 
 def test_camera_and_wheels_stand_beside_the_truth(mirotwin, tmp_path):

@@ -135,7 +135,6 @@ def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tm
         said = str(error) if error is not None else notes[0]
         assert re.search("the file ends in the middle of a record|the recording has no end", said)
         offset = re.search(r"offset (\d+)", said)
-        assert offset is not None
         assert int(offset[1]) <= size
         assert [run.tick for run in found] == [index * PERIOD for index in range(len(found))]
         counts.append(len(found))
@@ -156,7 +155,6 @@ def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at, bit):
         path.write_bytes(data)
         error = read(path)[2]
     kinds = ("damaged record", "not an MCAP file", "recording format")
-    assert error is not None
     assert any(kind in str(error) for kind in kinds)
 
 

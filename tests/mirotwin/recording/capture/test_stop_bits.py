@@ -2,8 +2,8 @@
 
 import io
 
-import msgspec
 import pytest
+from msgspec.structs import replace
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.events import Received
@@ -26,9 +26,9 @@ PERIODS = 150
 def noisy_world(seed):
     text = load("fig6")
     network = text.scenario.networks[0]
-    radio = msgspec.structs.replace(network.radio, bit_error_rate=5e-3)
-    network = msgspec.structs.replace(network, radio=radio)
-    return World(msgspec.structs.replace(text.scenario, networks=(network,)), seed, image())
+    radio = replace(network.radio, bit_error_rate=5e-3)
+    network = replace(network, radio=radio)
+    return World(replace(text.scenario, networks=(network,)), seed, image())
 
 
 def recorded(seed):

@@ -57,7 +57,6 @@ def read(data):
     schemas = {}
     found = []
     for schema, channel, message in make_reader(io.BytesIO(data)).iter_messages():
-        assert schema is not None
         assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
         if schema.id not in schemas:
             schemas[schema.id] = msgspec.json.decode(schema.data)
