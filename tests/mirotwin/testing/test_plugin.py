@@ -1,13 +1,18 @@
-"""The pytest plugin as a user has it: sessions with fixtures, options and markers, and what failed tests leave."""
+"""The pytest plugin as a user has it: sessions with fixtures, options, scenario files and firmware coverage."""
 
 import json
 import re
 import shlex
+import shutil
 from xml.etree import ElementTree
 
 import pytest
 
+from miro_robot.firmware import image_path
+from mirotwin.verify.cases.artifacts import image_beside
 from tests.mirotwin.testing.sessions import run, session
+from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
+from tests.mutants.planted import PLANTED
 
 MIXED = """
 def test_passes(link, robot):
@@ -93,12 +98,9 @@ def test_a_traceback_ends_at_the_tests_own_line(mixed):
 
 
 def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed):
-    cases = {
-        case.get("name"): case for case in ElementTree.parse(mixed / "junit.xml").getroot().iter("testcase")
-    }
     named = {
-        name: {one.get("name"): one.get("value") for one in case.iter("property")}
-        for name, case in cases.items()
+        case.get("name"): {one.get("name"): one.get("value") for one in case.iter("property")}
+        for case in ElementTree.parse(mixed / "junit.xml").iter("testcase")
     }
     facts = named["test_passes"]
     assert facts["mirotwin_seed"] == "0"
@@ -176,3 +178,330 @@ def test_talks(link):
     assert "net0/robot0: transmitted telemetry seq=0 slot=0 flags=10h accepted=1 rejected=0 (tick " in out
     assert "net0/robot0: received 55 44 (from tick " in out
     assert "55 55" not in out
+
+
+# Options: seeds, repetition, firmware, ini files
+
+MANY = """
+@pytest.mark.mirotwin(scenario={"network.radio.bit_error_rate": 0.01})
+@pytest.mark.parametrize("step", [1, 2])
+def test_noise(world, link, step):
+    for _ in range(3):
+        link.send(velocities={0: (step, step)})
+    world.run_for(ms(5))
+    print("DIGEST", world.seed, step, world.digest)
+    assert world.seed != 12
+
+def test_once():
+    pass
+"""
+
+
+@pytest.mark.slow
+def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path):
+    options = ["-v", "-rA", "--mirotwin-repeat=4", "--mirotwin-seed=10", "--mirotwin-artifacts=left"]
+    alone = session(tmp_path, *options, tests=MANY)
+    assert "test_noise[2-seed13] PASSED" in alone.stdout
+    assert "test_noise[1-seed12] FAILED" in alone.stdout
+    assert "2 failed, 7 passed" in alone.stdout
+    assert "pytest 'test_mine.py::test_noise[1]' --mirotwin-seed 12\n" in alone.stdout
+    files = {path.relative_to(tmp_path): path.read_bytes() for path in (tmp_path / "left").rglob("*.json")}
+    assert len(files) == 2
+    spread = session(tmp_path, *options, "-n", "2", child=True)
+    assert "2 failed, 7 passed" in spread.stdout
+    assert digests(spread.stdout) == digests(alone.stdout)
+    assert len(digests(alone.stdout)) == len(set(digests(alone.stdout))) == 8
+    for path, content in files.items():
+        assert (tmp_path / path).read_bytes() == content
+
+
+def digests(out):
+    return sorted(re.findall(r"^DIGEST .*$", out, re.MULTILINE))
+
+
+@pytest.mark.slow
+def test_the_ini_file_says_what_options_do_not(tmp_path):
+    (tmp_path / "pytest.ini").write_text(
+        "[pytest]\nmirotwin_seed = 3\nmirotwin_repeat = 2\nmirotwin_artifacts = left\nmirotwin_firmware = own.ihx\n"
+    )
+    for suffix in (".ihx", ".map", ".cdb"):
+        (tmp_path / f"own{suffix}").write_bytes(image_path().with_suffix(suffix).read_bytes())
+    tests = """
+def test_one(world):
+    assert world.image.path.name == "own.ihx"
+    assert world.seed in (3, 4)
+"""
+    assert "2 passed" in session(tmp_path, tests=tests).stdout
+    assert "1 passed" in session(tmp_path, "--mirotwin-repeat=1").stdout
+    assert "2 failed" in session(tmp_path, "--mirotwin-seed=7").stdout
+    assert len(list((tmp_path / "left").iterdir())) == 2
+
+
+COVERAGE = "--firmware-coverage=fw.info"
+USAGE_ERRORS = {
+    ("--mirotwin-firmware=gone.ihx",): "--mirotwin-firmware: ",
+    ("--mirotwin-firmware=test_mine.py",): "is not Intel HEX",
+    ("--mirotwin-seed=-1",): "--mirotwin-seed: -1: give 0 or more",
+    ("--mirotwin-repeat=0",): "--mirotwin-repeat: 0 is too few; give 1 or more",
+    ("--mirotwin-artifacts=test_mine.py",): "test_mine.py is no folder",
+    ("-o", "mirotwin_seed=x"): "mirotwin_seed: 'x' is no whole number",
+    (COVERAGE, "--firmware-image=gone.ihx"): "gone.ihx: there is no such file",
+    ("--firmware-coverage=gone/fw.info",): "there is no folder gone",
+    (COVERAGE, "--firmware-image=/dev/zero"): "/dev/zero: is not a regular file",
+    (COVERAGE, "--firmware-sources=gone"): "gone: --firmware-sources: there is no such folder",
+    (COVERAGE, "--firmware-coverage-fail-under=nan"): "nan is no percentage",
+    (COVERAGE, "--firmware-coverage-fail-under=900"): "900.0 is no percentage",
+    ("--firmware-coverage-fail-under=90",): "goes with --firmware-coverage=FILE.info",
+}
+
+
+@pytest.mark.parametrize("options", USAGE_ERRORS, ids=" ".join)
+def test_an_option_that_cannot_be_is_a_usage_error(tmp_path, options):
+    done = session(tmp_path, *options, tests="def test_one(world):\n    pass\n")
+    assert done.returncode == 4
+    assert USAGE_ERRORS[options] in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path):
+    (tmp_path / "conftest.py").write_text(
+        "import sys\n"
+        "def pytest_unconfigure():\n"
+        "    print('LOADED', sorted(n for n in sys.modules if n.split('.')[0].startswith('miro')))\n"
+    )
+    (tmp_path / "test_mine.py").write_text("def test_one(tmp_path):\n    pass\n")
+    out = session(tmp_path, "-s", child=True).stdout
+    assert "LOADED ['mirotwin', 'mirotwin.testing', 'mirotwin.testing.pytest_plugin']" in out
+
+
+@pytest.mark.slow
+def test_the_help_names_options_and_the_marker(tmp_path):
+    out = session(tmp_path, "--help").stdout + session(tmp_path, "--markers").stdout
+    for word in ("--mirotwin-firmware", "--mirotwin-repeat", "mirotwin_artifacts"):
+        assert word in out
+    assert "@pytest.mark.mirotwin(scenario=" in out
+    assert "its wheels" not in session(tmp_path, "--fixtures").stderr
+
+
+@pytest.mark.slow
+@needs_sdcc
+def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path):
+    image = built_in(tmp_path / "bad", *PLANTED["stops 15 ms late"][1:4])
+    tests = """
+def test_the_failsafe_stops_both_wheels(link, robot):
+    link.drive({0: (500, 500)}, ms(100))
+    link.send(velocities={0: (500, 500)})
+    robot.break_at("motion_stop", within=ms(111))
+
+@pytest.mark.mirotwin(expect={"failsafe_stop_ms": True})
+def test_the_same_by_a_check(link, world):
+    link.send(velocities={0: (500, 500)})
+    world.run_for(ms(200))
+"""
+    options = ["--mirotwin-firmware", image.path.relative_to(tmp_path), "--mirotwin-artifacts=left"]
+    failed = session(tmp_path, *options, tests=tests)
+    assert failed.returncode == 1
+    assert "2 failed" in failed.stdout
+    assert "motion_stop was not reached within 111 ms" in failed.stdout
+    (line, _) = re.findall(r"^  (pytest .*)$", failed.stdout, re.MULTILINE)
+    replay, debug = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    assert debug == replay.replace("mirotwin replay", "mirotwin debug")
+    left = re.search("left/[^/]+/firmware.ihx", replay)
+    assert replay.endswith(f"/case.stream --firmware {left[0]}")
+    replayed = run(tmp_path, replay)
+    assert replayed.returncode == 1
+    assert "fails as recorded: failsafe_stop_ms" in replayed.stderr
+    cured = run(tmp_path, replay.replace(left[0], str(image_path())))
+    assert cured.returncode == 0
+    assert line.endswith("--mirotwin-seed 0 --mirotwin-firmware bad/out/miro.ihx")
+    again = run(tmp_path, line)
+    assert again.returncode == 1
+    assert "motion_stop was not reached within 111 ms" in again.stdout
+    assert session(tmp_path).returncode == 0
+
+
+@pytest.mark.slow
+def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path):
+    (tmp_path / "a.scenario.toml").write_text('scenario = "silent"\n\n[[step]]\npause_ms = 5\n')
+    tests = """
+@pytest.mark.mirotwin(scenario="a.scenario.toml")
+def test_it(world):
+    pass
+"""
+    out = session(tmp_path, "test_mine.py", tests=tests).stdout
+    assert "1 error" in out
+    assert "has 1 step, which a test in Python does not do" in out
+
+
+@pytest.mark.slow
+def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path):
+    (tmp_path / "session").mkdir()
+    for suffix in (".ihx", ".map", ".cdb"):
+        shutil.copy(image_path().with_suffix(suffix), tmp_path / "session" / f"mine{suffix}")
+    tests = """
+@pytest.mark.mirotwin(expect={"frames_accepted_min": 9})
+def test_counts(link):
+    link.drive({0: (500, 500)}, ms(100))
+"""
+    options = ["--mirotwin-firmware", "mine.ihx", "--mirotwin-artifacts=left"]
+    failed = session(tmp_path / "session", *options, tests=tests)
+    line, _ = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    shutil.move(tmp_path / "session" / "left", tmp_path / "elsewhere" / "left")
+    shutil.rmtree(tmp_path / "session")
+    (folder,) = (tmp_path / "elsewhere" / "left").iterdir()
+    beside = ["firmware.cdb", "firmware.ihx", "firmware.map"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        *("case.stream", *beside, "report.txt", "summary.json")
+    ]
+    for command in (line, f"mirotwin replay {folder / 'case.stream'}"):
+        done = run(tmp_path / "elsewhere", command)
+        assert done.returncode == 1, done.stderr
+        assert "fails as recorded: frames_accepted_min" in done.stderr
+
+
+def test_an_image_beside_a_case_that_is_another_one_is_not_taken(tmp_path):
+    (tmp_path / "case.stream").write_text("")
+    (tmp_path / "firmware.ihx").write_text(":00000001FF\n")
+    assert image_beside(tmp_path / "case.stream", "00" * 32) is None
+    assert image_beside(tmp_path / "case.stream", None) is None
+
+
+# Scenario files are tests
+
+SILENT = 'scenario = "silent"\nduration_s = 0.3\n'
+GOOD = SILENT + 'step = [{ pause_ms = 5 }, { send = "poll" }, { expect = "answer", within_ms = 60 }]\n'
+
+
+@pytest.fixture(scope="module")
+def scenarios(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("session")
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    (folder / "good.scenario.toml").write_text(GOOD)
+    (folder / "late.scenario.toml").write_text(GOOD.replace("60", "20"))
+    (folder / "wrong.scenario.toml").write_text(GOOD.replace("within_ms", "within_s"))
+    return folder
+
+
+@pytest.mark.slow
+def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(scenarios):
+    done = session(scenarios, "-p", "no:xdist", "--junitxml=out.xml")
+    assert done.returncode == 1, done.stdout
+    assert "2 failed, 1 passed" in done.stdout
+    assert (
+        "\nstep failed: step 3: expect answer: tick 600000 (25.000 ms): wanted answer within 20 ms, "
+        in done.stdout
+    )
+    assert (
+        "\nwrong.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds\n" in done.stdout
+    )
+    assert "\nagain: mirotwin test late.scenario.toml\n" in done.stdout
+    assert "Traceback" not in done.stdout
+    assert ".py:" not in done.stdout
+    (suite,) = ElementTree.parse(scenarios / "out.xml").getroot()
+    names = {one.get("name") for one in suite.iter("property")}
+    assert names == {"mirotwin_seed", "mirotwin_digest", "mirotwin_firmware_sha256", "mirotwin_reproduce"}
+
+
+@pytest.mark.slow
+def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(scenarios):
+    assert "1 passed" in session(scenarios, "-k", "good", "-n", "1", child=True).stdout
+    assert session(scenarios, "-p", "no:xdist").returncode == 1
+    assert "2 failed" in session(scenarios, "--lf", "-p", "no:xdist").stdout
+    assert "good.scenario.toml::good" in session(scenarios, "-q", "--collect-only", "-p", "no:xdist").stdout
+
+
+# Firmware coverage of other people's test sessions
+
+TESTS = """
+from miro_robot.bare.machine import BareMachine
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import Cpu
+
+def test_reset():
+    BareMachine(load_hex(image_path())).run(max_cycles=2000)
+
+def test_longer():
+    BareMachine(load_hex(image_path())).run(max_cycles=20000)
+
+def test_other_firmware_does_not_count():
+    cpu = Cpu(Bus())
+    cpu.load(bytes(64))
+    cpu.run(10)
+    assert cpu.inspector is None
+"""
+
+
+COUNTS = """
+from mirotwin.firmware import coverage_files as firmware_coverage
+
+collect = firmware_coverage.collect
+
+def counted(*arguments):
+    with open("collected", "a") as file:
+        file.write("once\\n")
+    return collect(*arguments)
+
+firmware_coverage.collect = counted
+"""
+
+
+def counted(folder, *arguments, child=False):
+    done = session(folder, COVERAGE, *arguments, tests=TESTS, child=child)
+    assert done.returncode == 0, done.stdout
+    assert "coverage of miro.ihx, written to fw.info" in done.stdout
+    return (folder / "fw.info").read_text()
+
+
+@pytest.mark.slow
+def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes_and_writes_once(tmp_path):
+    alone = counted(tmp_path)
+    assert "FNDA:2,_main" in alone
+    assert alone != counted(tmp_path, "-k", "reset")
+    (tmp_path / "conftest.py").write_text(COUNTS)
+    assert alone == counted(tmp_path, "-n", "2", child=True)
+    assert (tmp_path / "collected").read_text() == "once\n"
+
+
+@pytest.mark.slow
+def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path):
+    wanted = (COVERAGE, "--firmware-coverage-fail-under")
+    assert session(tmp_path, *wanted, "5", tests=TESTS).returncode == 0
+    failed = session(tmp_path, *wanted, "99")
+    assert failed.returncode == 1
+    assert "3 passed" in failed.stdout
+    assert "fewer lines ran than the 99.0 %" in failed.stdout
+
+
+BREAKS = """
+import os
+
+def pytest_runtest_setup(item):
+    if os.environ.get("BREAK") == "off":
+        raise KeyboardInterrupt
+
+def pytest_runtestloop(session):
+    if os.environ.get("BREAK") == "down":
+        raise RuntimeError("a plugin's own")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "how", "code"),
+    [(["gone.py"], "", 4), (["-k", "gone"], "", 5), ([], "off", 2), ([], "down", 3)],
+)
+def test_too_few_lines_do_not_hide_what_else_went_wrong(tmp_path, monkeypatch, arguments, how, code):
+    """pytest: 2 interrupted, 3 an internal error, 4 a usage error, 5 no tests."""
+    (tmp_path / "conftest.py").write_text(BREAKS)
+    monkeypatch.setenv("BREAK", how)
+    done = session(tmp_path, COVERAGE, "--firmware-coverage-fail-under=99", *arguments, tests=TESTS)
+    assert done.returncode == code, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_collecting_tests_writes_nothing(tmp_path):
+    done = session(tmp_path, COVERAGE, "--collect-only", tests=TESTS)
+    assert done.returncode == 0
+    assert not (tmp_path / "fw.info").exists()

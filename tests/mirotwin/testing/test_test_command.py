@@ -1,4 +1,4 @@
-"""`mirotwin test`: which files are tests, their verdicts, and what a failure leaves."""
+"""`mirotwin test`: which files are tests, their verdicts, what a failure leaves, and saved failures run again."""
 
 import os
 from pathlib import Path
@@ -6,10 +6,19 @@ from xml.etree import ElementTree
 
 import pytest
 
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.image import load_hex
+from mirotwin.fuzz.oracle import RobotOracle
+from mirotwin.fuzz.target import target_for
+from mirotwin.verify.bare.case import case_text
+from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.steps.running import collect
+from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 ROOT = Path(__file__).parents[3]
 HEAD = 'scenario = "silent"\nduration_s = 0.5\n'
+TOO_SOON = "step 3 (too soon): expect answer: tick 600000 (25.000 ms):"
 GOOD = (
     HEAD
     + 'step = [{ pause_ms = 5 }, { send = "poll" }, { expect = "answer", accepted = 1, within_ms = 60 }]\n'
@@ -40,9 +49,8 @@ def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin
     assert (code, err) == (2, "")
     assert lines[0].startswith("passed  hil/a.scenario.toml (3 of 3 steps, 500.500 ms, digest ")
     assert lines[1].startswith("FAILED  hil/sub/b.scenario.toml (2 of 3 steps, ")
-    wanted = "wanted answer within 20 ms, found none of it, but "
     assert lines[2].startswith(
-        f"    step failed: step 3 (too soon): expect answer: tick 600000 (25.000 ms): {wanted}"
+        f"    step failed: {TOO_SOON} wanted answer within 20 ms, found none of it, but "
     )
     assert lines[3] == "    mirotwin test hil/sub/b.scenario.toml"
     assert lines[4] == "ERROR  hil/sub/c.scenario.toml"
@@ -60,33 +68,30 @@ def test_the_worst_verdict_is_the_exit_code(mirotwin, folder, names, code):
 
 
 def test_a_firmware_fault_is_exit_code_3(mirotwin, folder):
-    (folder / "bad.ihx").write_text(":01000000A55A\n:00000001FF\n")
+    hex_file(folder / "bad.ihx", b"\xa5")
     code, out, _ = mirotwin("test", "hil/a.scenario.toml", "--firmware", "bad.ihx")
     assert code == 3
-    assert out.splitlines()[0].startswith("FAULT  hil/a.scenario.toml (0 of 3 steps") or "1 of 3" in out
+    assert out.startswith("FAULT  hil/a.scenario.toml (1 of 3 steps")
     assert "firmware fault: net0/robot0: " in out
     assert "a firmware fault has stopped the run" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "what"),
-    [
-        (["empty"], "empty: no *.scenario.toml or *.stream there; nothing was tested"),
-        (["hil", "-k", "zzz"], "hil: 5 files, none with 'zzz' in its path; nothing was tested"),
-        (["none"], "none: there is no such file or folder; name a folder, or a *.scenario.toml or *.stream"),
-        (["hil/notes.toml"], "hil/notes.toml: is no *.scenario.toml or *.stream; rename it"),
-        (["hil", "--firmware", "none.ihx"], "none.ihx: there is no such file"),
-        (
-            ["hil", "--junit", "hil/a.scenario.toml"],
-            "hil/a.scenario.toml: is the input itself; choose another",
-        ),
-    ],
-)
-def test_nothing_to_test_is_bad_input(mirotwin, folder, arguments, what):
+NO_TEST = {
+    ("empty",): "empty: no *.scenario.toml or *.stream there; nothing was tested",
+    ("hil", "-k", "zzz"): "hil: 5 files, none with 'zzz' in its path; nothing was tested",
+    ("none",): "none: there is no such file or folder; name a folder, or a *.scenario.toml or *.stream",
+    ("hil/notes.toml",): "hil/notes.toml: is no *.scenario.toml or *.stream; rename it",
+    ("hil", "--firmware", "none.ihx"): "none.ihx: there is no such file",
+    ("hil", "--junit", "hil/a.scenario.toml"): "hil/a.scenario.toml: is the input itself; choose another",
+}
+
+
+@pytest.mark.parametrize("arguments", NO_TEST, ids=" ".join)
+def test_nothing_to_test_is_bad_input(mirotwin, folder, arguments):
     (folder / "empty").mkdir()
     code, out, err = mirotwin("test", *arguments)
     assert (code, out) == (2, "")
-    assert err.startswith(f"mirotwin: error: {what}")
+    assert err.startswith(f"mirotwin: error: {NO_TEST[arguments]}")
 
 
 def test_no_path_at_all_is_bad_input(mirotwin):
@@ -117,15 +122,11 @@ def test_files_are_collected_once_in_the_order_of_their_paths(folder):
 def test_junit_has_each_test_with_what_gives_it_again(mirotwin, folder):
     mirotwin("test", "hil", "--junit", "out.xml", "--seed", 4, "--set", "duration_s=0.4")
     (suite,) = ElementTree.parse(folder / "out.xml").getroot()
-    assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
-        "tests": "5",
-        "failures": "3",
-        "errors": "1",
-    }
+    assert [suite.get(key) for key in ("tests", "failures", "errors")] == ["5", "3", "1"]
     cases = {case.get("name"): case for case in suite}
     assert cases["b"].get("classname") == "hil.sub"
     failure = cases["b"].find("failure")
-    assert failure.get("message", "").startswith("step failed: step 3 (too soon): expect answer: ")
+    assert failure.get("message", "").startswith(f"step failed: {TOO_SOON}")
     properties = {one.get("name"): one.get("value") for one in cases["b"].iter("property")}
     again = "mirotwin test hil/sub/b.scenario.toml --seed 4 --set duration_s=0.4"
     assert properties["reproduce"] == again
@@ -139,18 +140,13 @@ def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin,
     code, out, _ = mirotwin("test", "hil", "--artifacts", "left", "--set", "duration_s=0.4")
     assert code == 2
     assert "    left in left/hil-sub-b" in out.splitlines()
-    assert sorted(path.name for path in (folder / "left").iterdir()) == [
-        "hil-sub-b",
-        "hil-sub-d",
-        "hil-sub-e",
-    ]
-    for name, line in {
-        "b": "fails as recorded: happens: net0/robot0: tick 600000 ",
-        "d": "fails as recorded: failsafe_stop_ms: net0/robot0: tick ",
-    }.items():
-        assert mirotwin("replay", f"left/hil-sub-{name}/case.stream", "-q")[0] == 1
-        _, _, err = mirotwin("replay", f"left/hil-sub-{name}/case.stream", "-q")
-        assert err.startswith(f"mirotwin: {line}")
+    assert {path.name for path in (folder / "left").iterdir()} == {"hil-sub-b", "hil-sub-d", "hil-sub-e"}
+    for name, check in (
+        ("b", "happens: net0/robot0: tick 600000 "),
+        ("d", "failsafe_stop_ms: net0/robot0: "),
+    ):
+        code, _, err = mirotwin("replay", f"left/hil-sub-{name}/case.stream", "-q")
+        assert (code, err.startswith(f"mirotwin: fails as recorded: {check}")) == (1, True)
     assert not (folder / "left/hil-sub-e/case.stream").exists()  # no check knows an answer's fields
     report = (folder / "left/hil-sub-e/report.txt").read_text().splitlines()
     code, _, err = mirotwin("run", "left/hil-sub-e/scenario.toml", "--out", "again", "-q", "--no-figure")
@@ -183,9 +179,7 @@ def test_what_steps_save_needs_a_folder(mirotwin, folder):
 def test_run_does_steps_too_and_its_recording_replays(mirotwin, folder):
     code, _, err = mirotwin("run", "hil/sub/b.scenario.toml", "--out", "run", "-q", "--no-figure")
     assert code == 1
-    assert err.startswith(
-        "mirotwin: step failed: step 3 (too soon): expect answer: tick 600000 (25.000 ms): "
-    )
+    assert err.startswith(f"mirotwin: step failed: {TOO_SOON}")
     assert '"count": 3' in (folder / "run/summary.json").read_text()
     assert mirotwin("replay", "run/run.mcap", "-q")[0] == 0
     assert mirotwin("run", "hil/a.scenario.toml", "--out", "good", "-q", "--no-figure") == (0, "", "")
@@ -199,9 +193,7 @@ def test_commands_that_would_leave_steps_out_say_so(mirotwin, folder, command):
     time = ["--at", "0.1s"] if command == ["camera", "look"] else ["--to", "1ms"]
     code, _, err = mirotwin(*command, "hil/a.scenario.toml", *time)
     assert code == 2
-    assert (
-        "has 3 steps, which only `mirotwin run` and `mirotwin test` do; run it, and give the run.mcap" in err
-    )
+    assert "has 3 steps, which only `mirotwin run` and `mirotwin test` do; run it, and give the run" in err
 
 
 def test_the_examples_pass_from_a_user_s_folder(mirotwin, folder):
@@ -213,12 +205,8 @@ def test_the_examples_pass_from_a_user_s_folder(mirotwin, folder):
 def test_pages_are_made_when_they_are_asked_for(mirotwin, folder):
     for more, pages in (((), 0), (("--pages",), 1)):
         assert mirotwin("test", "hil/sub/d.scenario.toml", "--artifacts", "left", *more)[0] == 1
-        found = [
-            path
-            for path in (folder / "left").rglob("report.html")
-            if b"failsafe_stop_ms" in path.read_bytes()
-        ]
-        assert len(found) == pages
+        found = [path.read_bytes() for path in (folder / "left").rglob("report.html")]
+        assert [b"failsafe_stop_ms" in page for page in found] == [True] * pages
 
 
 def test_what_a_failed_test_leaves_of_a_whole_run_replays_by_the_line_it_prints(mirotwin, folder):
@@ -229,3 +217,98 @@ def test_what_a_failed_test_leaves_of_a_whole_run_replays_by_the_line_it_prints(
     (line,) = [line for line in out.splitlines() if "mirotwin replay left/" in line]
     replayed, _, said = mirotwin(*line.split("mirotwin ")[1].split())
     assert (replayed, said.startswith("mirotwin: fails as recorded: ")) == (1, True)
+
+
+# Cases: saved failures, run again as a project's CI does
+
+PASSES = "# mirotwin stream 2\n2400000 > 55\n"
+DAMAGED = bytes([12, 9, 1, 0, 16, 0, 32, 0])
+"""Input of a session: a frame with one wrong character."""
+
+
+@pytest.fixture(scope="module")
+def mistaken(tmp_path_factory):
+    """A firmware with a mistake, and the folder of a case of it beside a stream that expects nothing."""
+    image = planted("takes frames with a bad CRC")
+    target = target_for(image)
+    assert target.run(DAMAGED)
+    folder = tmp_path_factory.mktemp("cases")
+    verdict = RobotOracle(target).confirm(DAMAGED, target.failure)
+    (folder / "crc.stream").write_text(verdict.case())
+    (folder / "silence.stream").write_text(PASSES)
+    return image, folder, str(verdict.failure)
+
+
+@needs_sdcc
+def test_a_case_fails_with_the_mistake_and_passes_without(mirotwin, mistaken, tmp_path):
+    image, folder, verdict = mistaken
+    code, out, err = mirotwin("test", folder, "--firmware", image.path, "--junit", tmp_path / "j.xml")
+    lines = out.splitlines()
+    assert (code, err) == (1, "")
+    assert lines[0].startswith(f"FAILED  {folder}/crc.stream (")
+    assert lines[1:] == [
+        f"    expectation failed: {verdict}",
+        f"    mirotwin replay {folder}/crc.stream --firmware {image.path}",
+        "1 failed",
+    ]
+    assert ElementTree.parse(tmp_path / "j.xml").find(".//testcase").get("name") == "crc"
+    code, out, err = mirotwin("test", folder)
+    assert (code, err, out.splitlines()[-1]) == (0, "", "1 passed")
+
+
+def test_a_stream_that_is_named_may_expect_nothing(mirotwin, tmp_path):
+    (tmp_path / "a.stream").write_text(PASSES)
+    code, out, _ = mirotwin("test", tmp_path / "a.stream")
+    assert (code, out.splitlines()[-1]) == (0, "1 passed")
+
+
+def test_a_case_whose_check_has_no_occasion_any_more_fails(mirotwin, tmp_path):
+    head = '# mirotwin stream 2\n#: verdict = "acts_within_ms: .."\n#: expect.acts_within_ms = true\n'
+    (tmp_path / "a.stream").write_text(f"{head}2400000 > 55\n")
+    code, out, _ = mirotwin("test", tmp_path)
+    assert code == 1
+    assert "    expectation not judged: acts_within_ms: the run had no occasion for it" in out.splitlines()
+
+
+def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
+    (tmp_path / "a.stream").write_text("# mirotwin stream 2\nx\n")
+    (tmp_path / "b.stream").write_text(PASSES.replace("2\n", "2\n#: expect.no_fault = true\n", 1))
+    code, out, _ = mirotwin("test", tmp_path)
+    assert code == 2
+    assert f"{tmp_path}/a.stream:2:1: " in out
+    assert out.splitlines()[-1] == "1 cannot be run, 1 passed"
+
+
+def test_a_case_of_a_bare_processor_runs_on_any_image_and_ends_with_3_for_a_fault(mirotwin, tmp_path):
+    line = BareLine(bit_ticks=1152)
+    hex_file(tmp_path / "undefined.ihx", b"\xa5")
+    hex_file(tmp_path / "spins.ihx", b"\x80\xfe")
+    image = load_hex(tmp_path / "undefined.ihx")
+    header = case_text(image, line, [Transmission(5000, DOWN, b"a")], 9000)
+    expecting = header.replace("#: [bare]", "#: [expect]\n#: no_fault = true\n#: [bare]")
+    (tmp_path / "a.stream").write_text(expecting)
+    code, out, _ = mirotwin("test", tmp_path, "--firmware", tmp_path / "undefined.ihx")
+    assert code == 3
+    assert out.splitlines()[:2] == [
+        f"FAULT  {tmp_path}/a.stream",
+        "    expectation failed: no_fault: tick 12 (0.001 ms): firmware executed the undefined opcode A5 at"
+        " 0x0000, tick 12",
+    ]
+    code, out, _ = mirotwin("test", tmp_path, "--firmware", tmp_path / "spins.ihx")
+    assert (code, out.splitlines()[-1]) == (0, "1 passed")
+    code, out, _ = mirotwin("test", tmp_path)
+    assert (code, "which has no firmware of its own; give --firmware IMAGE.ihx" in out) == (2, True)
+
+
+def test_a_check_that_no_case_names_is_refused(mirotwin, tmp_path):
+    (tmp_path / "b.stream").write_text(PASSES)
+    code, _, err = mirotwin("test", tmp_path / "b.stream", "--check", "mine.py:judge")
+    assert code == 2
+    assert "--check: no case is judged by mine.py:judge; leave it out" in err
+
+
+def test_cases_of_the_robot_run_on_its_own_firmware(mirotwin, tmp_path):
+    (tmp_path / "a.stream").write_text(PASSES.replace("2\n", "2\n#: expect.frames_accepted_min = 1\n", 1))
+    code, _, _ = mirotwin("test", tmp_path, "--junit", tmp_path / "j.xml")
+    assert code == 1
+    assert own_image().sha256 in (tmp_path / "j.xml").read_text()
