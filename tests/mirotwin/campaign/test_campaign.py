@@ -32,11 +32,9 @@ def test_a_row_says_what_the_run_itself_says(alone):
     assert (row["run"], row["seed"], row["network.radio.bit_error_rate"]) == (4, 4, 0.01)
     assert (row["digest"], row["verdict"], row["error"]) == (tracks.digest, "passed", "")
     assert (row["rms_position_cm"], row["rms_x_cm"]) == (tracking.rms_position_cm, tracking.rms_x_cm)
-    assert row["frames_accepted"] == counters["link"]["frames_accepted"]
-    assert (row["bit_errors"], row["vision_frames"]) == (
-        counters["link"]["bit_errors"],
-        counters["vision"]["frames"],
-    )
+    link = counters["link"]
+    assert (row["frames_accepted"], row["bit_errors"]) == (link["frames_accepted"], link["bit_errors"])
+    assert row["vision_frames"] == counters["vision"]["frames"]
     assert (row["faults"], row["settled"]) == (0, track.errors[-1].settled)
     assert row["check.no_fault"] == "passed"
 
@@ -93,18 +91,24 @@ class Interrupted(Exception):
     pass
 
 
-@pytest.mark.parametrize("torn", [b"", b'{"run":5,"verd'])
-def test_a_campaign_that_was_broken_off_goes_on_and_makes_no_run_twice(alone, tmp_path, torn):
-    path = tmp_path / "short.parquet"
+def broken_off(path, after=1):
+    """The short campaign up to so many outcomes; its journal."""
 
     def interrupt(tally, outcome):
-        if tally.new == 2:
+        if tally.new == after:
             raise Interrupted
 
     with pytest.raises(Interrupted):
         campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
+    return journal_path(path)
+
+
+@pytest.mark.parametrize("torn", [b"", b'{"run":5,"verd'])
+def test_a_campaign_that_was_broken_off_goes_on_and_makes_no_run_twice(alone, tmp_path, torn):
+    path = tmp_path / "short.parquet"
+    journal = broken_off(path, after=2)
     assert not path.exists()
-    with journal_path(path).open("ab") as stream:
+    with journal.open("ab") as stream:
         stream.write(torn)
     tally = campaign.run(plan_of(), path, InThisProcess())
     assert (tally.done, tally.new) == (6, 4)
@@ -114,9 +118,8 @@ def test_a_campaign_that_was_broken_off_goes_on_and_makes_no_run_twice(alone, tm
 @pytest.mark.parametrize("length", [0, 1, 30, 60])
 def test_a_first_line_that_was_cut_off_is_written_again(alone, tmp_path, length):
     path = tmp_path / "short.parquet"
-    journal_path(path).write_bytes(
-        b'{"mirotwin_campaign":1,"hash":"0123456789abcdef0123456789abcdef'[:length]
-    )
+    first = b'{"mirotwin_campaign":1,"hash":"0123456789abcdef0123456789abcdef'
+    journal_path(path).write_bytes(first[:length])
     assert campaign.run(plan_of(), path, InThisProcess()).new == 6
     assert path.read_bytes() == alone.read_bytes()
 
@@ -151,16 +154,11 @@ def test_results_of_another_campaign_are_refused_and_replaced_only_by_force(alon
 
 def test_unfinished_results_of_another_campaign_are_refused(tmp_path):
     path = tmp_path / "short.parquet"
-
-    def interrupt(tally, outcome):
-        raise Interrupted
-
-    with pytest.raises(Interrupted):
-        campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
-    left = journal_path(path).read_bytes()
+    journal = broken_off(path)
+    left = journal.read_bytes()
     with pytest.raises(BadInput, match="unfinished results of another campaign"):
         campaign.run(plan_of(SHORT.replace("3-5", "3-6")), path, InThisProcess())
-    assert journal_path(path).read_bytes() == left
+    assert journal.read_bytes() == left
 
 
 def test_unfinished_results_without_a_single_outcome_are_in_nobodys_way(tmp_path):
@@ -200,16 +198,9 @@ def test_a_file_that_is_no_campaigns_part_is_refused(tmp_path, content):
 )
 def test_a_line_that_is_no_outcome_is_refused(tmp_path, line, words):
     path = tmp_path / "short.parquet"
-
-    def interrupt(tally, outcome):
-        raise Interrupted
-
-    with pytest.raises(Interrupted):
-        campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
-    head = journal_path(path).read_bytes().splitlines(keepends=True)[0]
-    journal_path(path).write_bytes(
-        head + line
-    )  # other threads may have written outcomes meanwhile, of run 5 too
+    journal = broken_off(path)
+    head = journal.read_bytes().splitlines(keepends=True)[0]
+    journal.write_bytes(head + line)  # other threads may have written outcomes meanwhile, of run 5 too
     with pytest.raises(BadInput, match=words):
         campaign.run(plan_of(), path, InThisProcess())
     assert not path.exists()

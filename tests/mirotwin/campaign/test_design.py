@@ -1,26 +1,28 @@
-"""What a campaign file says: its points in their order, its draws, and values as settings write them."""
+"""What a campaign file says: its points in their order, its draws, values as settings; and the one that is built in."""
 
 import contextlib
+import hashlib
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from mirotwin import campaign
 from mirotwin.campaign.columns import FIGURES
 from mirotwin.campaign.design import Design, Draw, Factor, Level, inline
-from mirotwin.campaign.file import parse
-from mirotwin.campaign.plan import parse_plan
+from mirotwin.campaign.file import BUILTIN, parse
+from mirotwin.campaign.plan import load_plan, parse_plan
 from mirotwin.campaign.plan import plan_of as joined
 from mirotwin.campaign.ranges import seeds_of
+from mirotwin.campaign.rows import ResultRows
+from mirotwin.commands import main
 from tests.mirotwin.campaign.plans import SHORT, plan_of
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"
-README = Path(__file__).parents[3] / "mirotwin" / "campaign" / "README.md"
-
+ROOT = Path(__file__).parents[3]
 VALUES = st.recursive(
     st.booleans()
     | st.integers(-(10**12), 10**12)
@@ -142,20 +144,6 @@ def test_two_campaigns_are_the_same_when_their_runs_and_checks_are(change, same)
     assert plan_of(path="elsewhere/other.toml").hash == plan_of().hash
 
 
-def test_the_example_and_the_file_in_the_readme_can_be_run(tmp_path):
-    assert campaign.load(EXAMPLE).runs == 240
-    text = README.read_text().split("```toml\n")[1].split("```")[0].replace('firmware = "mine.ihx"', "")
-    text = text.replace('firmware = ["", "mine.ihx"]', "").replace('scenario = ["fig6", "fig8"]', "")
-    assert campaign.parse(text, tmp_path / "c.toml").runs == 3 * 2 * 200 * 100
-
-
-def test_the_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("pyarrow")
-    monkeypatch.chdir(tmp_path)
-    exec(README.read_text().split("```python\n")[1].split("```")[0], {})
-    assert capsys.readouterr().out.count(",") == 3
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -220,3 +208,70 @@ def test_ranges_of_seeds_may_be_as_long_as_is_said():
     assert len(seeds_of("0-9999999", 10**7)) == 10**7
     with pytest.raises(ValueError, match="give 1 to 9"):
         seeds_of("0-9", 9)
+
+
+# Mirotwin-Bench 1: its fixed scenarios, and what an entry gets
+
+PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
+BRIEF = "duration_s=0.3"
+IMPROVED = ("network.robot.controller={law = 'body_frame'}", "network.robot.estimator={kind = 'ekf'}")
+SHOWN = ("rms_position_cm", "seen_position_cm", "settling_s", "unsettled", "chattering_m_s2", "effort_m_s2")
+
+
+def fixed():
+    """File of each scenario -> SHA-256, as the page has them."""
+    return dict(re.findall(r"^\| `(bench1/\w+\.toml)` \|.*\| `([0-9a-f]{12})` \|$", PAGE, re.M))
+
+
+@pytest.mark.parametrize(
+    ("name", "runs"), [("benchmarks/estimators.toml", 360), ("examples/campaign.toml", 240)]
+)
+def test_the_campaign_files_of_the_tree_can_be_run(name, runs):
+    assert load_plan(ROOT / name).runs == runs
+
+
+def test_the_scenarios_are_those_whose_hashes_the_page_has():
+    files = sorted((BUILTIN / "bench1").glob("*.toml"))
+    now = {f"bench1/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in files}
+    assert now == fixed(), "another scenario is another benchmark: bench2"
+
+
+def test_the_benchmark_has_five_scenarios_with_fifty_seeds_each():
+    plan = load_plan("bench1")
+    assert plan.runs == 250
+    assert {plan.varied(number)["scenario"] for number in range(plan.runs)} == set(fixed())
+    assert [plan.varied(number)["seed"] for number in range(50)] == list(range(50))
+
+
+def test_the_plan_is_the_same_wherever_the_program_is_installed(tmp_path):
+    for path in BUILTIN.rglob("*.toml"):
+        copy = tmp_path / path.relative_to(BUILTIN)
+        copy.parent.mkdir(exist_ok=True)
+        copy.write_bytes(path.read_bytes())
+    assert load_plan(tmp_path / "bench1.toml").hash == load_plan("bench1").hash
+
+
+def test_a_file_of_the_name_of_a_built_in_campaign_goes_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("bench1").write_text('scenario = "fig6"\n', encoding="utf-8")
+    assert load_plan("bench1").runs == 1
+
+
+def test_a_campaign_that_is_neither_file_nor_built_in_is_refused_with_the_names_of_those_that_are():
+    with pytest.raises(BadInput, match=r"no such file; .*built-in: bench1"):
+        load_plan("bench9")
+
+
+def test_an_entry_is_a_law_in_every_scenario_and_its_figures_and_digests_are_in_the_results(tmp_path):
+    results = tmp_path / "entry.parquet"
+    options = [word for setting in (BRIEF, *IMPROVED) for word in ("--set", setting)]
+    command = ["campaign", "bench1", "--seeds", "0", "--jobs", "1", "-q", "--out", str(results), *options]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 0, done.output
+    rows = ResultRows(results)
+    assert rows.count == 5
+    assert rows.about.campaign == "bench1"
+    assert len(set(rows.column("digest"))) == 5
+    for name in SHOWN:
+        assert name in rows.metrics()
+        assert f"`{name}`" in PAGE

@@ -1,31 +1,132 @@
-"""Workers that end, hang behind or are not like this process: a campaign goes on, or ends in a line."""
+"""Runs alone and in workers, and workers that end, hang behind or are not like this process."""
 
+import contextlib
 import gc
+import multiprocessing
 import os
 import signal
 import sys
 import threading
-from concurrent.futures import Executor, Future
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
 import mirotwin
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin import campaign
-from mirotwin.campaign.drive import Drive
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.drive import Drive, outcomes_of
+from mirotwin.campaign.plan import plan_of_levels
+from mirotwin.campaign.ranges import seeds_of
+from mirotwin.campaign.single import run_single
 from mirotwin.campaign.versions import NOT_OF_RUNS
 from mirotwin.campaign.worker import RunOutcome, work
-from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.campaign.workers import Processes, Workers, processes
+from mirotwin.recording.reader import read
+from mirotwin.recording.track import Tracks
+from mirotwin.report.summary import tracking_of
 from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
-pytestmark = pytest.mark.slow
-
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+
+
+def jobs(seeds, *settings):
+    plan = plan_of_levels("test", [Level("a", ("duration_s=1.0", *settings), "fig7")], seeds)
+    return [plan.work(run) for run in range(plan.runs)]
+
+
+def without_times(outcomes):
+    return [replace(one, wall_s=0.0) for one in outcomes]
+
+
+def test_without_delay_noise_and_error_the_camera_sees_the_truth():
+    exact = "camera={kind = 'gaussian', position_error_cm = 0.0, heading_error_deg = 0.0, pixel_cm = 0.0}"
+    for camera, near in ((exact, 0.1), (exact.replace("}", ", delay_frames = 3}"), 0.2)):
+        (job,) = jobs(range(1, 2), camera)
+        found = run_single(job).figures
+        assert found["seen_position_cm"] == pytest.approx(found["rms_position_cm"], rel=near)
+
+
+def test_of_several_robots_the_worst_error_has_a_column(short):
+    job = plan_of_levels("test", [Level("a", scenario=str(short))], range(5, 6)).work(0)
+    world, tracks = World(load(str(short)).scenario, 5, load_hex(image_path())), Tracks()
+    while not world.finished:
+        tracks.add(world.step())
+    errors = [tracking_of(track.errors).rms_position_cm for track in tracks.robots.values()]
+    found = run_single(job).figures
+    assert len(set(errors)) == 2
+    assert (found["rms_position_cm"], found["worst_rms_position_cm"]) == (errors[0], max(errors))
+
+
+@pytest.mark.slow
+def test_outcomes_come_in_the_order_of_the_jobs_and_are_the_same_from_processes():
+    plan = [*jobs(range(3)), *jobs(range(1), "network.robot.start_error_x_cm=40.0")]
+    alone = [replace(run_single(one), run=run) for run, one in enumerate(plan)]
+    assert without_times(outcomes_of(plan, Processes(2))) == without_times(alone)
+    assert len({one.digest for one in alone}) == 4
+
+
+def test_a_recording_is_that_of_the_run(tmp_path):
+    path = tmp_path / "one.mcap"
+    (job,) = jobs(range(2, 3))
+    outcome = run_single(replace(job, recording=str(path)))
+    assert read(path).digest == outcome.digest == run_single(job).digest
+
+
+def test_whoever_stops_asking_leaves_no_job_behind(monkeypatch):
+    made = []
+
+    def slow(job):
+        time.sleep(0.02)
+        made.append(job.run)
+        return RunOutcome(job.run)
+
+    monkeypatch.setattr("mirotwin.campaign.drive.work", slow)
+    with ThreadPoolExecutor(1) as executor:
+        asking = outcomes_of(100 * jobs(range(1)), Workers(executor))
+        assert next(asking).run == 0
+        asking.close()
+    assert len(made) < 7
+
+
+def test_the_processes_ignore_ctrl_c_from_their_first_instruction():
+    before = signal.getsignal(signal.SIGINT)
+    with processes(2) as executor:
+        for child in multiprocessing.active_children():
+            os.kill(child.pid, signal.SIGINT)
+        assert executor.submit(len, "ab").result() == 2
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("0-49", range(50)), ("7", range(7, 8)), ("3-3", range(3, 4))])
+def test_seeds_are_written_with_the_last_one(text, seeds):
+    assert seeds_of(text) == seeds
+
+
+@given(st.text(max_size=60))
+def test_any_other_text_is_refused(text):
+    with contextlib.suppress(ValueError):
+        assert 1 <= len(seeds_of(text)) <= 1000
+
+
+@pytest.mark.parametrize("text", ["", "-", "9-0", "a", "0-49-50", "0:50", "0-1000", "1" * 41, "0-\n"])
+def test_what_is_no_range_is_refused_in_a_line(text):
+    with pytest.raises(ValueError, match=r"^[^\n]*\Z"):
+        seeds_of(text)
+
+
+# Workers that end, or are not like this process
 
 
 def killing(job):
@@ -35,6 +136,7 @@ def killing(job):
     return work(job)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_its_process_each_time_is_a_row_and_costs_no_other(monkeypatch, tmp_path, alone):
     monkeypatch.setattr("mirotwin.campaign.drive.work", killing)
     path = tmp_path / "short.parquet"
@@ -45,6 +147,7 @@ def test_a_run_that_ends_its_process_each_time_is_a_row_and_costs_no_other(monke
     assert [*found[:4], *found[5:]] == [*whole[:4], *whole[5:]]
 
 
+@pytest.mark.slow
 def test_a_process_keeps_nothing_of_the_runs_that_it_has_done():
     def worlds():
         gc.collect()
@@ -56,6 +159,7 @@ def test_a_process_keeps_nothing_of_the_runs_that_it_has_done():
     assert worlds() == before
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
     path = tmp_path / "short.parquet"
     executors, killed = [], []
@@ -80,6 +184,7 @@ def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
     assert whole.items() <= found.items()
 
 
+@pytest.mark.slow
 def test_workers_that_end_at_once_end_the_campaign_in_a_line(monkeypatch, tmp_path):
     monkeypatch.setattr("mirotwin.campaign.drive.FRUITLESS", 2)
 
@@ -93,6 +198,7 @@ def test_workers_that_end_at_once_end_the_campaign_in_a_line(monkeypatch, tmp_pa
         campaign.run(plan_of(), tmp_path / "short.parquet", Broken(1))
 
 
+@pytest.mark.slow
 def test_a_worker_with_another_version_or_firmware_is_refused_by_name(monkeypatch, tmp_path):
     plan = plan_of()
     other = replace(plan, versions=replace(plan.versions, mirotwin="0.0.7"))
@@ -106,6 +212,7 @@ def test_a_worker_with_another_version_or_firmware_is_refused_by_name(monkeypatc
         campaign.run(replace(plan, images=images), tmp_path / "c.parquet", InThisProcess())
 
 
+@pytest.mark.slow
 def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
     script = (
         "import sys, mirotwin.campaign.worker, mirotwin.campaign.workers\n"
@@ -116,6 +223,7 @@ def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
     assert done.stdout == "[]\n"
 
 
+@pytest.mark.slow
 def test_a_run_uses_no_source_that_is_left_out_of_the_hash_of_its_sources():
     script = (
         "import sys; from tests.mirotwin.campaign.plans import plan_of\n"
@@ -130,25 +238,20 @@ def test_a_run_uses_no_source_that_is_left_out_of_the_hash_of_its_sources():
     assert all((Path(mirotwin.__file__).parent / name).is_dir() for name in NOT_OF_RUNS)
 
 
+@pytest.mark.slow
 def test_the_uncompiled_engine_writes_the_same_bytes(tmp_path):
     (tmp_path / "short.toml").write_text(SHORT.replace("3-5", "3").replace("0.3", "0.04"))
-    command = [
-        sys.executable,
-        "-c",
-        "from mirotwin.entry import main; main()",
-        "campaign",
-        "short.toml",
-        "-q",
-    ]
+    program = [sys.executable, "-c", "from mirotwin.entry import main; main()"]
+    command = [*program, "campaign", "short.toml", "-q"]
     for name in ("compiled", "python"):
         if name == engine.active() or name == "python":
             words = [*command, "--jobs", "1", "--engine", name, "--out", f"{name}.parquet"]
             children.run(words, cwd=tmp_path, check=True)
-    assert (tmp_path / f"{engine.active()}.parquet").read_bytes() == (
-        tmp_path / "python.parquet"
-    ).read_bytes()
+    own, other = (tmp_path / f"{name}.parquet" for name in (engine.active(), "python"))
+    assert own.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.slow
 def test_at_most_so_many_runs_are_ahead_of_the_first_that_is_missing(monkeypatch):
     monkeypatch.setattr("mirotwin.campaign.drive.SPREAD", 10)
     held, handed = Future(), []
