@@ -16,11 +16,8 @@ import sys
 from collections import Counter
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario import file as scenario_file
 from miro_sim.world.saved import opened, sealed
-from miro_sim.world.world import World
+from tests.sim.world.rig import world_of
 
 LIMIT_S = 120
 """So long a load and a period may take; then the process ends with a traceback and exit code 1."""
@@ -49,8 +46,7 @@ REALS = (0.0, -0.0, float("nan"), float("inf"), float("-inf"), 1e300, -1e300, 1e
 
 def fresh(profile="wire"):
     """A world of two robots at tick 0, firmware and seed always the same."""
-    scenario = scenario_file.parse(SCENARIO.format(profile=profile), "mutated")
-    return World(scenario, 11, load_hex(image_path()))
+    return world_of(SCENARIO.format(profile=profile), seed=11)
 
 
 def saved_worlds(profile="wire"):

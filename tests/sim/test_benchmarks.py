@@ -12,14 +12,11 @@ from hypothesis import strategies as st
 from benchmarks import chain, disturbances, frame_loss, gains, improved
 from benchmarks.gains import FAMILIES, PATHS, Budget, Drive, Outcome, Search, Task
 from benchmarks.interval import clopper_pearson, wilson
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_sim.pitch import ground
-from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario.build import dead_s
 from miro_sim.scenario.file import load
-from miro_sim.world.world import World
 from mirotwin.campaign.single import run_single
+from tests.sim.world.rig import finished, image, world_of
 
 PAGE = Path(__file__).parents[2] / "docs/disturbances.md"
 
@@ -221,10 +218,7 @@ SHORT = ("duration_s=2.0", 'camera={kind="gaussian"}', 'network.robot.controller
 
 
 def run_world(*sets, seed=1, scenario="fig6"):
-    world = World(scenario_file.load(scenario, (*SHORT, *sets)).scenario, seed, load_hex(image_path()))
-    while not world.finished:
-        world.step()
-    return world
+    return finished(world_of(scenario, *SHORT, *sets, seed=seed))
 
 
 def run_case(name, estimator):
@@ -279,18 +273,14 @@ def test_the_case_of_lost_frames_loses_a_fifth_of_them():
 
 @pytest.mark.parametrize(("robots", "expected_s"), [(3, 0.02796), (5, 0.03629)])
 def test_the_pilot_is_told_the_delay_of_its_network(robots, expected_s):
-    scenario = scenario_file.load("fig6", (f"network.robots={robots}",)).scenario
-    assert dead_s(scenario, scenario.networks[0]) == pytest.approx(expected_s, abs=1e-5)
-    world = World(scenario, 0, load_hex(image_path()))
-    assert world.networks[0].robots[0].pilot.dead_s == dead_s(scenario, scenario.networks[0])
+    world = world_of("fig6", f"network.robots={robots}")
+    assert dead_s(world.scenario, world.scenario.networks[0]) == pytest.approx(expected_s, abs=1e-5)
+    assert world.networks[0].robots[0].pilot.dead_s == dead_s(world.scenario, world.scenario.networks[0])
 
 
 def test_the_cost_is_that_of_both_loops_over_all_periods():
-    image = load_hex(image_path())
-    plain, ours = (
-        chain.world("fig6", "yang_kim", "none", image),
-        chain.world("fig6", "body_frame", "ekf", image),
-    )
+    chains = ("yang_kim", "none"), ("body_frame", "ekf")
+    plain, ours = (chain.world("fig6", *each, image()) for each in chains)
     spent = chain.pair(plain, ours)
     assert plain.finished
     assert ours.finished

@@ -7,14 +7,11 @@ from hypothesis import strategies as st
 from miro_host.pilot import STANDSTILL, WheelCommand
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.scenario.keys import ControlNoise
 from miro_sim.world.control_noise import NoisyCommands
-from miro_sim.world.world import World
+from tests.sim.world.rig import world_of
 
-IMAGE = load_hex(image_path())
 WHEELS = Wheels()
 TEXT = """
 name = "noisy"
@@ -66,7 +63,7 @@ def test_draws_are_even_over_the_bounds_and_new_in_each_period():
 
 
 def run(lines, seed=2, periods=12):
-    world = World(parse(TEXT.format(lines), "noisy.toml"), seed, IMAGE)
+    world = world_of(TEXT.format(lines), seed=seed)
     return world, [world.step() for _ in range(periods)]
 
 

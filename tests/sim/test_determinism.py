@@ -11,45 +11,15 @@ from hypothesis import strategies as st
 
 from miro_exact import engine
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario import file as scenario_file
-from miro_sim.scenario.profiles import profiles
-from miro_sim.world.world import World
 from tests import children
 from tests.sim import digests
 from tests.sim.engines import Checkpoint, compare, lockstep
 from tests.sim.machines import MACHINES, ROOT, Missing, Refused, check_tools, run
+from tests.sim.world.rig import fig6
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 GOLDEN = json.loads(digests.GOLDEN.read_text())
 SHORT = GOLDEN[digests.SHORT]
-SHORT_RADIO = """
-name = "short"
-duration_s = 0.1
-
-[[network]]
-radio.profile = "{profile}"
-
-[[network.robot]]
-slot = 0
-reference.kind = "line"
-
-[[network.robot]]
-slot = 2
-reference.kind = "arc"
-
-[[network]]
-radio.profile = "{profile}"
-
-[[network.robot]]
-slot = 1
-reference.kind = "line"
-"""
-
-
-def world():
-    return World(scenario_file.load("fig6", ["duration_s=0.5"]).scenario, 7, load_hex(image_path()))
 
 
 def test_another_seed_gives_other_bits():
@@ -101,7 +71,7 @@ def test_recording_everything_changes_nothing(tmp_path):
 
 @pytest.mark.parametrize("cut_ticks", [12, 40_009, CONTROL_PERIOD_TICKS - 1, 3 * CONTROL_PERIOD_TICKS + 5])
 def test_any_cutting_of_a_run_gives_the_same_state(cut_ticks):
-    whole, cut = world(), world()
+    whole, cut = fig6(), fig6()
     end = 4 * CONTROL_PERIOD_TICKS if cut_ticks > 12 else 60_000
     whole.run_to(end)
     tick = 0
@@ -109,30 +79,6 @@ def test_any_cutting_of_a_run_gives_the_same_state(cut_ticks):
         tick = min(end, tick + cut_ticks)
         cut.run_to(tick)
     assert cut.state.save() == whole.state.save()
-
-
-@pytest.mark.parametrize("at_tick", [5_000, 801_000, 1_000_003, 1_321_777, 2_500_001])
-def test_a_world_saved_anywhere_and_loaded_elsewhere_goes_on_with_the_same_bits(at_tick):
-    first, second = world(), world()
-    first.run_to(at_tick)
-    second.load(first.save())
-    for period in range(1, 6):
-        first.run_to(period * CONTROL_PERIOD_TICKS)
-        second.run_to(period * CONTROL_PERIOD_TICKS)
-        assert second.state.save() == first.state.save()
-    assert second.digest == first.digest
-
-
-@pytest.mark.parametrize("profile", sorted(profiles()))
-@pytest.mark.parametrize("seed", [0, 1, 7])
-def test_every_radio_profile_gives_one_digest_however_the_run_is_cut(profile, seed):
-    text = SHORT_RADIO.format(profile=profile)
-    worlds = [World(scenario_file.parse(text, "short"), seed, load_hex(image_path())) for _ in range(2)]
-    worlds[0].step()
-    for tick in range(8192, CONTROL_PERIOD_TICKS, 8192):
-        worlds[1].run_to(tick)
-    worlds[1].step()
-    assert worlds[0].digest == worlds[1].digest
 
 
 def test_the_table_has_a_run_of_everything_and_no_other():

@@ -12,12 +12,11 @@ from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
 from miro_host.plugins import PluginError
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario.file import load, parse
+from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from tests.host.own_laws import LeakyParameters, WrongParameters
 from tests.sim.mutated_worlds import with_field
+from tests.sim.world.rig import finished, image, world_of
 
 PERIODS = 24
 NOTHING_HEARD = struct.pack("<q4B2q2B", -1, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -38,13 +37,13 @@ class Listener(Law[LawParameters]):
         return Velocities(0.1 + count * 1e-5, 0.0, {"position_left": count})
 
 
-def world(parameters, seed=7, estimator=None):
+def world(parameters, estimator=None):
     scenario = load("fig6").scenario
     network = scenario.networks[0]
     chosen = {} if estimator is None else {"estimator": estimator}
     robot = msgspec.structs.replace(network.robot[0], controller=parameters, **chosen)
     network = msgspec.structs.replace(network, robot=(robot,))
-    return World(msgspec.structs.replace(scenario, networks=(network,)), seed, load_hex(image_path()))
+    return World(msgspec.structs.replace(scenario, networks=(network,)), 7, image())
 
 
 def finish(one):
@@ -143,9 +142,7 @@ estimator.kind = "KIND"
 
 def behind_m(kind):
     """How far the robot runs from the reference in the end, along the line."""
-    one = World(parse(QUIET.replace("KIND", kind), "quiet"), 0, load_hex(image_path()))
-    while not one.finished:
-        last = one.step().robots[0]
+    last = finished(world_of(QUIET.replace("KIND", kind))).last.robots[0]
     return abs(last.truth.x_m - last.reference.x_m)
 
 

@@ -9,16 +9,13 @@ from click.testing import CliRunner
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import ScenarioError, parse
-from miro_sim.world.world import World
 from mirotwin.commands import main
+from tests.sim.world.rig import world_of
 
 README = Path(__file__).parents[2] / "sim/miro_sim/radio/README.md"
-IMAGE = load_hex(image_path())
 NETWORK = """
 [[network]]
 [network.radio]
@@ -175,8 +172,8 @@ def test_the_command_line_lists_the_profiles_with_their_keys():
         assert name in result.stdout
 
 
-def world(*radios, seed=7):
-    return World(parse(text(*radios), "air.toml"), seed, IMAGE)
+def world(*radios):
+    return world_of(text(*radios))
 
 
 def ran(world, periods=6):

@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 
 from miro_host.estimators.predict import NoEstimator, PredictParameters
 from miro_host.registries import LAWS
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_robot.lm629.options import CHOICES
 from miro_sim.scenario.camera_keys import PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_text, load, parse
 from miro_sim.scenario.keys import Scenario
-from miro_sim.world.world import World
+from tests.sim.world.rig import finished, world_of
 
 SMALL = """
 name = "small"
@@ -394,8 +392,7 @@ def test_every_choice_is_named_to_who_chooses_another(name):
 
 
 def chips_world(options):
-    scenario = parse(with_chips(options).replace("duration_s = 1", "duration_s = 0.1"), "chips")
-    return World(scenario, 0, load_hex(image_path()))
+    return world_of(with_chips(options), "duration_s=0.1")
 
 
 def test_both_chips_of_a_robot_follow_the_table():
@@ -407,10 +404,7 @@ def test_both_chips_of_a_robot_follow_the_table():
 
 def test_another_reading_gives_another_run_and_the_default_one_the_same():
     def digest(options):
-        world = chips_world(options)
-        while not world.finished:
-            world.step()
-        return world.digest
+        return finished(chips_world(options)).digest
 
     assert digest("") == digest("busy_clocks = 120")
     assert digest("") != digest("busy_clocks = 240")

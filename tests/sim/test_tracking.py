@@ -6,21 +6,17 @@ import statistics
 import pytest
 
 from miro_protocol.decoder import Decoder, Received
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario.file import load
-from miro_sim.world.world import World
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
+from tests.sim.world.rig import world_of
 
-IMAGE = load_hex(image_path())
 LAWS = ["body_frame", "kanayama", "dynamic_feedback"]
 GAUSSIAN = 'camera={kind="gaussian"}'
 
 
 def errors_cm(name, seed, *settings):
     """Distances of the robot from its reference, at each camera frame."""
-    world, errors = World(load(name, settings).scenario, seed, IMAGE), []
+    world, errors = world_of(name, *settings, seed=seed), []
     while not world.finished:
         robot = world.step().robots[0]
         truth, reference = robot.truth, robot.reference
@@ -116,10 +112,9 @@ class Observer:
 
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
 def test_the_figure_is_tracked_within_the_papers_measurement_error(name):
-    scenario = load(name).scenario
     errors = []
     for seed in range(10):
-        world = World(scenario, seed, IMAGE)
+        world = world_of(name, seed=seed)
         observer = Observer(world)
         periods = []
         while not world.finished:

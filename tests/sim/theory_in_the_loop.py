@@ -13,13 +13,10 @@ from itertools import pairwise
 from rich.console import Console
 from rich.table import Table
 
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario.file import load
-from miro_sim.world.world import World
 from mirotwin.recording.theory_track import PERIOD_S
 from mirotwin.recording.track import Tracks
 from mirotwin.report.theory import gains_of, theory_of
+from tests.sim.world.rig import world_of
 
 CONTROLLER = "network.robot.controller"
 BODY = [f'{CONTROLLER}={{law="body_frame"}}', 'network.robot.estimator={kind="predict"}']
@@ -36,8 +33,7 @@ RUNS = {
 def run(name, seed):
     """The theory of a run, and the rms of f1 and f2 if commands are compared with the motion a period later."""
     scenario, settings = RUNS[name]
-    text = load(scenario, settings)
-    world, tracks, robots = World(text.scenario, seed, load_hex(image_path())), Tracks(), []
+    world, tracks, robots = world_of(scenario, *settings, seed=seed), Tracks(), []
     while not world.finished:
         period = world.step()
         tracks.add(period)
@@ -51,7 +47,7 @@ def run(name, seed):
             f = (command[axis] - before[axis] - second[axis] + first[axis]) / PERIOD_S
             squares.append(f * f)
         late.append(math.sqrt(math.fsum(squares) / len(squares)))
-    return theory_of(tracks.robots[0, 0].theory, gains_of(text.scenario)[0, 0]), late
+    return theory_of(tracks.robots[0, 0].theory, gains_of(world.scenario)[0, 0]), late
 
 
 def of_disturbance(name):

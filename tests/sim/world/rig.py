@@ -1,4 +1,6 @@
-"""Worlds for the tests of waiting and injecting: the built-in line, with other hosts and more robots."""
+"""Worlds for tests: of built-in scenarios, of a text, and the line with other hosts and more robots."""
+
+from functools import cache
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
@@ -29,18 +31,30 @@ reference.kind = "arc"
 slot = 1
 reference.kind = "line"
 """
-_IMAGES = []
 
 
+@cache
 def image():
-    if not _IMAGES:
-        _IMAGES.append(load_hex(image_path()))
-    return _IMAGES[0]
+    return load_hex(image_path())
 
 
-def fig6(seed=SEED, **options):
-    return World(file.load("fig6").scenario, seed, image(), **options)
+def world_of(source, *settings, seed=SEED, **options):
+    """A world of a built-in scenario, or of a scenario's text, with settings."""
+    text = "\n" in source
+    scenario = file.parse(source, "text", settings) if text else file.load(source, settings).scenario
+    return World(scenario, seed, image(), **options)
 
 
-def two_networks(host="", seed=SEED, **options):
-    return World(file.parse(TWO_NETWORKS.format(host=host), "two"), seed, image(), **options)
+def finished(world):
+    """The same world at its end."""
+    while not world.finished:
+        world.step()
+    return world
+
+
+def fig6(**options):
+    return world_of("fig6", **options)
+
+
+def two_networks(host="", **options):
+    return world_of(TWO_NETWORKS.format(host=host), **options)

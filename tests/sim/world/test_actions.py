@@ -9,13 +9,11 @@ from miro_exact.clock import ticks
 from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import DOWNLINK
-from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
 from miro_sim.world.actions import POWER, RESET, Waiting
 from miro_sim.world.waits import WaitExpired
-from miro_sim.world.world import World
 from tests.children import uncompiled
-from tests.sim.world.rig import PERIOD, fig6, image, two_networks
+from tests.sim.world.rig import PERIOD, fig6, two_networks, world_of
 
 HELD, RUNS, OFF, ON = 1, 0, 0, 1
 BOOTED_TICK = ticks(0.060)
@@ -23,9 +21,7 @@ SPEED = 800
 
 
 def silent(**options):
-    return World(
-        load("fig6", ["network.host=silent", "network.radio.profile=wire"]).scenario, 7, image(), **options
-    )
+    return world_of("fig6", "network.host=silent", "network.radio.profile=wire", **options)
 
 
 def driving(**options):
@@ -259,7 +255,7 @@ def digest_of_actions():
     actions += [Reset(900_001, 0, 0, HELD), Reset(900_400, 0, 0, RUNS)]
     actions += [Power(1_200_000, 0, 0, OFF), RadioState(1_300_000, 0, "down"), Power(1_500_123, 0, 0, ON)]
     settings = ["network.host=silent", "network.radio.profile=fade15", "camera={kind = 'gaussian'}"]
-    world = World(load("fig6", settings).scenario, 7, image(), script=actions)
+    world = world_of("fig6", *settings, script=actions)
     world.run_to(3 * PERIOD)
     return world.digest
 

@@ -11,11 +11,9 @@ from hypothesis import strategies as st
 from miro_sim.pitch.contact import GRID_TICKS, next_look, touch
 from miro_sim.pitch.ground import ROBOT_HALF_M as HALF_M
 from miro_sim.plant.params import DriveParams
-from miro_sim.scenario import file
 from miro_sim.world import conditions as wait
 from miro_sim.world.waits import WaitExpired
-from miro_sim.world.world import World
-from tests.sim.world.rig import image
+from tests.sim.world.rig import world_of
 
 HEAD_ON = """
 name = "head-on"
@@ -100,7 +98,7 @@ def test_no_look_is_needed_before_they_can_meet():
 
 
 def head_on(gap_cm):
-    return World(file.parse(HEAD_ON.format(gap_cm=gap_cm), "head-on"), 3, image())
+    return world_of(HEAD_ON.format(gap_cm=gap_cm), seed=3)
 
 
 def test_two_robots_that_meet_are_reported_at_the_first_tick_of_the_grid_at_which_they_touch():
@@ -139,7 +137,7 @@ reference.speed_m_s = {4}
         robot.format(slot, 11 * slot, draw.uniform(-3, 3), 3.1 * (slot % 2), draw.choice((0.0, 0.3, 0.6)))
         for slot in range(5)
     )
-    return World(file.parse(text, "crowd"), 3, image())
+    return world_of(text, seed=3)
 
 
 def touches(world):
@@ -214,7 +212,7 @@ drive.battery.voltage_v = 1
 
 @pytest.mark.parametrize("cut_ticks", [800_800, 300_007])
 def test_a_robot_that_a_force_pushes_faster_than_it_drives_is_reported_where_it_touches(cut_ticks):
-    world, slow = (World(file.parse(PUSHED, "pushed"), 3, image()) for _ in range(2))
+    world, slow = (world_of(PUSHED, seed=3) for _ in range(2))
     end_tick = 15 * 800_800
     while world.tick < end_tick:
         world.run_to(min(end_tick, world.tick + cut_ticks))

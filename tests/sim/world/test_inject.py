@@ -7,11 +7,9 @@ from hypothesis import strategies as st
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.transmission import Transmission
-from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
-from miro_sim.world.world import World
 from tests.sim.world.random_cuts import differing, differing_ticks
-from tests.sim.world.rig import PERIOD, fig6, image, two_networks
+from tests.sim.world.rig import PERIOD, fig6, image, two_networks, world_of
 
 FRAME = encode(TeamFrame(0, 5, ((100, 100), (0, 0), (0, 0))), 3)
 KEYUP_TICKS = 24_000
@@ -75,16 +73,13 @@ def test_what_is_announced_at_the_begin_of_a_period_is_not_in_the_digest_of_the_
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.005])
 def test_what_is_injected_at_the_last_moment_of_a_period_gives_the_digest_of_a_script(latency_s):
-    scenario = load(
-        "fig6", ["duration_s=0.3", "network.host=silent", f"network.radio.latency_s={latency_s}"]
-    ).scenario
-    live = World(scenario, 7, image())
-    script = []
+    settings = "duration_s=0.3", "network.host=silent", f"network.radio.latency_s={latency_s}"
+    live, script = world_of("fig6", *settings), []
     for seq in range(4):
         live.run_to((seq + 1) * PERIOD)
         data = encode(TeamFrame(0, seq, ((1, 2),) * 3), 3)
         script.append(Transmission(live.inject(data), ">", data))
-    scripted = World(scenario, 7, image(), script)
+    scripted = world_of("fig6", *settings, script=script)
     for world in (live, scripted):
         world.run_to(8 * PERIOD)
     assert live.digest == scripted.digest

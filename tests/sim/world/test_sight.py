@@ -10,14 +10,12 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.grabber import Grabber
 from miro_host.eye.track import Sighting
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
 from miro_sim.scenario.camera_keys import CalibrationErrorSizes, GeometricCamera
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.world.sight import calibration_for
 from miro_sim.world.world import World
+from tests.sim.world.rig import image
 
-IMAGE = load_hex(image_path())
 ROBOT = """
 [[network.robot]]
 slot = {}
@@ -37,7 +35,7 @@ def scenario(camera, robots=((0, 0, 0),), others=()):
 
 
 def world(camera, *robots, others=(), seed=3):
-    return World(scenario(camera, robots or ((0, 0, 0),), others), seed, IMAGE)
+    return World(scenario(camera, robots or ((0, 0, 0),), others), seed, image())
 
 
 def measured(one, periods=20):
