@@ -5,7 +5,7 @@
     python -m tests.fuzz.process TARGET ENGINE choose FOLDER ..                     the inputs that are kept
     python -m tests.fuzz.process TARGET ENGINE once FILE                            one input, and what comes of it
 
-Under Atheris, Python code of ours, and what it reads with, is instrumented when the target imports it. With `compiled`
+Under Atheris, Python code of ours, and what it reads with, is instrumented when it is imported. With `compiled`
 the hot modules are what the build made of them: without the sanitizers' build coverage does not see into them.
 """
 

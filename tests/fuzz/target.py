@@ -25,7 +25,7 @@ _VALUES = re.compile(r"""['"`].*['"`]|[0-9]+""")
 
 
 class Target(NamedTuple):
-    """`make` imports what is fuzzed and returns the function that takes the bytes.
+    """`make` returns the function that takes the bytes.
 
     `engine`: which twin of hot modules runs without the sanitizers: coverage sees into `python` ones, and `compiled`
     ones are what people use. `words`: what a file of the kind is made of. `most_bytes`: longer inputs tell no more.
@@ -36,6 +36,11 @@ class Target(NamedTuple):
     engine: str = "compiled"
     most_bytes: int = 4096
     words: Sequence[bytes] = ()
+
+
+def always(run):
+    """The `make` of a target that needs no preparation."""
+    return lambda: run
 
 
 def refused(error):

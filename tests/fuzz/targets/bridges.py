@@ -3,8 +3,13 @@
 import contextlib
 import os
 import socket
+from selectors import DefaultSelector
 from typing import Any
 
+from mirotwin.ports.endpoint import PortContext
+from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
+from mirotwin.ports.sockets import TcpEndpoint
+from mirotwin.ports.terminal import PtyEndpoint
 from tests.fuzz.target import Draws, Target, pieces
 
 
@@ -28,16 +33,10 @@ class _Radio:
 
 
 def _context(radio, told):
-    from selectors import DefaultSelector
-
-    from mirotwin.ports.endpoint import PortContext
-
     return PortContext(radio, DefaultSelector(), told.append)
 
 
 def _negotiation():
-    from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
-
     told = []
     whole, parts, other = (Rfc2217Endpoint(_context(_Radio(), told), "127.0.0.1", 0) for _ in range(3))
 
@@ -162,10 +161,6 @@ class _TerminalClient:
 
 
 def _sockets(kind):
-    from mirotwin.ports.rfc2217 import Rfc2217Endpoint
-    from mirotwin.ports.sockets import TcpEndpoint
-    from mirotwin.ports.terminal import PtyEndpoint
-
     def run(data):
         radio, told = _Radio(), []
         context = _context(radio, told)

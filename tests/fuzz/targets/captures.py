@@ -1,43 +1,43 @@
 """Files of characters: streams, pcapng, hex text, and what `decode` and `export` make of any file."""
 
+from collections import Counter
+from io import BytesIO
 from itertools import islice
 
-from tests.fuzz.target import Target, folder, pieces, refused
+from miro_exact.bad_input import BadInput
+from miro_protocol import pcapng, stream
+from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
+from mirotwin.recording.capture import render
+from mirotwin.recording.capture.detect import FORMATS, detect
+from mirotwin.recording.capture.hextext import HexError, HexText
+from mirotwin.recording.capture.input import Input
+from mirotwin.recording.capture.layout import robots_in
+from mirotwin.recording.capture.rows import rows
+from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from tests.fuzz.target import Target, always, folder, pieces, refused
 
 _SOURCE = "fuzz.stream"
 _MOST = 5_000
 """Transmissions that are looked at: a short capture can hold no more anyway."""
 
 
-def _stream():
-    from miro_exact.bad_input import BadInput
-    from miro_protocol import stream
-
-    def run(data):
-        try:
-            found = stream.decode(data, _SOURCE)
-        except BadInput as error:
-            return refused(error)
-        outcome = "taken"
-        try:
-            found.script()
-        except BadInput as error:
-            outcome = refused(error)
-        again = stream.decode(stream.format_stream(found.entries, found.header).encode(), _SOURCE)
-        assert again.entries == found.entries, "written and read again, the lines differ"
-        assert again.header == found.header, "written and read again, the header differs"
-        return outcome
-
-    return run
+def _stream(data):
+    try:
+        found = stream.decode(data, _SOURCE)
+    except BadInput as error:
+        return refused(error)
+    outcome = "taken"
+    try:
+        found.script()
+    except BadInput as error:
+        outcome = refused(error)
+    again = stream.decode(stream.format_stream(found.entries, found.header).encode(), _SOURCE)
+    assert again.entries == found.entries, "written and read again, the lines differ"
+    assert again.header == found.header, "written and read again, the header differs"
+    return outcome
 
 
 def _pcapng():
-    from collections import Counter
-    from io import BytesIO
-
-    from miro_protocol import pcapng
-    from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
-
     def read(source, passed_over):
         found = []
         try:
@@ -63,8 +63,6 @@ def _pcapng():
 
 
 def _hex_text():
-    from mirotwin.recording.capture.hextext import HexError, HexText
-
     def read(parts):
         text, found = HexText("fuzz.txt"), b""
         try:
@@ -86,44 +84,33 @@ def _hex_text():
     return run
 
 
-def _capture():
-    from miro_exact.bad_input import BadInput
-    from mirotwin.recording.capture import render
-    from mirotwin.recording.capture.detect import FORMATS, detect
-    from mirotwin.recording.capture.input import Input
-    from mirotwin.recording.capture.layout import robots_in
-    from mirotwin.recording.capture.rows import rows
-    from mirotwin.recording.capture.source import READ_ERRORS, open_source
-
-    def run(data):
-        forced, data = (data[0], data[1:]) if data else (0, b"")
-        path = folder() / "fuzz.capture"
-        path.write_bytes(data)
-        said = []
-        with Input(str(path)) as given:
-            format, about = detect(given.peek())
-            assert about.isprintable()
-            format = FORMATS[forced % len(FORMATS)] if forced < 2 * len(FORMATS) else format
-            outcome, sent = "taken", []
-            source = open_source(given, format, said.append)
-            try:
-                sent += islice(source.sent, _MOST)
-            except READ_ERRORS as error:
-                outcome = refused(error)
-        assert all(line.isprintable() for line in said), said
-        layouts = {one.network: robots_in(sent, one.network)[0] for one in sent}
-        for row in rows(sent, layouts.__getitem__):
-            assert render.table_line(row, source.timed).isprintable()
-            render.json_line(row, source.timed)
+def _capture(data):
+    forced, data = (data[0], data[1:]) if data else (0, b"")
+    path = folder() / "fuzz.capture"
+    path.write_bytes(data)
+    said = []
+    with Input(str(path)) as given:
+        format, about = detect(given.peek())
+        assert about.isprintable()
+        format = FORMATS[forced % len(FORMATS)] if forced < 2 * len(FORMATS) else format
+        outcome, sent = "taken", []
+        source = open_source(given, format, said.append)
         try:
-            for convert_to in (render.to_pcapng(sent), render.to_stream(sent, layouts.__getitem__)):
-                for _ in convert_to:
-                    pass
-        except BadInput as error:
-            outcome += f", {refused(error)}"
-        return f"{format}: {outcome}"
-
-    return run
+            sent += islice(source.sent, _MOST)
+        except READ_ERRORS as error:
+            outcome = refused(error)
+    assert all(line.isprintable() for line in said), said
+    layouts = {one.network: robots_in(sent, one.network)[0] for one in sent}
+    for row in rows(sent, layouts.__getitem__):
+        assert render.table_line(row, source.timed).isprintable()
+        render.json_line(row, source.timed)
+    try:
+        for convert_to in (render.to_pcapng(sent), render.to_stream(sent, layouts.__getitem__)):
+            for _ in convert_to:
+                pass
+    except BadInput as error:
+        outcome += f", {refused(error)}"
+    return f"{format}: {outcome}"
 
 
 STREAM_WORDS = (
@@ -132,8 +119,8 @@ STREAM_WORDS = (
 ).split(b"|")
 
 TARGETS = {
-    "stream": Target("stream files and their headers, written again", _stream, words=STREAM_WORDS),
+    "stream": Target("stream files and their headers, written again", always(_stream), words=STREAM_WORDS),
     "pcapng": Target("captures, also from a pipe, written again", _pcapng, most_bytes=2048),
     "hextext": Target("hexadecimal text, cut anywhere", _hex_text, most_bytes=256),
-    "capture": Target("any file as `decode` and `export` read it", _capture, words=STREAM_WORDS),
+    "capture": Target("any file as `decode` and `export` read it", always(_capture), words=STREAM_WORDS),
 }

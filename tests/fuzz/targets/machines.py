@@ -1,35 +1,32 @@
 """What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
-from tests.fuzz.target import Draws, Target, folder, refused
+from miro_exact.bad_input import BadInput
+from miro_exact.state import snapshot
+from miro_robot.bare.input import InputPiece
+from miro_robot.bare.machine import BareMachine
+from miro_robot.bare.pins import PinEvent, read_pins
+from miro_robot.board import Board
+from miro_robot.image import load_hex
+from miro_robot.plant import Plant
+from miro_robot.wiring import WiringError, load_wiring
+from tests.fuzz.target import Draws, Target, always, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
 
 _NAME = "fuzz.ihx"
 
 
-def _pins():
-    from miro_exact.bad_input import BadInput
-    from miro_robot.bare.pins import read_pins
-
-    def run(data):
-        try:
-            events = read_pins(data.decode("utf-8", "replace"), "fuzz.pins")
-        except BadInput as error:
-            return refused(error)
-        text = "".join(f"{event.tick} * P{event.port}.{event.bit} {event.level}\n" for event in events)
-        assert read_pins(text, "again") == events, "written and read again, the events differ"
-        return f"{min(len(events), 3)} events"
-
-    return run
+def _pins(data):
+    try:
+        events = read_pins(data.decode("utf-8", "replace"), "fuzz.pins")
+    except BadInput as error:
+        return refused(error)
+    text = "".join(f"{event.tick} * P{event.port}.{event.bit} {event.level}\n" for event in events)
+    assert read_pins(text, "again") == events, "written and read again, the events differ"
+    return f"{min(len(events), 3)} events"
 
 
 def _serial():
     """Pieces of input with conditions, and pins, for a program that sends back what it gets."""
-    from miro_exact.state import snapshot
-    from miro_robot.bare.input import InputPiece
-    from miro_robot.bare.machine import BareMachine
-    from miro_robot.bare.pins import PinEvent
-    from miro_robot.image import load_hex
-
     path = folder() / _NAME
     path.write_bytes(hex_records(ECHO))
     image = load_hex(path)
@@ -75,11 +72,6 @@ def _serial():
 
 
 def _board():
-    from miro_robot.board import Board
-    from miro_robot.image import load_hex
-    from miro_robot.plant import Plant
-    from miro_robot.wiring import WiringError, load_wiring
-
     path = folder() / "fuzz-board.toml"
     code = folder() / _NAME
     code.write_bytes(hex_records(_BUS_PROGRAM))
@@ -105,7 +97,7 @@ _BUS_PROGRAM = bytes.fromhex("908000 04 F0 E0 F580 F590 F5A0 F5B0 A3 80F2".repla
 
 
 TARGETS = {
-    "pins": Target("levels on pins", _pins),
+    "pins": Target("levels on pins", always(_pins)),
     "serial": Target("serial input with conditions and pins, in parts", _serial, most_bytes=128),
     "board": Target(
         "board files, and the board that comes of one",

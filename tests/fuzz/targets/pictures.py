@@ -4,7 +4,21 @@ import math
 import warnings
 import zlib
 
-from tests.fuzz.target import Draws, Target, refused
+from miro_exact.bad_input import BadInput
+from miro_host.eye import eye_file
+from miro_host.eye.calibration import Calibration
+from miro_host.eye.calibration_kinds import exact
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import ColourClasses, classes_of
+from miro_host.eye.eye_file import EyeError
+from miro_host.eye.fit import fit, parse_points
+from miro_host.eye.patterns import PATTERNS
+from miro_host.eye.sample_file import parse_samples
+from miro_host.eye.tracker import Tracker
+from miro_sim.pitch.colour_samples import colours_of
+from miro_sim.pitch.picture_settings import PictureSettings
+from mirotwin.camera.picture import Picture, parse, png
+from tests.fuzz.target import Draws, Target, always, refused
 
 _ORIGIN = "fuzz.file"
 _WIDTH, _HEIGHT = 320, 240
@@ -24,9 +38,6 @@ def _with_sums(png):
 
 
 def _picture():
-    from miro_exact.bad_input import BadInput
-    from mirotwin.camera.picture import Picture, parse, png
-
     def read(data):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -44,94 +55,56 @@ def _picture():
     return run
 
 
-def _calibration():
-    from miro_host.eye import eye_file
-    from miro_host.eye.calibration import Calibration
-    from miro_host.eye.eye_file import EyeError
-
-    def run(data):
+def _calibration(data):
+    try:
+        found = eye_file.parse(data.decode("utf-8", "replace"), Calibration, _ORIGIN)
+    except EyeError as error:
+        return refused(error)
+    assert eye_file.parse(found.text(), Calibration, "again") == found, "written and read again, it differs"
+    lens, drawn = found.lens(), 0
+    for u, v in ((0.0, 0.0), (160.0, 120.0), (319.0, 239.0)):
         try:
-            found = eye_file.parse(data.decode("utf-8", "replace"), Calibration, _ORIGIN)
-        except EyeError as error:
-            return refused(error)
-        assert eye_file.parse(found.text(), Calibration, "again") == found, (
-            "written and read again, it differs"
-        )
-        lens, drawn = found.lens(), 0
-        for u, v in ((0.0, 0.0), (160.0, 120.0), (319.0, 239.0)):
-            try:
-                x_m, y_m = lens.ground(u, v, found.height_m(0.05))
-            except ValueError as error:
-                refused(error)
-                continue
-            assert math.isfinite(x_m + y_m), "a place that is no number"
-            drawn += 1
-        return f"taken, {drawn} of 3 pixels lie on the ground"
-
-    return run
+            x_m, y_m = lens.ground(u, v, found.height_m(0.05))
+        except ValueError as error:
+            refused(error)
+            continue
+        assert math.isfinite(x_m + y_m), "a place that is no number"
+        drawn += 1
+    return f"taken, {drawn} of 3 pixels lie on the ground"
 
 
-def _colours():
-    from miro_host.eye import eye_file
-    from miro_host.eye.colours import ColourClasses
-    from miro_host.eye.eye_file import EyeError
-
-    def run(data):
-        try:
-            found = eye_file.parse(data.decode("utf-8", "replace"), ColourClasses, _ORIGIN)
-        except EyeError as error:
-            return refused(error)
-        assert eye_file.parse(found.text(), ColourClasses, "again") == found, (
-            "written and read again, they differ"
-        )
-        assert len(found.table) == 65536
-        return f"{min(len(found.colours), 3)} colours"
-
-    return run
+def _colours(data):
+    try:
+        found = eye_file.parse(data.decode("utf-8", "replace"), ColourClasses, _ORIGIN)
+    except EyeError as error:
+        return refused(error)
+    assert eye_file.parse(found.text(), ColourClasses, "again") == found, (
+        "written and read again, they differ"
+    )
+    assert len(found.table) == 65536
+    return f"{min(len(found.colours), 3)} colours"
 
 
-def _points():
-    from miro_host.eye.camera_parameters import CameraParameters
-    from miro_host.eye.eye_file import EyeError
-    from miro_host.eye.fit import fit, parse_points
-
-    def run(data):
-        try:
-            found = parse_points(data.decode("utf-8", "replace"), _ORIGIN)
-            fit(found, CameraParameters(), _ORIGIN)
-        except EyeError as error:
-            return refused(error)
-        return "fits"
-
-    return run
+def _points(data):
+    try:
+        found = parse_points(data.decode("utf-8", "replace"), _ORIGIN)
+        fit(found, CameraParameters(), _ORIGIN)
+    except EyeError as error:
+        return refused(error)
+    return "fits"
 
 
-def _samples():
-    from miro_host.eye.colours import classes_of
-    from miro_host.eye.eye_file import EyeError
-    from miro_host.eye.sample_file import parse_samples
-
-    def run(data):
-        try:
-            found = classes_of(parse_samples(data.decode("utf-8", "replace"), _ORIGIN), _ORIGIN)
-        except EyeError as error:
-            return refused(error)
-        assert found.text()
-        return f"{min(len(found.colours), 3)} colours"
-
-    return run
+def _samples(data):
+    try:
+        found = classes_of(parse_samples(data.decode("utf-8", "replace"), _ORIGIN), _ORIGIN)
+    except EyeError as error:
+        return refused(error)
+    assert found.text()
+    return f"{min(len(found.colours), 3)} colours"
 
 
 def _tracker():
     """Rectangles of the classes' colours, anywhere, also over the edge, in a few pictures one after the other."""
-    from miro_host.eye import eye_file
-    from miro_host.eye.calibration_kinds import exact
-    from miro_host.eye.camera_parameters import CameraParameters
-    from miro_host.eye.colours import ColourClasses
-    from miro_host.eye.patterns import PATTERNS
-    from miro_host.eye.tracker import Tracker
-    from mirotwin.camera.picture import Picture
-
     classes = eye_file.parse(_colours_toml().decode(), ColourClasses, "colours")
     paints = [bytes((int(mean.y), int(mean.cb), int(mean.cr))) for mean in classes.colours.values()]
     plain = bytes((40, 128, 128)) * (_WIDTH * _HEIGHT)
@@ -169,10 +142,6 @@ def _tracker():
 
 
 def _colours_toml():
-    from miro_host.eye.camera_parameters import CameraParameters
-    from miro_sim.pitch.colour_samples import colours_of
-    from miro_sim.pitch.picture_settings import PictureSettings
-
     return colours_of(CameraParameters(), PictureSettings(), "diagonal", True).text().encode()
 
 
@@ -181,9 +150,9 @@ _TOML = b"[camera]\n|[residuals]\n|[colours.|[floor]\n|version = 1| = |1e300|-0.
 
 TARGETS = {
     "picture": Target("PNG and PPM files, also with right sums", _picture, words=_PICTURE_WORDS),
-    "calibration": Target("calibrations, written again, and their lens", _calibration, words=_TOML),
-    "colours": Target("colour classes, written again, and their table", _colours, words=_TOML),
-    "points": Target("control points, and the camera that fits them", _points, most_bytes=2048),
-    "samples": Target("sampled pixels, and their classes", _samples, most_bytes=1024),
+    "calibration": Target("calibrations, written again, and their lens", always(_calibration), words=_TOML),
+    "colours": Target("colour classes, written again, and their table", always(_colours), words=_TOML),
+    "points": Target("control points, and the camera that fits them", always(_points), most_bytes=2048),
+    "samples": Target("sampled pixels, and their classes", always(_samples), most_bytes=1024),
     "tracker": Target("the tracker on pictures of rectangles", _tracker, most_bytes=256),
 }

@@ -6,8 +6,15 @@ from zlib import crc32
 
 from mcap.opcode import Opcode
 
+from miro_exact.bad_input import BadInput
+from mirotwin.recording import recorder
+from mirotwin.recording.capture.input import Input
+from mirotwin.recording.capture.recorded import transmissions, transmissions_of
+from mirotwin.recording.container import RecordingError
+from mirotwin.recording.reader import parse
+from mirotwin.rerun.job import load_job
 from tests.fuzz.target import Draws, Target, folder, refused
-from tests.mirotwin.mutated_files import without_sums
+from tests.mirotwin.mutated_files import ECHO, hex_records, without_sums
 
 _MAGIC = b"\x89MCAP0\r\n"
 _SCENARIO = (
@@ -81,9 +88,6 @@ def _built(data, begin):
 
 def _begin():
     """What a reader wants at the beginning of a recording."""
-    from mirotwin.recording import recorder
-    from tests.mirotwin.mutated_files import ECHO, hex_records
-
     names = (recorder.SCENARIO_ATTACHMENT, recorder.FIRMWARE_ATTACHMENT, recorder.SYMBOLS_ATTACHMENT)
     assert tuple(name.encode() for name in (*names, recorder.RESUMED_ATTACHMENT)) == _NAMES[:4], names
     about = {b"format": recorder.FORMAT.encode(), b"seed": b"3", b"scenario": b"one"}
@@ -98,13 +102,6 @@ def _begin():
 
 
 def _recording():
-    from miro_exact.bad_input import BadInput
-    from mirotwin.recording.capture.input import Input
-    from mirotwin.recording.capture.recorded import transmissions, transmissions_of
-    from mirotwin.recording.container import RecordingError
-    from mirotwin.recording.reader import parse
-    from mirotwin.rerun.job import load_job
-
     begin = _begin()
     path = folder() / "fuzz.mcap"
 

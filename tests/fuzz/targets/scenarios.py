@@ -1,65 +1,55 @@
 """What people write to say what runs: scenarios with steps and expectations, settings, cases, URLs."""
 
-from tests.fuzz.target import Target, folder, refused
+import contextlib
+import io
+from urllib.parse import quote
+
+import tomli_w
+
+from miro_exact.bad_input import BadInput
+from miro_exact.domain import DomainError
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import decode, of_table, parse
+from miro_sim.scenario.keys import without_expectations
+from miro_sim.world.world import World
+from mirotwin.ports.url import parse_url
+from mirotwin.rerun.job import load_job
+from mirotwin.verify.cases.case import tables_of
+from mirotwin.verify.steps.reading import everything
+from tests.fuzz.target import Target, always, folder, refused
 from tests.fuzz.targets.captures import STREAM_WORDS
+from tests.mirotwin.conftest import SHORT
 
 _ORIGIN = "fuzz.toml"
 
 
-def _scenario():
-    import tomli_w
-
-    from miro_sim.scenario.errors import ScenarioError
-    from miro_sim.scenario.file import decode, of_table, parse
-    from miro_sim.scenario.keys import without_expectations
-    from mirotwin.verify.cases.case import tables_of
-    from mirotwin.verify.steps.reading import everything
-
-    def run(data):
-        try:
-            found = parse(decode(data, _ORIGIN), _ORIGIN, (), everything)
-        except ScenarioError as error:
-            return refused(error)
-        tables = tables_of(found)
-        assert of_table(tables, "again") == without_expectations(found), (
-            "of its own tables, the scenario differs"
-        )
-        assert parse(tomli_w.dumps(tables), "written") == without_expectations(found), (
-            "written, the scenario differs"
-        )
-        return f"taken, {min(len(found.networks), 3)} networks, {min(len(found.step), 3)} steps"
-
-    return run
+def _scenario(data):
+    try:
+        found = parse(decode(data, _ORIGIN), _ORIGIN, (), everything)
+    except ScenarioError as error:
+        return refused(error)
+    tables = tables_of(found)
+    assert of_table(tables, "again") == without_expectations(found), "of its own tables, the scenario differs"
+    assert parse(tomli_w.dumps(tables), "written") == without_expectations(found), (
+        "written, the scenario differs"
+    )
+    return f"taken, {min(len(found.networks), 3)} networks, {min(len(found.step), 3)} steps"
 
 
-def _settings():
-    from miro_sim.scenario.errors import ScenarioError
-    from miro_sim.scenario.file import parse
-    from mirotwin.verify.steps.reading import everything
-    from tests.mirotwin.conftest import SHORT
-
-    def run(data):
-        settings = data.decode("utf-8", "surrogateescape").split("\n")
-        try:
-            found = parse(SHORT, _ORIGIN, settings[:8], everything)
-        except ScenarioError as error:
-            return refused(error)
-        assert parse(SHORT, _ORIGIN, settings[:8], everything) == found
-        return "taken"
-
-    return run
+def _settings(data):
+    settings = data.decode("utf-8", "surrogateescape").split("\n")
+    try:
+        found = parse(SHORT, _ORIGIN, settings[:8], everything)
+    except ScenarioError as error:
+        return refused(error)
+    assert parse(SHORT, _ORIGIN, settings[:8], everything) == found
+    return "taken"
 
 
 def _world():
     """A scenario that is accepted makes a world, which runs or says with which numbers nothing can be computed."""
-    from miro_exact.bad_input import BadInput
-    from miro_exact.domain import DomainError
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
-    from miro_sim.scenario.errors import ScenarioError
-    from miro_sim.scenario.file import decode, parse
-    from miro_sim.world.world import World
-
     image = load_hex(image_path())
 
     def run(data):
@@ -80,57 +70,39 @@ def _world():
     return run
 
 
-def _case():
+def _case(data):
     """Stream files as `replay` takes them, up to the world that is to run."""
-    import contextlib
-    import io
-
-    from miro_exact.bad_input import BadInput
-    from miro_exact.domain import DomainError
-    from mirotwin.rerun.job import load_job
-
-    def run(data):
-        path = folder() / "fuzz.stream"
-        path.write_bytes(data)
-        said = io.StringIO()
-        with contextlib.redirect_stderr(said):
-            try:
-                job = load_job(str(path))
-            except BadInput as error:
-                return refused(error)
-            assert all(line.isprintable() for line in said.getvalue().splitlines())
-            if sum(len(network.robot) for network in job.scenario.networks) > 10:
-                return "too many robots for here"
-            try:
-                job.world_of()
-            except (BadInput, DomainError) as error:
-                return refused(error)
-        return f"taken, {min(len(job.script), 3)} in the script, case {bool(job.case.verdict)}"
-
-    return run
-
-
-def _url():
-    from urllib.parse import quote
-
-    from miro_exact.bad_input import BadInput
-    from mirotwin.ports.url import parse_url
-
-    def run(data):
-        text = data.decode("utf-8", "replace")
+    path = folder() / "fuzz.stream"
+    path.write_bytes(data)
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said):
         try:
-            found = parse_url(text)
+            job = load_job(str(path))
         except BadInput as error:
             return refused(error)
-        words = [f"seed={found.seed}", f"network={found.network}", f"limit_s={found.limit_s!r}"]
-        words += [f"{key}={quote(value)}" for key in ("firmware", "out") if (value := getattr(found, key))]
-        words += [f"realtime={found.realtime!r}"] if found.realtime else []
-        words += [f"set={quote(one)}" for one in found.settings]
-        name = quote(found.scenario)
-        assert parse_url(f"miro://{name}{'' if not words else '?'}{'&'.join(words)}") == found
-        return f"taken, {min(len(words), 8)} options"
+        assert all(line.isprintable() for line in said.getvalue().splitlines())
+        if sum(len(network.robot) for network in job.scenario.networks) > 10:
+            return "too many robots for here"
+        try:
+            job.world_of()
+        except (BadInput, DomainError) as error:
+            return refused(error)
+    return f"taken, {min(len(job.script), 3)} in the script, case {bool(job.case.verdict)}"
 
-    return run
+
+def _url(data):
+    text = data.decode("utf-8", "replace")
+    try:
+        found = parse_url(text)
+    except BadInput as error:
+        return refused(error)
+    words = [f"seed={found.seed}", f"network={found.network}", f"limit_s={found.limit_s!r}"]
+    words += [f"{key}={quote(value)}" for key in ("firmware", "out") if (value := getattr(found, key))]
+    words += [f"realtime={found.realtime!r}"] if found.realtime else []
+    words += [f"set={quote(one)}" for one in found.settings]
+    name = quote(found.scenario)
+    assert parse_url(f"miro://{name}{'' if not words else '?'}{'&'.join(words)}") == found
+    return f"taken, {min(len(words), 8)} options"
 
 
 _KEYS = (
@@ -140,9 +112,11 @@ _KEYS = (
 ).split(b"|")
 
 TARGETS = {
-    "scenario": Target("scenarios with steps and expectations, written again", _scenario, words=_KEYS),
-    "settings": Target("--set KEY=VALUE", _settings, most_bytes=512, words=_KEYS),
+    "scenario": Target(
+        "scenarios with steps and expectations, written again", always(_scenario), words=_KEYS
+    ),
+    "settings": Target("--set KEY=VALUE", always(_settings), most_bytes=512, words=_KEYS),
     "startup": Target("an accepted scenario becomes a world that begins to run", _world, words=_KEYS),
-    "case": Target("stream files as `replay` takes them", _case, words=STREAM_WORDS + _KEYS),
-    "url": Target("miro:// URLs", _url, most_bytes=256, words=b"&set= limit_s= %26 .toml".split()),
+    "case": Target("stream files as `replay` takes them", always(_case), words=STREAM_WORDS + _KEYS),
+    "url": Target("miro:// URLs", always(_url), most_bytes=256, words=b"&set= limit_s= %26 .toml".split()),
 }

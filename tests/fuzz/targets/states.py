@@ -4,10 +4,24 @@ An input names fields by number, each with the bytes that stand there instead. A
 the input says otherwise. The state must be refused with a ValueError and without a change, or run on.
 """
 
+import hashlib
 import math
 import struct
 
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.state import Flat
+from miro_robot.bare.input import InputPiece
+from miro_robot.bare.machine import BareMachine
+from miro_robot.bare.pins import PinEvent
+from miro_robot.board import Board
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.plant import Plant
+from miro_robot.wiring import load_wiring
+from miro_sim.world.saved import opened, sealed
 from tests.fuzz.target import Draws, Target, folder, refused
+from tests.mirotwin.mutated_files import ECHO, hex_records
+from tests.sim.mutated_worlds import fresh, saved_worlds
 
 _FRESH_AFTER = 64
 """Inputs that one world, board or machine loads: what was loaded before must not matter."""
@@ -68,22 +82,14 @@ class _World:
     """A world with its `Flat` state; what is put is sealed again."""
 
     def __init__(self, profile):
-        from tests.sim.mutated_worlds import fresh
-
         self.world = fresh(profile)
         self.state = self.world.state
 
     def put(self, state):
-        from miro_sim.world.saved import sealed
-
         self.world.load(sealed(self.world.identity(), state))
 
 
 def _world(profile):
-    from miro_exact.clock import CONTROL_PERIOD_TICKS
-    from miro_sim.world.saved import opened
-    from tests.sim.mutated_worlds import saved_worlds
-
     identity = _World(profile).world.identity()
     states = [opened(saved, identity) for saved in saved_worlds(profile)]
 
@@ -95,10 +101,6 @@ def _world(profile):
 
 def _sealed():
     """The form around the state: magic, version, what a world belongs to, checksum."""
-    import hashlib
-
-    from tests.sim.mutated_worlds import fresh, saved_worlds
-
     world = fresh()
     saved = saved_worlds()[1][:-32]
     before = world.state.save()
@@ -127,8 +129,6 @@ class _Flat:
     """Anything with a table of state."""
 
     def __init__(self, root):
-        from miro_exact.state import Flat
-
         self.root = root
         self.state = Flat(root)
 
@@ -137,12 +137,6 @@ class _Flat:
 
 
 def _board():
-    from miro_robot.board import Board
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
-    from miro_robot.plant import Plant
-    from miro_robot.wiring import load_wiring
-
     image = load_hex(image_path())
 
     def make():
@@ -165,12 +159,6 @@ def _board():
 
 
 def _bare():
-    from miro_robot.bare.input import InputPiece
-    from miro_robot.bare.machine import BareMachine
-    from miro_robot.bare.pins import PinEvent
-    from miro_robot.image import load_hex
-    from tests.mirotwin.mutated_files import ECHO, hex_records
-
     path = folder() / "state.ihx"
     path.write_bytes(hex_records(ECHO))
     image = load_hex(path)
