@@ -1,14 +1,12 @@
 """A board with a few assembled lines in its flash, on the bench: no radio, no motors."""
 
-from pathlib import Path
-
 import msgspec
 
 from miro_robot.board import Board
-from miro_robot.image import Image, Symbol, Symbols
+from miro_robot.image import Symbol
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-from tests.robot.mcs51.asm import assemble, labels_of
+from tests.robot.mcs51 import asm
 
 CYCLE = 12
 MS = 24_000
@@ -22,15 +20,7 @@ RESET = "CLR P2.5\nNOP\nNOP\nSETB P2.5\nMOV R6,#5\nwait:\nMOV R7,#0\nDJNZ R7,$\n
 
 def image_of(text):
     """The assembled lines as an image; its labels are its symbols."""
-    code = assemble(text)
-    return Image(
-        path=Path("test.ihx"),
-        code=code + b"\xff" * (0x10000 - len(code)),
-        used=((0, len(code)),),
-        size=len(code),
-        sha256="",
-        symbols=Symbols({name: Symbol(address, "code") for name, address in labels_of(text).items()}),
-    )
+    return asm.image_of(text, {name: Symbol(at, "code") for name, at in asm.labels_of(text).items()})
 
 
 def board_with(text, wiring=None, stop_on_fault=True, options=None, plant=None):

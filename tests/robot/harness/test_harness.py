@@ -1,7 +1,5 @@
 """A machine that is put back over and over."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -12,10 +10,11 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import FastOracle
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness, LiveOracle
 from miro_robot.harness.program import BYTES, FRAMES, SESSION, Program
-from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
+from miro_robot.image import load_hex
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
 from miro_robot.wiring import load_wiring
+from tests.robot.mcs51.asm import image_of
 
 BIT_TICKS = 2500
 MS = 24_000
@@ -207,11 +206,6 @@ def code(*words):
     start = bytes.fromhex("75CBFF 75CAB2 75CDFF 75CCB2 75C834 759850".replace(" ", ""))
     data = start + bytes.fromhex("".join(words))
     return image_of(data.ljust(64, b"\x00"))
-
-
-def image_of(data):
-    code = data.ljust(SPACE_BYTES, b"\xff")
-    return Image(Path("made.ihx"), code, ((0, len(data)),), len(data), "", Symbols(dict))
 
 
 def test_firmware_that_never_sleeps_is_run_for_10_ms():

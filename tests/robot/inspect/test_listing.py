@@ -5,24 +5,13 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_robot.image import Image, Symbol, Symbols, load_hex, parse_hex
+from miro_robot.image import Symbol, load_hex, parse_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.listing import rows, text_lines
 from miro_robot.inspect.symbol_names import SymbolNames, functions
 from miro_robot.mcs51.opcodes import LENGTH
 from tests.robot.inspect.programs import build_modules
-from tests.robot.mcs51.asm import assemble
-
-
-def image_of(code, symbols=None):
-    return Image(
-        path=Path("none.ihx"),
-        code=code.ljust(0x10000, b"\xff"),
-        used=((0, len(code)),),
-        size=len(code),
-        sha256="",
-        symbols=Symbols(symbols or {}),
-    )
+from tests.robot.mcs51.asm import assemble, image_of
 
 
 @given(

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.inspect.stack_depth import StackReader
-from tests.mirotwin.verify.bare.firmwares import image
+from tests.robot.mcs51.asm import image_of
 from tests.robot.mcs51.rig import cpu_with
 
 
 def depth(text):
-    return StackReader(image(text)).all()
+    return StackReader(image_of(text)).all()
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_what_cannot_be_told_is_said(text, said):
 
 
 def test_each_instruction_that_makes_room_has_its_height():
-    heights = StackReader(image("PUSH ACC\nMOV A,SP\nADD A,#28h\nMOV SP,A\nend:\nSJMP end")).heights(0)
+    heights = StackReader(image_of("PUSH ACC\nMOV A,SP\nADD A,#28h\nMOV SP,A\nend:\nSJMP end")).heights(0)
     assert heights == {0: 0, 2: 1, 4: 1, 6: 1, 8: 0x29}
 
 

@@ -5,8 +5,7 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, InstructionTrace, registers
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
-from tests.robot.inspect.test_listing import image_of
-from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.asm import assemble, image_of
 from tests.robot.mcs51.rig import RecordingBus
 
 PROGRAM = """

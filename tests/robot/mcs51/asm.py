@@ -5,7 +5,10 @@ Numbers are decimal or end in h; names of registers and bits are those of the AT
 """
 
 import re
+from hashlib import sha256
+from pathlib import Path
 
+from miro_robot.image import SPACE_BYTES, Image, Symbols
 from miro_robot.mcs51.opcodes import BITS, SFRS, TABLE
 
 KEYWORDS = {"A", "C", "AB", "DPTR", "@DPTR", "@A+DPTR", "@A+PC"}
@@ -19,6 +22,29 @@ def assemble(text, origin=0):
 def labels_of(text, origin=0):
     """The addresses of the labels."""
     return _two_passes(text, origin)[1]
+
+
+def image_of(program, symbols=None):
+    """The image of machine code, or of lines to be assembled."""
+    code = assemble(program) if isinstance(program, str) else program
+    return Image(
+        path=Path("test.ihx"),
+        code=code.ljust(SPACE_BYTES, b"\xff"),
+        used=((0, len(code)),),
+        size=len(code),
+        sha256=sha256(code).hexdigest(),
+        symbols=Symbols(symbols or {}),
+    )
+
+
+def hex_text(code, at=0):
+    """Machine code as Intel HEX, 16 bytes a record."""
+    records = []
+    for first in range(0, len(code), 16):
+        data = code[first : first + 16]
+        body = bytes([len(data)]) + (at + first).to_bytes(2, "big") + b"\0" + data
+        records.append(f":{body.hex().upper()}{-sum(body) & 0xFF:02X}\n")
+    return "".join(records) + ":00000001FF\n"
 
 
 def _two_passes(text, origin):

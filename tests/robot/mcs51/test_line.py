@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import NEVER_TICK
-from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.line import Line
 
 EDGES = st.lists(st.tuples(st.integers(0, 20), st.integers(0, 1)), max_size=40)
@@ -51,16 +50,6 @@ def test_forgetting_changes_no_answer_from_there_on(initial, steps, cut, queries
         if query >= cut:
             assert line.level_at(query) == naive_level(initial, levels, query)
     assert all(tick > cut for tick, _ in line.edges())
-
-
-@given(st.integers(0, 1), EDGES)
-def test_a_restored_line_equals_the_one_saved(initial, steps):
-    line, _ = built(initial, steps)
-    line.settled_tick = 77
-    other = Line()
-    restore(other, snapshot(line))
-    assert snapshot(other) == snapshot(line)
-    assert other.edges() == line.edges()
 
 
 def test_going_back_in_time_is_refused():

@@ -3,7 +3,7 @@
 import pytest
 
 from miro_exact.state import snapshot
-from tests.robot.mcs51.rig import cpu_with, sfr
+from tests.robot.mcs51.rig import cpu_with, sfr, whole_and_cut
 
 TIMER_WAKES = """
 LJMP main
@@ -33,12 +33,8 @@ def test_an_idle_cpu_is_woken_by_a_timer_and_goes_on_behind_the_instruction_that
 
 
 def test_idle_time_is_the_same_in_one_run_and_in_many():
-    one, many = cpu_with(TIMER_WAKES), cpu_with(TIMER_WAKES)
-    one.run(5000)
-    for cycle in range(0, 5001, 7):
-        many.run(cycle)
-    many.run(5000)
-    assert snapshot(one) == snapshot(many)
+    whole, cut = whole_and_cut(lambda: cpu_with(TIMER_WAKES), 5000)
+    assert snapshot(whole) == snapshot(cut)
 
 
 @pytest.mark.parametrize("pending", ["NOP", "SETB TF0"])

@@ -34,13 +34,36 @@ def test_exf2_is_up_after_the_cycle_that_follows_the_sample(mode):
     assert at(cpu, 22, "T2CON") == (mode | EXEN2 | 0x40,)
 
 
-def test_a_capture_takes_the_count_of_the_cycle_before():
-    """4316E section 2.12: capture copies TH2:TL2 when T2EX falls; TR2 set at the end of cycle 1 counts from 2
-    on.
-    """
-    cpu = falling(20, f"MOV T2CON,#{CAPTURE | EXEN2 | TR2:02X}h\n")
-    assert at(cpu, 21, "TL2", "RCAP2L") == (19, 0)
-    assert at(cpu, 22, "TL2", "RCAP2L") == (20, 19)
+FULL = "MOV TL2,#0FFh\nMOV TH2,#0FFh\n"
+DCEN = "MOV T2MOD,#01h\n" + FULL + "MOV RCAP2L,#0FEh\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n"
+BY_HAND = {  # set-up, the pin that falls in cycle 20, registers, and what they are with all cycles below so many done
+    "a capture takes the count of the cycle before": (  # TR2 set at the end of cycle 1 counts from 2 on
+        f"MOV T2CON,#{CAPTURE | EXEN2 | TR2}\n", T2EX_LOW, ("TL2", "RCAP2L"), {21: (19, 0), 22: (20, 19)},
+    ),
+    "without EXEN2 T2EX does nothing": (
+        f"MOV RCAP2L,#80h\nMOV T2CON,#{TR2}\n", T2EX_LOW, ("TL2", "T2CON"), {30: (26, TR2)},
+    ),
+    "a counter counts in the cycle after the sample": ("MOV T2CON,#06h\n", T2_LOW, ("TL2",), {21: (0,), 22: (1,)}),
+    "a counter that overflows reloads and flags": (
+        FULL + "MOV RCAP2L,#34h\nMOV RCAP2H,#12h\nMOV T2CON,#06h\n", T2_LOW,
+        ("TH2", "TL2", "T2CON"), {22: (0x12, 0x34, 0x86)},
+    ),
+    "in capture mode an overflow goes to zero": (  # counts from cycle 8 on
+        FULL.replace("0FFh", "0F0h", 1) + "MOV RCAP2L,#34h\nMOV T2CON,#05h\n", 0xFF,
+        ("TH2", "TL2", "T2CON"), {23: (0xFF, 0xFF, 0x05), 24: (0x00, 0x00, 0x85)},
+    ),
+    "with DCEN and T2EX high it counts up and each overflow toggles EXF2": (
+        DCEN, 0xFF, ("TL2", "T2CON"),
+        {12: (0xFF, 0x04), 13: (0xFE, 0xC4), 14: (0xFF, 0xC4), 15: (0xFE, 0x84), 16: (0xFF, 0x84), 17: (0xFE, 0xC4)},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("setup", "levels", "names", "expected"), BY_HAND.values(), ids=BY_HAND)
+def test_registers_are_in_each_cycle_as_calculated_by_hand(setup, levels, names, expected):
+    """4316E sections 2.9 and 2.12."""
+    cpu = falling(20, setup, levels)
+    assert {cycle: at(cpu, cycle, *names) for cycle in expected} == expected
 
 
 def test_a_reload_by_t2ex_goes_before_the_count_of_its_cycle():
@@ -48,12 +71,6 @@ def test_a_reload_by_t2ex_goes_before_the_count_of_its_cycle():
     cpu = falling(20, f"MOV RCAP2L,#80h\nMOV T2CON,#{RELOAD | EXEN2 | TR2:02X}h\n")
     assert at(cpu, 21, "TL2") == (17,)
     assert at(cpu, 22, "TL2") == (0x81,)
-
-
-def test_without_exen2_t2ex_does_nothing():
-    """4316E section 2.12: EXEN2 = 0 makes timer 2 ignore T2EX."""
-    cpu = falling(20, f"MOV RCAP2L,#80h\nMOV T2CON,#{TR2:02X}h\n")
-    assert at(cpu, 30, "TL2", "T2CON") == (26, TR2)
 
 
 @pytest.mark.parametrize(("written_in", "flag"), [(19, 0x40), (20, 0x40), (21, 0x00), (22, 0x00)])
@@ -83,44 +100,6 @@ def test_exf2_is_answered_a_cycle_later_than_an_external_interrupt():
     assert cpu.cycles == 25
 
 
-def test_counter_mode_counts_in_the_cycle_after_the_sample():
-    """4316E sections 2.9 and 2.12: a fall of T2 between two samples is counted in the following cycle."""
-    cpu = falling(20, "MOV T2CON,#06h\n", T2_LOW)
-    assert at(cpu, 21, "TL2") == (0,)
-    assert at(cpu, 22, "TL2") == (1,)
-
-
-def test_a_counter_that_overflows_reloads_and_flags():
-    """4316E section 2.12: overflow loads RCAP2 and sets TF2."""
-    cpu = falling(
-        20, "MOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#34h\nMOV RCAP2H,#12h\nMOV T2CON,#06h\n", T2_LOW
-    )
-    assert at(cpu, 22, "TH2", "TL2", "T2CON") == (0x12, 0x34, 0x86)
-
-
-def test_capture_mode_overflows_to_zero():
-    """4316E section 2.12: in capture mode RCAP2 is not loaded; TF2 is set all the same."""
-    setup = "MOV TL2,#0F0h\nMOV TH2,#0FFh\nMOV RCAP2L,#34h\nMOV T2CON,#05h\n"  # counts from cycle 8 on
-    cpu = cpu_with(setup + "NOP\n" * 40)
-    assert at(cpu, 8 + 15, "TH2", "TL2", "T2CON") == (0xFF, 0xFF, 0x05)
-    assert at(cpu, 8 + 16, "TH2", "TL2", "T2CON") == (0x00, 0x00, 0x85)
-
-
-def test_auto_reload_has_the_period_of_its_reload_value():
-    """4316E section 2.12: 65536 - RCAP2 cycles from overflow to overflow."""
-    setup = "MOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#9Ch\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n"  # from 10 on
-    cpu = cpu_with("LJMP main\nORG 0040h\nmain:\n" + setup + "loop:\nSJMP loop")
-    flags = []
-    cpu.run(12)
-    for cycle in range(12, 900, 2):
-        cpu.run(cycle)
-        if sfr(cpu, "T2CON") & 0x80:
-            flags.append(cycle)
-            cpu.peripherals.write(0xC8, 0x04, cycle)
-    assert flags == list(range(14, 900, 100))[: len(flags)]
-    assert len(flags) == 9
-
-
 def test_dcen_counts_down_to_rcap2_and_then_from_ffff():
     """4316E section 2.12: with DCEN and T2EX low it counts down; where TH2:TL2 equals RCAP2 it underflows to
     FFFF, sets TF2 and toggles EXF2.
@@ -136,16 +115,6 @@ def test_dcen_counts_down_to_rcap2_and_then_from_ffff():
         (0xFF, 0xFF, 0xC4),
         (0xFF, 0xFE, 0xC4),
     ]
-
-
-def test_dcen_counts_up_while_t2ex_is_high_and_each_overflow_toggles_exf2():
-    """4316E section 2.12: up at T2EX = 1, overflow at FFFF loads RCAP2."""
-    setup = (
-        "MOV T2MOD,#01h\nMOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#0FEh\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n"
-    )
-    cpu = cpu_with(setup + "NOP\n" * 40)
-    seen = [at(cpu, 12 + n, "TL2", "T2CON") for n in range(6)]
-    assert seen == [(0xFF, 0x04), (0xFE, 0xC4), (0xFF, 0xC4), (0xFE, 0x84), (0xFF, 0x84), (0xFE, 0xC4)]
 
 
 def test_dcen_follows_t2ex_from_the_cycle_after_the_sample():

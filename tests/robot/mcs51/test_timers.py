@@ -11,7 +11,7 @@ from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.robot.mcs51.asm import SFRS, assemble
-from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped, whole_and_cut
 
 REGISTERS = ("TMOD", "TCON", "TL0", "TH0", "TL1", "TH1", "T2CON", "T2MOD", "TL2", "TH2", "RCAP2L", "RCAP2H")
 
@@ -110,14 +110,16 @@ def test_a_counter_counts_falls_one_cycle_after_their_sample():
 )
 def test_falls_within_an_instruction_count_however_a_run_is_cut(ticks, mode):
     """An instruction of four cycles goes on beyond the end of its piece of a run, and pins move meanwhile."""
-    whole, pieces = (cpu_with(f"MOV TMOD,#{mode}\nMOV TCON,#50h\nloop:\nMUL AB\nSJMP loop") for _ in range(2))
-    for cpu in (whole, pieces):
+
+    def prepare():
+        cpu = cpu_with(f"MOV TMOD,#{mode}\nMOV TCON,#50h\nloop:\nMUL AB\nSJMP loop")
         for number, tick in enumerate(sorted(ticks)):
             cpu.set_external(3, 0xFF if number % 2 else 0xC7, tick)  # T0, T1 and INT1
-    whole.run(300)
-    while pieces.cycles < whole.cycles:
-        pieces.run(pieces.cycles + 1)
-    assert snapshot(whole) == snapshot(pieces)
+        return cpu
+
+    whole, cut = whole_and_cut(prepare, 300)
+    cut.run(whole.cycles)
+    assert snapshot(whole) == snapshot(cut)
 
 
 def test_a_gate_is_the_pin_and_not_the_interrupt_flag():

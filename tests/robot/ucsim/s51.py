@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests import children
+from tests.robot.mcs51.asm import hex_text
 
 OBSERVE = ("step", "dump /b iram 0 255", "dump /b sfr 128 255")
 _STOPPED = re.compile(rb"Stop at 0x([0-9a-f]+): \(\d+\) stepped (\d+) ticks\n")
@@ -44,7 +45,7 @@ def run(code, commands, heard=None):
     serial = [] if heard is None else ["-S", f"uart=0,out={heard}"]
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder, "image.ihx")
-        image.write_text(intel_hex(code))
+        image.write_text(hex_text(code))
         script = Path(folder, "commands")
         script.write_text("\n".join(commands) + "\n")
         printed = Path(folder, "printed")
@@ -57,17 +58,6 @@ def run(code, commands, heard=None):
                 check=True,
             )
         return printed.read_bytes()
-
-
-def intel_hex(code):
-    """An image from address 0 as Intel HEX, 32 bytes a record."""
-    lines = []
-    for address in range(0, len(code), 32):
-        part = code[address : address + 32]
-        record = bytes((len(part), address >> 8, address & 0xFF, 0)) + part
-        lines.append(f":{record.hex().upper()}{-sum(record) & 0xFF:02X}")
-    lines.append(":00000001FF\n")
-    return "\n".join(lines)
 
 
 class Reader:
