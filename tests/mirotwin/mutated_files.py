@@ -10,6 +10,7 @@ which command reads them. What does not: what a format means.
 import argparse
 import contextlib
 import random
+import re
 import signal
 import struct
 import sys
@@ -24,7 +25,9 @@ from click.testing import CliRunner
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import builtin_text
 from mirotwin.commands import main
-from tests.mirotwin.conftest import SHORT
+from tests.fuzz.mutation import changed
+from tests.fuzz.target import Target, with_sums
+from tests.mirotwin.conftest import SHORT, hex_text
 
 ALLOWED = (0, 1, 2, 3, 4, 42)
 SLOW_S = 5.0
@@ -83,50 +86,19 @@ step = [
 ]
 """
 EVENTS = b"5 *@0/1 reset 1\n6 *@0 radio down\n7 * P1.0 0\n#: set = {}\n#: expect = {no_fault = true}\n"
-MOST_BYTES = 1 << 20
-NUMBERS = (
-    b"0",
-    b"-1",
-    b"4294967296",
-    b"99999999999999999999",
-    b"9" * 5000,
-    b"1e999",
-    b"nan",
-    b"0x" + b"f" * 5000,
+_NUMBERS = (*b"0 -1 4294967296 99999999999999999999 1e999 nan".split(), b"9" * 5000, b"0x" + b"f" * 5000)
+_BRACKETS = (*b"[ { ( a. [[ \\ # : $".split(), b'"', b"'", b"\n", b"\xff", b"\x00", b"\x1b[2J")
+DAMAGE = Target(
+    "what a damaged file may hold",
+    lambda: None,
+    most_bytes=1 << 20,
+    words=[*_NUMBERS, *(one * count for one in _BRACKETS for count in (1, 1, 300, 20_000))],
 )
-BRACKETS = (
-    b"[",
-    b"{",
-    b"(",
-    b"a.",
-    b"[[",
-    b"\xff",
-    b"\x00",
-    b"\x1b[2J",
-    b"\n",
-    b"\\",
-    b'"',
-    b"'",
-    b"#",
-    b":",
-    b"$",
-)
-
 RESUMMED = "image, sums put right"
 
 
 def hex_records(code):
-    """Intel HEX."""
-    lines = []
-    for place in range(0, len(code), 16):
-        body = (
-            bytes([len(code[place : place + 16])])
-            + place.to_bytes(2, "big")
-            + b"\0"
-            + code[place : place + 16]
-        )
-        lines.append(f":{(body + bytes([-sum(body) & 0xFF])).hex().upper()}\n")
-    return "".join([*lines, ":00000001FF\n"]).encode()
+    return hex_text(code).encode()
 
 
 class Seeds:
@@ -160,11 +132,8 @@ class Seeds:
         self.pieces.append(EVENTS)
         self._add_pictures()
         raw = bytes.fromhex("5555555555ff2dd4fc") + bytes(range(40))
-        self.kinds["raw"] = (
-            "a.bin",
-            raw * 3,
-            [["decode", "@"], ["decode", "@", "--format", "raw", "--json"]],
-        )
+        decode = [["decode", "@"], ["decode", "@", "--format", "raw", "--json"]]
+        self.kinds["raw"] = ("a.bin", raw * 3, decode)
         self.kinds["hex text"] = ("a.txt", raw.hex(" ").encode() + b" # end\n", [["decode", "@"]])
 
     def _add_pictures(self):
@@ -189,21 +158,12 @@ class Seeds:
     def _add_texts(self, image):
         steps = ["--max-cycles", "300"]
         watch = [["fw", "trace", "named.ihx", *steps], ["fw", "profile", "named.ihx", *steps, "--json"]]
-        self.kinds["scenario"] = (
-            "a.toml",
-            builtin_text("fig6").encode(),
-            [["fw", "profile", "@", "--to", "100us"]],
-        )
-        self.kinds["steps"] = (
-            "a.scenario.toml",
-            STEPS,
-            [["run", "@", "--out", "steps", "--force", *SHORT_RUN]],
-        )
-        self.kinds["image"] = (
-            "a.ihx",
-            image.read_bytes(),
-            [["fw", "run", "@", *steps]] * 5 + [["fw", "disasm", "@"], ["info", "--firmware", "@"]],
-        )
+        profile = [["fw", "profile", "@", "--to", "100us"]]
+        self.kinds["scenario"] = ("a.toml", builtin_text("fig6").encode(), profile)
+        run = [["run", "@", "--out", "steps", "--force", *SHORT_RUN]]
+        self.kinds["steps"] = ("a.scenario.toml", STEPS, run)
+        read = [*[["fw", "run", "@", *steps]] * 5, ["fw", "disasm", "@"], ["info", "--firmware", "@"]]
+        self.kinds["image"] = ("a.ihx", image.read_bytes(), read)
         self.kinds[RESUMMED] = self.kinds["image"]
         for suffix, lines in (".map", ECHO_MAP), (".cdb", ECHO_CDB), (".rst", ECHO_RST):
             (self.folder / f"named{suffix}").write_text(lines)
@@ -211,16 +171,10 @@ class Seeds:
             until = ["fw", "run", "named.ihx", "--until", "_loop", *steps]
             commands = [cover, *watch, ["fw", "disasm", "named.ihx"], until]
             self.kinds[suffix] = (f"named{suffix}", lines.encode(), commands)
-        self.kinds["tracefile"] = (
-            "a.info",
-            (self.folder / "fw.info").read_bytes(),
-            [["fw", "coverage", "echo.ihx", "--max-cycles", "50", "--out", "@", "--append"]],
-        )
-        self.kinds["serial input"] = (
-            "a.serial",
-            b"some characters\r\n\x00\xff",
-            [["fw", "run", "echo.ihx", "--stdin", "@", "--max-cycles", "20000"]],
-        )
+        append = [["fw", "coverage", "echo.ihx", "--max-cycles", "50", "--out", "@", "--append"]]
+        self.kinds["tracefile"] = ("a.info", (self.folder / "fw.info").read_bytes(), append)
+        listen = [["fw", "run", "echo.ihx", "--stdin", "@", "--max-cycles", "20000"]]
+        self.kinds["serial input"] = ("a.serial", b"some characters\r\n\x00\xff", listen)
 
     def _run(self, *arguments):
         with contextlib.chdir(self.folder):
@@ -243,67 +197,6 @@ def without_sums(recording):
     return bytes(data)
 
 
-def resummed(image):
-    """Intel HEX with lengths and sums put right, so that damage gets past them."""
-    lines = []
-    for line in image.split(b"\n"):
-        with contextlib.suppress(ValueError):
-            record = bytearray.fromhex(line[1:].decode("ascii", "replace"))
-            if 5 <= len(record) <= 260:
-                record[0] = len(record) - 5
-                record[-1] = -sum(record[:-1]) & 0xFF
-                line = b":" + record.hex().encode()
-        lines.append(line)
-    return b"\n".join(lines)
-
-
-def mutate(data, draw, other):
-    """`data` with one to four damages; `other` is a file to take a piece of."""
-    for _ in range(draw.choice((1, 1, 2, 4))):
-        data = _damage(bytearray(data), draw, other)
-    return data[:MOST_BYTES]
-
-
-def _damage(data, draw, other):
-    at = draw.randrange(len(data) + 1)
-    length = min(len(data) - at, draw.choice((1, 1, 2, 8, 100, 2000)))
-    kind = draw.randrange(10)
-    if kind == 0 and data:  # a bit
-        data[at - 1] ^= 1 << draw.randrange(8)
-    elif kind == 1 and data:  # a byte
-        data[at - 1] = draw.randrange(256)
-    elif kind == 2:
-        del data[at : at + length]
-    elif kind == 3:
-        data[at:at] = bytes(draw.randrange(256) for _ in range(draw.choice((1, 3, 50))))
-    elif kind == 4:  # twice, or very often
-        data[at:at] = data[at : at + length] * draw.choice((1, 1, 2, 1000))
-    elif kind == 5:
-        del data[at:]
-    elif kind == 6:  # a piece of another file
-        begin = draw.randrange(len(other) + 1)
-        data[at : at + length] = other[begin : begin + draw.choice((10, 100, 3000))]
-    elif kind == 7:  # in place of a number
-        digits = (
-            [place for place in range(len(data)) if 0x30 <= data[place] <= 0x39]
-            if len(data) < 1 << 16
-            else []
-        )
-        at = draw.choice(digits) if digits else at
-        end = at
-        while end < len(data) and 0x30 <= data[end] <= 0x39:
-            end += 1
-        data[at:end] = draw.choice(NUMBERS)
-    elif kind == 8:  # deep nesting, or one of what has a meaning
-        data[at:at] = draw.choice(BRACKETS) * draw.choice((1, 1, 1, 300, 20_000))
-    else:  # two pieces exchanged
-        to = draw.randrange(len(data) + 1)
-        piece = bytes(data[at : at + length])
-        data[at : at + length] = data[to : to + length]
-        data[to : to + length] = piece
-    return bytes(data)
-
-
 class Slow(BaseException):
     """A case that takes too long."""
 
@@ -322,9 +215,13 @@ class Case:
         self.name, content, commands = seeds.kinds[self.kind]
         self.good = content
         others = [*seeds.pieces, *(good for _, good, _ in seeds.kinds.values())]
-        self.content = mutate(content, draw, draw.choice(others))
+        if draw.randrange(10) == 0 and (numbers := [*re.finditer(rb"[0-9]+", content[: 1 << 16])]):
+            first, end = draw.choice(numbers).span()
+            self.content = content[:first] + draw.choice(_NUMBERS) + content[end:]
+        else:
+            self.content = changed(content, DAMAGE, others, draw)
         if self.kind == RESUMMED:
-            self.content = resummed(self.content)
+            self.content = with_sums(self.content)
         self.arguments = [self.name if word == "@" else word for word in draw.choice(commands)]
 
     def run(self, folder):
