@@ -15,7 +15,7 @@ from mirotwin.campaign.journal import journal_path
 from tests.example_count import examples
 from tests.fuzz.mutation import changed
 from tests.fuzz.target import Target
-from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
+from tests.mirotwin.campaign.conftest import InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 

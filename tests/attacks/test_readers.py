@@ -16,7 +16,7 @@ from mirotwin.camera import picture
 from mirotwin.campaign.page import arm_line
 from mirotwin.campaign.rows import ResultRows
 from tests import children
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
+from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of
 
 SPARSE_BYTES = 2 << 30
 MEMORY_BYTES = 1 << 30

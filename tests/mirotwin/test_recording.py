@@ -1,4 +1,4 @@
-"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one."""
+"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one; the writer."""
 
 import io
 import json
@@ -6,7 +6,6 @@ import re
 import struct
 import time
 import tracemalloc
-from zlib import crc32
 
 import msgspec
 import pytest
@@ -14,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Message
 from mcap.writer import CompressionType, Writer
 
 from miro_exact.clock import nanoseconds
@@ -22,13 +22,12 @@ from miro_host.posture import Posture
 from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
-from mirotwin.recording import channels, topics, writer
+from mirotwin.recording import channels, writer
 from mirotwin.recording import recorder as recorder_module
-from mirotwin.recording.container import RecordingError, records
+from mirotwin.recording.container import BrokenOff, RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import TOGETHER, Recorder, RunSource
-from mirotwin.recording.rows import Chunk, joined_crc
-from mirotwin.recording.writer import MAGIC
+from mirotwin.recording.writer import MAGIC, McapWriter
 from tests.mirotwin.synthetic import periods
 from tests.naive import recording_messages
 
@@ -141,21 +140,6 @@ def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, ch
     assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
 
 
-def test_a_message_that_cannot_be_written_leaves_nothing_in_its_chunk():
-    chunk = Chunk(1 << 20, pytest.fail)
-    chunk.add(1, 5, channels.DutyMessage(0, 1))
-    before = bytes(chunk.data)
-    with pytest.raises(TypeError, match="Encoding objects of type object"):
-        chunk.add(1, 6, channels.DutyMessage(0, object()))
-    assert chunk.data == before
-    assert chunk.last_ns == 5
-
-
-@given(st.binary(), st.binary())
-def test_checksums_of_two_pieces_are_joined_to_that_of_both(one, other):
-    assert joined_crc(crc32(one), crc32(other), len(other)) == crc32(one + other)
-
-
 def write_all(recorder, written):
     for period in written:
         recorder.write(period)
@@ -238,23 +222,23 @@ def test_inner_values_of_different_laws_have_schemas_that_name_them():
 
 
 def message_type_of(topic):
-    place = topics.topic_of(topic)
+    place = channels.topic_of(topic)
     return None if place is None else channels.message_type(place)
 
 
 @pytest.mark.parametrize(
     ("topic", "place"),
     [
-        ("/period", topics.Topic("/period")),
-        ("/net0/wire", topics.Topic("wire", 0)),
-        ("/net12/robot3/lm629", topics.Topic("lm629", 12, 3)),
+        ("/period", channels.Topic("/period")),
+        ("/net0/wire", channels.Topic("wire", 0)),
+        ("/net12/robot3/lm629", channels.Topic("lm629", 12, 3)),
         ("/net0/robot/lm629", None),
         ("/net\u0663/wire", None),
         ("/period/", None),
     ],
 )
 def test_a_topic_says_what_it_names(topic, place):
-    assert topics.topic_of(topic) == place
+    assert channels.topic_of(topic) == place
 
 
 @pytest.mark.parametrize("change", [b'"bad_stop":[3,19]', b'"bad_stop":[18,3]', b'"bad_stop":[3,-1]'])
@@ -275,8 +259,8 @@ def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch
 
 def test_every_channel_has_a_message_type_and_foreign_topics_have_none():
     for name, kind in channels.ROBOT_CHANNELS.items():
-        assert message_type_of(topics.robot_topic(1, 2, name)) is kind
-    assert message_type_of(topics.wire_topic(7)) is channels.WireMessage
+        assert message_type_of(channels.robot_topic(1, 2, name)) is kind
+    assert message_type_of(channels.wire_topic(7)) is channels.WireMessage
     assert message_type_of("/camera") is None
     assert message_type_of("/net0/robot0/unknown") is None
 
@@ -463,3 +447,165 @@ def test_checksums_of_zero_say_nothing_as_other_programs_write_them():
     writer.start()
     writer.finish()
     assert list(records(io.BytesIO(stream.getvalue()), "x.mcap")) == []
+
+
+# The writer: the bytes of the library's, and a file that can be read at any moment of its making
+
+STEP_NAMES = ("schema", "channel", "message", "message", "message", "message", "flush")
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(STEP_NAMES),
+        st.integers(1, 3),
+        st.integers(0, (1 << 64) - 1),
+        st.one_of(st.binary(max_size=40), st.integers(0, 3000).map(bytes)),
+    ),
+    max_size=40,
+)
+CHUNK_SIZE = 1000
+
+
+@pytest.fixture(scope="module")
+def short_chunks():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(writer, "CHUNK_SIZE", CHUNK_SIZE)
+        yield
+
+
+def of_the_library(steps):
+    stream = io.BytesIO()
+    writer = Writer(stream, CHUNK_SIZE, CompressionType.NONE, enable_data_crcs=True)
+    writer.start("profile", "library")
+    writer.add_metadata("mine", {"key": "ä", "empty": ""})
+    writer.add_attachment(0, 0, "name.txt", "text/plain", b"content")
+    for what, number, time_ns, data in steps:
+        if what == "schema":
+            writer.register_schema(f"schema{number}", "jsonschema", data)
+        elif what == "channel":
+            writer.register_channel(f"/topic{number}", "json", number)
+        elif what == "message":
+            writer.add_message(number, time_ns, data, time_ns)
+    writer.finish()
+    return stream.getvalue()
+
+
+def begun(stream):
+    writer = McapWriter(stream, "profile", "library")
+    writer.add_metadata("mine", {"key": "ä", "empty": ""})
+    writer.add_attachment("name.txt", "text/plain", b"content")
+    return writer
+
+
+def put(writer, step):
+    what, number, time_ns, data = step
+    if what == "schema":
+        writer.add_schema(f"schema{number}", "jsonschema", data)
+    elif what == "channel":
+        writer.add_channel(f"/topic{number}", "json", number)
+    elif what == "message":
+        writer.add_message(number, time_ns, msgspec.Raw(data))
+    else:
+        writer.flush()
+
+
+def written(steps):
+    stream = io.BytesIO()
+    writer = begun(stream)
+    for step in steps:
+        put(writer, step)
+    writer.finish()
+    return stream.getvalue()
+
+
+@pytest.mark.usefixtures("short_chunks")
+@pytest.mark.slow
+@settings(max_examples=400)
+@given(STEPS)
+def test_a_file_is_the_bytes_of_the_librarys_writer_whenever_it_was_flushed(steps):
+    assert written(steps) == of_the_library(steps)
+
+
+ROWS = [("schema", 1, 0, b"{}"), ("channel", 1, 0, b"")]
+ROWS += [("message", 1, index, bytes([index]) * (7 * index)) for index in range(100)]
+
+
+class Journal(io.BytesIO):
+    """Keeps what the file is after each write, as a process killed right then leaves it."""
+
+    def __init__(self):
+        super().__init__()
+        self.states = []
+
+    def write(self, data, /):
+        piece = bytes(data[:300])  # a raw file may take less than it is given
+        done = super().write(piece)
+        self.states.append(self.getvalue())
+        return done
+
+
+def readable(data):
+    """Times of the messages in a file without an end."""
+    times = []
+
+    def read():
+        for _, record in records(io.BytesIO(data), "x"):
+            if isinstance(record, Message):
+                times.append(record.log_time)
+
+    with pytest.raises(BrokenOff, match="the recording has no end: the run that wrote it was broken off"):
+        read()
+    return times
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_killed_after_any_write_it_leaves_all_that_was_flushed_before():
+    journal = Journal()
+    writer = begun(journal)
+    journal.states.clear()
+    added, flushed = 0, 0
+    for count, step in enumerate(ROWS):
+        put(writer, step)
+        added += step[0] == "message"
+        if count % 3 == 0:
+            writer.flush()
+        for state in journal.states:
+            found = readable(state)
+            assert found == list(range(len(found)))
+            assert flushed <= len(found) <= added
+        journal.states.clear()
+        if count % 3 == 0:
+            flushed = added
+    writer.finish()
+    assert added == 100
+    assert journal.getvalue() == written(ROWS)
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_after_a_full_disk_nothing_more_is_written():
+    class Full(io.BytesIO):
+        room = 2500
+
+        def write(self, data, /):
+            self.room -= len(data)
+            if self.room < 0:
+                raise OSError(28, "No space left on device")
+            return super().write(data)
+
+    full = Full()
+    writer = begun(full)
+    added = 0
+
+    def fill():
+        nonlocal added
+        for step in ROWS:
+            put(writer, step)
+            added += step[0] == "message"
+
+    with pytest.raises(OSError, match="No space left"):
+        fill()
+    before = full.getvalue()
+    full.room = 1 << 20
+    writer.flush()
+    writer.finish()
+    assert full.getvalue() == before
+    found = readable(before)
+    assert 0 < len(found) <= added

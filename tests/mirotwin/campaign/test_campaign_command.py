@@ -3,7 +3,6 @@
 import contextlib
 import json
 import signal
-import sys
 import time
 from pathlib import Path
 
@@ -14,7 +13,8 @@ from mirotwin import campaign
 from mirotwin.campaign.journal import journal_path
 from mirotwin.commands import main
 from tests import children
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
+from tests.mirotwin import program
+from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
@@ -95,34 +95,29 @@ def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
         (("[grid]", "[grid"), "line 6, column 6: not TOML"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(here, change, place):
+def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(mirotwin, here, change, place):
     (here / "short.toml").write_text(SHORT.replace(*change))
-    result = called("short.toml")
-    assert result.exit_code == 2
-    assert result.output.startswith(f"mirotwin: error: short.toml: {place}"), result.output
-    assert result.output.count("\n") == 1
+    assert mirotwin.refuses("campaign", "short.toml").startswith(f"short.toml: {place}")
     assert [path.name for path in here.iterdir()] == ["short.toml"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["short.toml", "--seeds", "0-9999999"], "has 20000000 runs, more than 100000"),
-        (["nothing.toml"], "nothing.toml: there is no such file"),
-        (["short.toml", "--out", "short.csv"], "results are a .parquet file"),
-        (
-            ["short.toml", "--out", "short.toml/a.parquet"],
-            "short.toml: File exists; choose another folder with --out",
-        ),
-        (["show", "nothing.parquet"], "nothing.parquet: there is no such file"),
-        (["show", "short.toml"], "short.toml: is no Parquet file"),
-    ],
-)
-def test_what_cannot_be_meant_is_refused_in_a_line(here, arguments, words):
-    result = called(*arguments)
-    assert result.exit_code == 2
-    assert words in result.output
-    assert "Traceback" not in result.output
+REFUSED = {
+    ("short.toml", "--seeds", "0-9999999"): "has 20000000 runs, more than 100000",
+    ("nothing.toml",): "nothing.toml: there is no such file",
+    ("short.toml", "--out", "short.csv"): "results are a .parquet file",
+    (
+        "short.toml",
+        "--out",
+        "short.toml/a.parquet",
+    ): "short.toml: File exists; choose another folder with --out",
+    ("show", "nothing.parquet"): "nothing.parquet: there is no such file",
+    ("show", "short.toml"): "short.toml: is no Parquet file",
+}
+
+
+@pytest.mark.parametrize("arguments", REFUSED, ids=" ".join)
+def test_what_cannot_be_meant_is_refused_in_a_line(mirotwin, here, arguments):
+    assert REFUSED[arguments] in mirotwin.refuses("campaign", *arguments)
 
 
 def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
@@ -175,8 +170,8 @@ def runs(process):
 def started(here, seeds, *options):
     """The campaign in a process of its own, once three runs are in its journal; and the journal."""
     (here / "short.toml").write_text(SHORT.replace("3-5", seeds))
-    command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]
-    process = children.start([*command, "--jobs", "1", *options], stderr=-1, text=True)
+    words = ["campaign", "short.toml", "--jobs", "1", *options]
+    process = children.start([*program.COMMAND, *words], stderr=-1, text=True)
     part = journal_path(here / "runs/short.parquet")
     until(lambda: part.exists() and part.read_bytes().count(b"\n") >= 4)
     return process, part

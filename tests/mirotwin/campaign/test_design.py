@@ -20,7 +20,7 @@ from mirotwin.campaign.plan import plan_of as joined
 from mirotwin.campaign.ranges import seeds_of
 from mirotwin.campaign.rows import ResultRows
 from mirotwin.commands import main
-from tests.mirotwin.campaign.plans import SHORT, plan_of
+from tests.mirotwin.campaign.conftest import SHORT, plan_of
 
 ROOT = Path(__file__).parents[3]
 VALUES = st.recursive(

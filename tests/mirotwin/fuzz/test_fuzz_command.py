@@ -48,8 +48,7 @@ def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin
 
 @pytest.mark.parametrize("kind", ["frames", "session"])
 def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_path, kind):
-    code, out, err = mirotwin("fuzz", "--time", "0.3s", "--input", kind, "--out", tmp_path / "out")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("fuzz", "--time", "0.3s", "--input", kind, "--out", tmp_path / "out")
     assert out.startswith("miro.ihx: ")
     assert "never reached: " in out
     assert "no crashes" in out.splitlines()
@@ -64,17 +63,8 @@ def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines,
 
 
 def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
-    code, _, err = mirotwin("fuzz", "--time", "0.3s", "--covering", "give_up", "--out", tmp_path / "out")
-    assert code == 1
+    err = mirotwin.ends(1, "fuzz", "--time", "0.3s", "--covering", "give_up", "--out", tmp_path / "out")
     assert "--covering give_up: not reached by " in err
-
-
-def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
-    arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "0.3s")
-    code, out, _ = mirotwin("fuzz", "--time", "0.3s", *arguments, "--out", tmp_path / "out")
-    assert code == 1
-    assert "wheels_within_m_s: judged " in out
-    assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
 
 
 @pytest.mark.parametrize("error", [RuntimeError("oh"), SystemExit(0)], ids=repr)
@@ -82,9 +72,8 @@ def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, 
     def raises(*_):
         raise error
 
-    monkeypatch.setattr("mirotwin.verify.checks.course.PitchMonitor.period", raises)
-    code, _, err = mirotwin("fuzz", "--time", "1s", "--expect", "inside_pitch", "--out", tmp_path / "out")
-    assert code == 2
+    monkeypatch.setattr("mirotwin.verify.checks.course.InsidePitch.found", raises)
+    err = mirotwin.ends(2, "fuzz", "--time", "1s", "--expect", "inside_pitch", "--out", tmp_path / "out")
     assert "--expect: " in err
     assert f"check 'inside_pitch' cannot judge: {type(error).__name__}: " in err
     assert "; the campaign has ended; repair the check" in err
@@ -128,8 +117,7 @@ def test_plain_lines_tell_how_far_it_is_until_ctrl_c_ends_it_with_what_was_found
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_line(mirotwin, engines, tmp_path, arguments, said):
-    code, _, err = mirotwin("fuzz", *arguments, "--out", tmp_path / "out")
-    assert code == 2
+    err = mirotwin.ends(2, "fuzz", *arguments, "--out", tmp_path / "out")
     assert said in err
     assert err.count("\n") == 1
     assert not engines
@@ -157,8 +145,7 @@ def test_a_folder_with_something_in_it_is_refused_and_an_earlier_campaign_is_rep
 def test_a_corpus_inside_the_folder_that_is_replaced_is_refused(mirotwin, engines, tmp_path):
     out = tmp_path / "out"
     assert mirotwin("fuzz", "--time", "0.5s", "-q", "--out", out)[0] == 0
-    code, _, err = mirotwin("fuzz", "--out", out, "--force", "--corpus", out / "corpus")
-    assert code == 2
+    err = mirotwin.ends(2, "fuzz", "--out", out, "--force", "--corpus", out / "corpus")
     assert "which the campaign replaces; choose another folder with --out" in err
     other = mirotwin("fuzz", "--time", "0.5s", "-q", "--out", tmp_path / "other", "--corpus", out)
     assert other[0] == 0
@@ -167,8 +154,7 @@ def test_a_corpus_inside_the_folder_that_is_replaced_is_refused(mirotwin, engine
 @needs_sdcc
 def test_firmware_that_comes_up_with_a_fault_is_refused(mirotwin, engines, tmp_path):
     image = built(*MISTAKES["executes A5h"][:3]).path
-    code, _, err = mirotwin("fuzz", image, "--out", tmp_path / "out")
-    assert code == 2
+    err = mirotwin.ends(2, "fuzz", image, "--out", tmp_path / "out")
     assert "the firmware comes up with a fault: firmware executed the undefined opcode A5 at " in err
 
 
@@ -184,8 +170,7 @@ def test_an_image_without_symbols_can_be_fuzzed_and_has_no_functions_to_cover(mi
     bare = tmp_path / "bare.ihx"
     bare.write_bytes(own_image().path.read_bytes())
     command = ("fuzz", bare, "--time", "0.3s", "--out", tmp_path / "out")
-    code, _, err = mirotwin(*command, "--covering", "main")
-    assert code == 2
+    err = mirotwin.ends(2, *command, "--covering", "main")
     assert "the image has no symbols; put the .map or .cdb that the linker wrote beside the image" in err
     code, out, _ = mirotwin(*command)
     assert code == 0

@@ -75,19 +75,6 @@ def test_a_find_is_minimised_confirmed_and_left_as_a_case_that_replays(tmp_path,
 
 
 @needs_sdcc
-def test_minimising_twice_leaves_the_same_bytes(tmp_path):
-    image = planted("takes frames with a bad CRC")
-    left = []
-    for number in range(2):
-        triage = triage_of(image, tmp_path / str(number))
-        crash = triage.take(damaged(15))
-        left.append(
-            (crash, (tmp_path / str(number) / "out" / "crashes" / f"{crash.name}.input").read_bytes())
-        )
-    assert left[0] == left[1]
-
-
-@needs_sdcc
 def test_many_inputs_of_one_mistake_come_down_to_few_finds(tmp_path):
     triage = triage_of(planted("takes frames with a bad CRC"), tmp_path)
     failing = [damaged(place) + bytes(extra) for place in range(9, 22) for extra in range(3)]

@@ -11,8 +11,6 @@ import pytest
 from miro_robot.firmware import image_path
 from mirotwin.verify.cases.artifacts import image_beside
 from tests.mirotwin.testing.sessions import run, session
-from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
-from tests.mutants.planted import PLANTED
 
 MIXED = """
 def test_passes(link, robot):
@@ -281,43 +279,6 @@ def test_the_help_names_options_and_the_marker(tmp_path):
         assert word in out
     assert "@pytest.mark.mirotwin(scenario=" in out
     assert "its wheels" not in session(tmp_path, "--fixtures").stderr
-
-
-@pytest.mark.slow
-@needs_sdcc
-def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path):
-    image = built_in(tmp_path / "bad", *PLANTED["stops 15 ms late"][1:4])
-    tests = """
-def test_the_failsafe_stops_both_wheels(link, robot):
-    link.drive({0: (500, 500)}, ms(100))
-    link.send(velocities={0: (500, 500)})
-    robot.break_at("motion_stop", within=ms(111))
-
-@pytest.mark.mirotwin(expect={"failsafe_stop_ms": True})
-def test_the_same_by_a_check(link, world):
-    link.send(velocities={0: (500, 500)})
-    world.run_for(ms(200))
-"""
-    options = ["--mirotwin-firmware", image.path.relative_to(tmp_path), "--mirotwin-artifacts=left"]
-    failed = session(tmp_path, *options, tests=tests)
-    assert failed.returncode == 1
-    assert "2 failed" in failed.stdout
-    assert "motion_stop was not reached within 111 ms" in failed.stdout
-    (line, _) = re.findall(r"^  (pytest .*)$", failed.stdout, re.MULTILINE)
-    replay, debug = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
-    assert debug == replay.replace("mirotwin replay", "mirotwin debug")
-    left = re.search("left/[^/]+/firmware.ihx", replay)
-    assert replay.endswith(f"/case.stream --firmware {left[0]}")
-    replayed = run(tmp_path, replay)
-    assert replayed.returncode == 1
-    assert "fails as recorded: failsafe_stop_ms" in replayed.stderr
-    cured = run(tmp_path, replay.replace(left[0], str(image_path())))
-    assert cured.returncode == 0
-    assert line.endswith("--mirotwin-seed 0 --mirotwin-firmware bad/out/miro.ihx")
-    again = run(tmp_path, line)
-    assert again.returncode == 1
-    assert "motion_stop was not reached within 111 ms" in again.stdout
-    assert session(tmp_path).returncode == 0
 
 
 @pytest.mark.slow

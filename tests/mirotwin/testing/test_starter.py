@@ -18,8 +18,7 @@ LATE = PLANTED["stops 15 ms late"]
 
 
 def test_without_a_name_each_example_has_a_line(mirotwin):
-    code, out, err = mirotwin("examples")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("examples")
     assert [line.split()[0] for line in out.splitlines()[:-1]] == list(starter.EXAMPLES)
     assert max(map(len, out.splitlines())) <= 80
 
@@ -31,12 +30,10 @@ def test_all_that_lies_in_the_folder_can_be_written():
 
 @pytest.mark.parametrize("name", starter.EXAMPLES)
 def test_an_example_is_written_file_by_file(mirotwin, tmp_path, name):
-    code, out, err = mirotwin("examples", name, tmp_path / "here")
-    assert (code, err) == (0, "")
-    assert [Path(line) for line in out.splitlines()] == [
-        tmp_path / "here" / one for one, _ in starter.example_files(name)
-    ]
-    assert all(path.is_file() for path in map(Path, out.splitlines()))
+    out = mirotwin.succeeds("examples", name, tmp_path / "here")
+    written = [Path(line) for line in out.splitlines()]
+    assert written == [tmp_path / "here" / one for one, _ in starter.example_files(name)]
+    assert all(path.is_file() for path in written)
 
 
 def test_what_is_written_into_the_current_folder_is_said_to_be_there(mirotwin, tmp_path, monkeypatch):
@@ -48,11 +45,8 @@ def test_what_is_written_into_the_current_folder_is_said_to_be_there(mirotwin, t
 
 def test_a_file_with_other_content_is_replaced_by_force_alone(mirotwin, tmp_path):
     (tmp_path / "late.ihx").write_text("mine")
-    code, _, err = mirotwin("examples", "firmware", tmp_path)
-    assert code == 2
-    assert err == (
-        f"mirotwin: error: {tmp_path}: holds late.ihx already; name another folder, or replace with --force\n"
-    )
+    said = mirotwin.refuses("examples", "firmware", tmp_path)
+    assert said == f"{tmp_path}: holds late.ihx already; name another folder, or replace with --force"
     assert os.listdir(tmp_path) == ["late.ihx"]
     assert mirotwin("examples", "firmware", tmp_path, "--force")[0] == 0
     assert (tmp_path / "mine.ihx").read_bytes() == image_path().read_bytes()
@@ -70,9 +64,7 @@ def test_a_link_is_not_written_through(mirotwin, tmp_path):
     ("name", "hint"), [("frimware", "did you mean firmware?"), ("x", "there are firmware, ")]
 )
 def test_a_name_that_is_none_is_answered_with_those_there_are(mirotwin, tmp_path, name, hint):
-    code, _, err = mirotwin("examples", name, tmp_path)
-    assert code == 2
-    assert hint in err
+    assert hint in mirotwin.ends(2, "examples", name, tmp_path)
 
 
 def test_the_late_image_is_the_shipped_firmware_with_one_mistake():
@@ -92,12 +84,10 @@ def tree(folder):
 
 
 def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_path):
-    code, out, err = mirotwin("init", tmp_path / "mine")
-    assert (code, err) == (0, "")
-    assert tree(tmp_path / "mine") == {name for name, _ in starter.project_files()}
-    assert {"Makefile", "firmware/main.c", "tests/test_robot.py", ".github/workflows/firmware.yml"} <= tree(
-        tmp_path / "mine"
-    )
+    out = mirotwin.succeeds("init", tmp_path / "mine")
+    found = tree(tmp_path / "mine")
+    assert found == {name for name, _ in starter.project_files()}
+    assert {"Makefile", "firmware/main.c", "tests/test_robot.py", ".github/workflows/firmware.yml"} <= found
     assert f"next: cd {tmp_path}/mine && make test" in out
 
 
@@ -120,9 +110,8 @@ def test_an_empty_folder_will_do_and_other_files_stay(mirotwin, tmp_path):
 
 def test_nothing_is_written_where_one_of_the_files_is_there_already_and_differs(mirotwin, tmp_path):
     (tmp_path / "Makefile").write_text("all:\n")
-    code, out, err = mirotwin("init", tmp_path)
-    assert (code, out) == (2, "")
-    assert err == f"mirotwin: error: {tmp_path}: holds Makefile already; name a folder that is new or empty\n"
+    said = mirotwin.refuses("init", tmp_path)
+    assert said == f"{tmp_path}: holds Makefile already; name a folder that is new or empty"
     assert tree(tmp_path) == {"Makefile"}
     (tmp_path / "Makefile").unlink()
     assert mirotwin("init", tmp_path)[0] == mirotwin("init", tmp_path)[0] == 0
@@ -130,22 +119,17 @@ def test_nothing_is_written_where_one_of_the_files_is_there_already_and_differs(
 
 def test_a_file_is_no_folder(mirotwin, tmp_path):
     (tmp_path / "a").write_text("")
-    assert mirotwin("init", tmp_path / "a")[0] == 2
-    code, _, err = mirotwin("init", tmp_path / "a" / "b")
-    assert code == 2
-    assert err.count("\n") == 1
+    mirotwin.refuses("init", tmp_path / "a")
+    mirotwin.refuses("init", tmp_path / "a" / "b")
 
 
 def test_an_installation_without_the_files_says_so(mirotwin, tmp_path, monkeypatch):
     monkeypatch.setattr(starter, "source_folder", lambda: None)
-    code, _, err = mirotwin("init", tmp_path / "a")
-    assert code == 2
-    assert "not part of this installation" in err
+    assert "not part of this installation" in mirotwin.ends(2, "init", tmp_path / "a")
 
 
 def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(mirotwin, tmp_path):
-    code, out, err = mirotwin("init", "--without-firmware", tmp_path / "mine")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("init", "--without-firmware", tmp_path / "mine")
     assert tree(tmp_path / "mine") == {
         name
         for name, _ in starter.project_files()

@@ -6,15 +6,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import load_hex
 from mirotwin.fuzz.oracle import RobotOracle
 from mirotwin.fuzz.target import target_for
-from mirotwin.verify.bare.case import case_text
-from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.steps.running import collect
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
+from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
 
 ROOT = Path(__file__).parents[3]
 HEAD = 'scenario = "silent"\nduration_s = 0.5\n'
@@ -89,9 +85,7 @@ NO_TEST = {
 @pytest.mark.parametrize("arguments", NO_TEST, ids=" ".join)
 def test_nothing_to_test_is_bad_input(mirotwin, folder, arguments):
     (folder / "empty").mkdir()
-    code, out, err = mirotwin("test", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"mirotwin: error: {NO_TEST[arguments]}")
+    assert mirotwin.refuses("test", *arguments).startswith(NO_TEST[arguments])
 
 
 def test_no_path_at_all_is_bad_input(mirotwin):
@@ -149,8 +143,7 @@ def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin,
         assert (code, err.startswith(f"mirotwin: fails as recorded: {check}")) == (1, True)
     assert not (folder / "left/hil-sub-e/case.stream").exists()  # no check knows an answer's fields
     report = (folder / "left/hil-sub-e/report.txt").read_text().splitlines()
-    code, _, err = mirotwin("run", "left/hil-sub-e/scenario.toml", "--out", "again", "-q", "--no-figure")
-    assert code == 1
+    err = mirotwin.ends(1, "run", "left/hil-sub-e/scenario.toml", "--out", "again", "-q", "--no-figure")
     assert err == f"mirotwin: {report[1]}\n"
     assert report[-1] == "mirotwin test hil/sub/e.scenario.toml --set duration_s=0.4"
 
@@ -177,22 +170,19 @@ def test_what_steps_save_needs_a_folder(mirotwin, folder):
 
 
 def test_run_does_steps_too_and_its_recording_replays(mirotwin, folder):
-    code, _, err = mirotwin("run", "hil/sub/b.scenario.toml", "--out", "run", "-q", "--no-figure")
-    assert code == 1
+    err = mirotwin.ends(1, "run", "hil/sub/b.scenario.toml", "--out", "run", "-q", "--no-figure")
     assert err.startswith(f"mirotwin: step failed: {TOO_SOON}")
     assert '"count": 3' in (folder / "run/summary.json").read_text()
     assert mirotwin("replay", "run/run.mcap", "-q")[0] == 0
     assert mirotwin("run", "hil/a.scenario.toml", "--out", "good", "-q", "--no-figure") == (0, "", "")
-    code, _, err = mirotwin("run", "hil/a.scenario.toml", "--record", "full")
-    assert code == 2
+    err = mirotwin.ends(2, "run", "hil/a.scenario.toml", "--record", "full")
     assert "--record full does not go with the steps of hil/a.scenario.toml" in err
 
 
 @pytest.mark.parametrize("command", [["fw", "trace"], ["camera", "look"]])
 def test_commands_that_would_leave_steps_out_say_so(mirotwin, folder, command):
     time = ["--at", "0.1s"] if command == ["camera", "look"] else ["--to", "1ms"]
-    code, _, err = mirotwin(*command, "hil/a.scenario.toml", *time)
-    assert code == 2
+    err = mirotwin.ends(2, *command, "hil/a.scenario.toml", *time)
     assert "has 3 steps, which only `mirotwin run` and `mirotwin test` do; run it, and give the run" in err
 
 
@@ -279,36 +269,7 @@ def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
     assert out.splitlines()[-1] == "1 cannot be run, 1 passed"
 
 
-def test_a_case_of_a_bare_processor_runs_on_any_image_and_ends_with_3_for_a_fault(mirotwin, tmp_path):
-    line = BareLine(bit_ticks=1152)
-    hex_file(tmp_path / "undefined.ihx", b"\xa5")
-    hex_file(tmp_path / "spins.ihx", b"\x80\xfe")
-    image = load_hex(tmp_path / "undefined.ihx")
-    header = case_text(image, line, [Transmission(5000, DOWN, b"a")], 9000)
-    expecting = header.replace("#: [bare]", "#: [expect]\n#: no_fault = true\n#: [bare]")
-    (tmp_path / "a.stream").write_text(expecting)
-    code, out, _ = mirotwin("test", tmp_path, "--firmware", tmp_path / "undefined.ihx")
-    assert code == 3
-    assert out.splitlines()[:2] == [
-        f"FAULT  {tmp_path}/a.stream",
-        "    expectation failed: no_fault: tick 12 (0.001 ms): firmware executed the undefined opcode A5 at"
-        " 0x0000, tick 12",
-    ]
-    code, out, _ = mirotwin("test", tmp_path, "--firmware", tmp_path / "spins.ihx")
-    assert (code, out.splitlines()[-1]) == (0, "1 passed")
-    code, out, _ = mirotwin("test", tmp_path)
-    assert (code, "which has no firmware of its own; give --firmware IMAGE.ihx" in out) == (2, True)
-
-
 def test_a_check_that_no_case_names_is_refused(mirotwin, tmp_path):
     (tmp_path / "b.stream").write_text(PASSES)
-    code, _, err = mirotwin("test", tmp_path / "b.stream", "--check", "mine.py:judge")
-    assert code == 2
+    err = mirotwin.ends(2, "test", tmp_path / "b.stream", "--check", "mine.py:judge")
     assert "--check: no case is judged by mine.py:judge; leave it out" in err
-
-
-def test_cases_of_the_robot_run_on_its_own_firmware(mirotwin, tmp_path):
-    (tmp_path / "a.stream").write_text(PASSES.replace("2\n", "2\n#: expect.frames_accepted_min = 1\n", 1))
-    code, _, _ = mirotwin("test", tmp_path, "--junit", tmp_path / "j.xml")
-    assert code == 1
-    assert own_image().sha256 in (tmp_path / "j.xml").read_text()

@@ -202,13 +202,6 @@ def test_afl_showmap_shows_the_edges_of_one_input(tmp_path):
     assert (tmp_path / "map").read_text() == "000001:1\n000002:1\n000003:1\n"
 
 
-def test_afl_showmap_shows_the_edges_of_a_folder(tmp_path):
-    write_seeds(tmp_path / "seeds", {"a": b"DUx", "b": b"x"})
-    showmap("-i", str(tmp_path / "seeds"), "-o", str(tmp_path / "maps"))
-    lines = [len(path.read_text().splitlines()) for path in sorted((tmp_path / "maps").iterdir())]
-    assert lines == [3, 1]
-
-
 def test_afl_tmin_keeps_what_fails(tmp_path):
     (tmp_path / "in").write_bytes(WORD + b"and more of it")
     target = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", spec().text()]

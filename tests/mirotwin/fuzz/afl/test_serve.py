@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mirotwin.fuzz.afl import serve
 from mirotwin.fuzz.afl.job import read_executions
 from mirotwin.fuzz.afl.serve import CASES_VARIABLE, MAP_VARIABLE, attach, wait_status
 from tests import children
-from tests.mirotwin.fuzz.afl.double import MAP_SIZE, ROOT, WORD, Double, spec
+from tests.mirotwin.fuzz.afl.double import ROOT, WORD, spec
 
 PRIVATE, CREATE, REMOVE = 0, 0o1000, 0
 CASES_BYTES = 4096
@@ -116,18 +116,8 @@ def by_hand(specification, data):
 def afl():
     """It has said hello to the server of a double."""
     with FakeAfl(spec()) as found:
-        found.word = found.hello()
+        found.hello()
         yield found
-
-
-def test_the_first_word_says_options_size_of_the_map_and_shared_memory(afl):
-    said = afl.word
-    assert said & 0x8000_0001 == 0x8000_0001
-    assert said & 0x4000_0000, "the size of the map follows"
-    assert ((said & 0x00FF_FFFE) >> 1) + 1 == MAP_SIZE
-    assert said & 0x0100_0000, "test cases come through shared memory"
-    assert not said & 0x3000_0000, "neither a snapshot module nor a dictionary"
-    assert afl.end() == 0
 
 
 def test_the_process_that_is_told_cannot_exist(afl):
@@ -135,45 +125,11 @@ def test_the_process_that_is_told_cannot_exist(afl):
     assert process > int(Path("/proc/sys/kernel/pid_max").read_text())
 
 
-def test_edges_are_counted_in_the_memory_of_afl_which_is_as_long_as_it_was_made(afl):
-    assert (len(afl.edges.memory), len(afl.cases.memory)) == (65536, CASES_BYTES)
-    assert afl.run(b"DUC") == (afl.run(b"DUC")[0], 0)
-    assert bytes(afl.edges.memory) == b"\0\1\1\1\1".ljust(65536, b"\0")
-    afl.run(b"hello")
-    assert bytes(afl.edges.memory) == b"\0\1".ljust(65536, b"\0")
-
-
-@pytest.mark.parametrize("kind", [1, 2, 8, 93])
-def test_the_signal_of_a_find_tells_its_kind(kind):
-    with FakeAfl(spec(kind=kind)) as afl:
-        afl.hello()
-        status = afl.run(WORD)[1]
-        assert os.WIFSIGNALED(status)
-        assert os.WTERMSIG(status) - serve.FIRST_SIGNAL == kind - 1
-        assert afl.run(b"hello")[1] == 0
-
-
 @given(st.integers(1, 255))
 def test_each_kind_of_finding_is_a_signal_that_kills(kind):
     status = wait_status(kind)
     assert os.WIFSIGNALED(status)
     assert os.WTERMSIG(status) > signal.SIGSYS, "none that a program dies of by itself"
-
-
-@pytest.mark.slow
-def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does(afl):
-    own, seen = Double(), {}
-
-    @settings(max_examples=1000, database=None)
-    @given(st.binary(max_size=8) | st.binary(max_size=4).map(lambda tail: WORD + tail))
-    def one(data):
-        status = afl.run(data)[1]
-        assert status == wait_status(own.run(data))
-        seen.setdefault(data, status)
-        assert seen[data] == status
-
-    one()
-    assert len(set(seen.values())) == 2
 
 
 def test_a_length_beyond_the_segment_is_cut_to_it(afl):

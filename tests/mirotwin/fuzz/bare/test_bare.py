@@ -208,16 +208,6 @@ def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
     assert target.failure.check == "keeps_the_last"
 
 
-def test_a_check_that_raises_is_a_finding_that_says_where():
-    def divides(run):
-        return 1 // (len(run.received) - 2)
-
-    target = BareTarget(image(SLEEPS), "bytes", check=check(divides))
-    assert target.run(b"ab") == CHECK_CODE
-    assert "raised ZeroDivisionError" in target.failure.what
-    assert "test_bare.py:" in target.failure.what
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from mirotwin import campaign
 from mirotwin.commands import main
-from tests.mirotwin.campaign.plans import InThisProcess, plan_of
+from tests.mirotwin.campaign.conftest import InThisProcess, plan_of
 from tests.mirotwin.report.page import browser
 from tests.mirotwin.report.page.conftest import called
 from tests.mirotwin.report.page.test_run_page import Markup

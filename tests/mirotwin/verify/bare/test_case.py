@@ -17,7 +17,6 @@ from mirotwin.verify.bare.run import BarePlayback
 from tests.host import distribution
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 
-MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
 WRONG = 'def short(run):\n    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None\n'
 
 
@@ -50,27 +49,6 @@ def test_a_case_fails_again_as_recorded(tmp_path, data, firmware, code, said):
     _, again = rerun_bare_case(case(tmp_path, data, firmware), image(firmware))
     assert (again.code, again.failure is not None) == (code, True)
     assert again.lines[0].startswith(said)
-
-
-@pytest.mark.parametrize("data", [b"ab!", b"ab?"])
-def test_other_firmware_cures_it(tmp_path, data):
-    _, again = rerun_bare_case(case(tmp_path, data), image(MENDED))
-    assert (again.code, again.failure) == (0, None)
-    assert again.lines[0].startswith("cured: ")
-
-
-def test_other_firmware_may_fail_otherwise(tmp_path):
-    _, again = rerun_bare_case(case(tmp_path, b"ab!"), image("NOP\n" + SLEEPS.replace("ORG 23h", "ORG 23h")))
-    assert (again.code, again.failure.fault) == (3, True)
-    assert again.lines[0].startswith("still fails, but not as recorded: ")
-
-
-def test_a_case_that_does_not_fail_again_differs(tmp_path):
-    path = case(tmp_path, b"ab!")
-    path.write_text(path.read_text().replace(" > 61 62 21", " > 61 62 20"))
-    _, again = rerun_bare_case(path, image(SLEEPS))
-    assert (again.code, again.failure) == (4, None)
-    assert again.lines[0].startswith("not reproduced: no_fault passes")
 
 
 def test_a_case_of_a_check_needs_that_check(tmp_path):

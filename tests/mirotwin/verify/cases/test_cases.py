@@ -1,7 +1,5 @@
 """Cases: what is left of a failure gives it again, to the tick."""
 
-import sys
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,7 +12,7 @@ from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text, tables_of, write_case
 from mirotwin.verify.checks.happens import expect_of
-from tests import children
+from tests.mirotwin import program
 from tests.mirotwin.verify.checks.rig import MS, needs_sdcc, own_image, planted, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
 
@@ -44,28 +42,22 @@ def failing(tmp_path, expect="failsafe_stop_ms = 100.0"):
 def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path, engine):
     path = failing(tmp_path)
     verdict = stream.read(path).header.verdict
-    program = [sys.executable, "-c", "from mirotwin.entry import main; main()"]
-    command = [*program, "replay", str(path), "-q", "--engine", engine]
-    found = children.run(command, capture_output=True, text=True)
+    found = program.run("replay", path, "-q", "--engine", engine)
     assert (found.returncode, found.stderr) == (1, f"mirotwin: fails as recorded: {verdict}\n")
 
 
 def test_settings_that_cure_it_are_told(mirotwin, tmp_path):
     path = failing(tmp_path)
-    code, out, err = mirotwin("replay", path, "-q", "--expect", "failsafe_stop_ms=110.0")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("replay", path, "-q", "--expect", "failsafe_stop_ms=110.0")
     assert out.startswith("cured: failsafe_stop_ms passes; recorded: failsafe_stop_ms: net0/robot1: tick ")
-    code, _, err = mirotwin("replay", path, "-q", "--expect", "failsafe_stop_ms=90.0")
-    assert code == 1
+    err = mirotwin.ends(1, "replay", path, "-q", "--expect", "failsafe_stop_ms=90.0")
     assert "still fails, but not as recorded: failsafe_stop_ms: net0/robot1: " in err
 
 
 def test_a_case_that_does_not_fail_again_is_a_difference(mirotwin, tmp_path):
     path = failing(tmp_path)
     path.write_text(path.read_text().replace("after_ms = 100.0", "after_ms = 110.0"))
-    code, _, err = mirotwin("replay", path, "-q")
-    assert code == 4
-    assert "not reproduced: failsafe_stop_ms passes" in err
+    assert "not reproduced: failsafe_stop_ms passes" in mirotwin.ends(4, "replay", path, "-q")
 
 
 def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(mirotwin, tmp_path):
@@ -88,9 +80,7 @@ def test_a_case_of_planted_firmware_is_cured_by_the_shipped_one(mirotwin, tmp_pa
     checks.finish()
     path = tmp_path / "late.stream"
     write_case(path, case_of_checks(world, trace, checks))
-    code, _, err = mirotwin("replay", path, "-q")
-    assert code == 2
-    assert "name the image with --firmware" in err
+    assert "name the image with --firmware" in mirotwin.ends(2, "replay", path, "-q")
     code, _, err = mirotwin("replay", path, "-q", "--firmware", image.path)
     assert (code, err.count("fails as recorded: failsafe_stop_ms")) == (1, 1)
     code, out, _ = mirotwin("replay", path, "-q", "--firmware", own_image().path)
@@ -120,8 +110,7 @@ def test_an_event_that_must_not_come_is_judged_again(mirotwin, tmp_path):
     heard = world.run_until(conditions.Heard(), within=80 * MS)
     expect = expect_of("never_happens", conditions.Heard(), 60 * MS, 140 * MS)
     write_case(tmp_path / "a.stream", case_text(world, trace, expect, "never_happens: of old"))
-    code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q")
-    assert code == 1
+    err = mirotwin.ends(1, "replay", tmp_path / "a.stream", "-q")
     assert f"never_happens: net0/robot1: tick {heard.tick} " in err
 
 
@@ -158,12 +147,10 @@ def test_a_verdict_of_a_check_that_nothing_expects_is_refused(mirotwin, tmp_path
     path = failing(tmp_path)
     path.write_text(path.read_text().replace("[expect.failsafe_stop_ms]", "[expect.motors_off_ms]"))
     for command in (("replay", path, "-q"), ("debug", path, "-x", "where")):
-        code, out, err = mirotwin(*command)
-        assert (code, out) == (2, "")
+        err = mirotwin.refuses(*command)
         assert "the verdict is of the check 'failsafe_stop_ms', which nothing expects" in err
 
 
 def test_a_case_ends_where_it_failed_whatever_the_duration_of_its_scenario(mirotwin, tmp_path):
-    code, _, err = mirotwin("replay", failing(tmp_path), "-q", "--set", "duration_s=0.25")
-    assert code == 1
+    err = mirotwin.ends(1, "replay", failing(tmp_path), "-q", "--set", "duration_s=0.25")
     assert "fails as recorded: failsafe_stop_ms" in err

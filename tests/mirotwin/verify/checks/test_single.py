@@ -170,12 +170,11 @@ def test_a_radio_that_loses_frames_needs_more_of_them():
 
 PERIODS = 60
 STARTS_OFF = "network.robot.start_error_x_cm=7.0"
-WEAK = "network.robot.drive.battery.voltage_v=0.7"
 FEW = f"duration_s={PERIODS * CONTROL_PERIOD_TICKS / 24e6}"
 
 
-def driven(*settings, name="line"):
-    world = World(load(name, [FEW, *settings]).scenario, 2, own_image())
+def driven(*settings):
+    world = World(load("line", [FEW, *settings]).scenario, 2, own_image())
     checks, tracks = Checks(world), Tracks()
     while not world.finished:
         tracks.add(world.step())
@@ -222,14 +221,6 @@ def test_a_robot_settles_in_time_or_fails_when_the_time_is_over():
     assert failures[0].wanted.startswith(
         f"within {SETTLED_CM:g} cm and {SETTLED_RAD:g} rad of the reference after"
     )
-
-
-def test_a_robot_with_an_empty_battery_neither_settles_nor_tracks():
-    settings = ("expect.settles_within_s=1.5", "expect.tracks_within_cm=3.0")
-    _, _, found = driven(*settings, WEAK)
-    assert (found["settles_within_s"], found["tracks_within_cm"]) == ("failed", "failed")
-    _, _, found = driven(*settings)
-    assert (found["settles_within_s"], found["tracks_within_cm"]) == ("passed", "passed")
 
 
 def test_a_robot_that_drives_over_the_edge_fails_once_for_each_time():

@@ -18,18 +18,6 @@ from tests.mirotwin.verify.conform.mistakes import MISTAKES
 pytestmark = pytest.mark.slow
 
 
-def test_presuppositions_are_rules_and_no_rule_presupposes_itself():
-    by_id = {rule.id: rule for rule in RULES}
-
-    def walk(id, path):
-        assert id not in path, f"{' -> '.join((*path, id))} is a circle"
-        for other in by_id[id].presupposes:
-            walk(other, (*path, id))
-
-    for id in by_id:
-        walk(id, ())
-
-
 def test_all_but_one_rule_presuppose_that_a_plain_frame_is_obeyed():
     assert [rule.id for rule in RULES if not rule.presupposes] == ["P24"]
     assert all(find("P24") in presupposed(rule) for rule in RULES if rule.id != "P24")
@@ -93,10 +81,6 @@ def test_a_presupposition_counts_by_way_of_rules_that_are_not_tried():
     assert [(one.rule, one.verdict) for one in found] == [("P24", "failed"), ("P44", "not judged")]
 
 
-def test_all_rules_are_tried_on_firmware_that_keeps_them():
-    assert {one.verdict for one in try_all(RULES, own_image())} == {"passed"}
-
-
 def test_a_rule_that_failed_after_a_firmware_fault_is_not_judged_and_the_fault_is_the_cause():
     rules = [find(id) for id in ("P24", "P29", "P54")]
     outcomes = with_faults(list(try_all(rules, image_of(FAULTS))), rules)
@@ -144,8 +128,7 @@ def test_a_usual_mistake_is_named_in_the_first_three_lines(name, mirotwin):
 
 @needs_sdcc
 def test_a_timeline_tells_what_was_sent_received_commanded_and_answered(mirotwin):
-    code, out, err = mirotwin("conform", "--explain", "P44")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("conform", "--explain", "P44")
     lines = out.splitlines()
     assert lines[0].startswith("P44 full duplex: A robot MUST hear the next frame while it answers")
     assert lines[3] == "net0/robot1 (N = 3): 9 expectations passed"

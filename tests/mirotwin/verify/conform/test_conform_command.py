@@ -18,8 +18,7 @@ def program(folder, code):
 
 
 def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin):
-    code, out, err = mirotwin("conform", "--rule", "P29", "--rule", "p02", "--rule", "P29")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("conform", "--rule", "P29", "--rule", "p02", "--rule", "P29")
     assert [line.split() for line in out.splitlines()] == [
         ["rule", "name", "verdict", "first", "failure"],
         ["P29", "stop", "passed"],
@@ -69,8 +68,7 @@ def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin, tmp_pat
     assert "trial of P03: net0/robot1: firmware ran past the end of its stack" in err
     row = next(line for line in out.splitlines() if line.startswith("P53"))
     assert "wanted no such fault (trial of P03), found firmware ran past the end" in row
-    code, _, err = mirotwin("replay", folder / "P03-fault.stream", "--firmware", image, "-q")
-    assert code == 3
+    err = mirotwin.ends(3, "replay", folder / "P03-fault.stream", "--firmware", image, "-q")
     assert err.startswith("mirotwin: fails as recorded: no_fault: net0/robot1: tick ")
 
 
@@ -127,11 +125,10 @@ def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_pat
 
 
 def test_all_rules_are_listed_and_none_is_tried(mirotwin):
-    code, out, err = mirotwin("conform", "--list")
-    assert (code, err) == (0, "")
+    out = mirotwin.succeeds("conform", "--list")
     for rule in ALL:
         assert rule.id in out
-    code, out, _ = mirotwin("conform", "--list", "--json")
+    out = mirotwin.succeeds("conform", "--list", "--json")
     assert [json.loads(line)["rule"] for line in out.splitlines()] == [rule.id for rule in ALL]
 
 
@@ -163,15 +160,11 @@ def test_what_cannot_be_meant_is_one_line_and_exit_code_2_and_leaves_nothing(
     mirotwin, arguments, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    code, out, err = mirotwin("conform", *arguments)
-    assert (code, out) == (2, "")
-    assert REFUSED[arguments] in err
-    assert len(err.splitlines()) == 1
+    assert REFUSED[arguments] in mirotwin.refuses("conform", *arguments)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_rule_that_a_scenario_names_and_is_not_there_is_refused(mirotwin):
-    code, _, err = mirotwin("run", "fig6", "--expect", "conforms_to=P99")
-    assert code == 2
+    err = mirotwin.ends(2, "run", "fig6", "--expect", "conforms_to=P99")
     assert "conforms_to=P99" in err
     assert "there is no rule 'P99'" in err

@@ -1,16 +1,22 @@
-"""The overlay: what a reader of the picture may rely on, and that labels keep clear of each other."""
+"""Pictures: what a reader of the overlay may rely on, and that a file no camera can have made is refused in a line."""
 
 import math
+import struct
+import warnings
+import zlib
+from contextlib import suppress
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from miro_exact.bad_input import BadInput
 from miro_host.eye.notes import Notes
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from mirotwin.camera import overlay
 from mirotwin.camera.overlay import INK, LOST, SCALE, Box, draw
-from mirotwin.camera.picture import Picture, taken
+from mirotwin.camera.picture import Picture, parse, png, taken
 from tests.host.eye.scenes import FRAME, tracker
 from tests.naive.painted_frame import PaintedFrame, PaintedRobot
 
@@ -104,3 +110,32 @@ def test_a_saved_picture_differs_by_rounding_where_colours_are_shown_in_full():
         blue = y + 1.772 * (cb - 128)
         shown = picture.image().getpixel((5, at))
         assert max(abs(a - b) for a, b in zip(shown, (red, green, blue), strict=True)) <= 1.0
+
+
+# Files that are no picture of ours
+
+WHOLE = png(Image.new("RGB", (320, 240), (30, 60, 90)))
+BEHIND_HEAD, BEFORE_END = 33, len(WHOLE) - 12
+KINDS = b"tRNS gAMA cHRM sRGB pHYs iCCP tEXt zTXt iTXt eXIf acTL fcTL fdAT".split()
+
+
+def with_chunk(kind, data, at):
+    """The picture with a chunk more, whose sum is right."""
+    body = kind + data
+    chunk = struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
+    return WHOLE[:at] + chunk + WHOLE[at:]
+
+
+@pytest.mark.parametrize("at", [BEHIND_HEAD, BEFORE_END])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_chunk_of_any_kind_and_size_is_passed_over_or_refused_without_a_warning(kind, at):
+    for size in range(0, 30, 3):
+        for data in (bytes(size), b"\xff" * size, b"a\0\0" + zlib.compress(bytes(size))):
+            with warnings.catch_warnings(), suppress(BadInput):
+                warnings.simplefilter("error")
+                assert parse(with_chunk(kind, data, at), "x.png").width == 320
+
+
+def test_a_colour_profile_of_nothing_is_damage():
+    with pytest.raises(BadInput, match=r"x\.png: is damaged: .*; write the picture again"):
+        parse(with_chunk(b"iCCP", b"", BEFORE_END), "x.png")
