@@ -1,39 +1,25 @@
-"""From power-on to the first sleep: the handshake with the two LM629, and a board where it fails."""
+"""From power-on to the first sleep: the handshake with the two LM629, a board where it fails, resets at other times."""
 
 from itertools import pairwise
 
 import msgspec
 import pytest
 
+from miro_exact.state import Flat
 from miro_protocol.decoder import Received, TelemetryDecoder
-from miro_protocol.frames import TelemetryFrame
+from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.wiring import load_wiring
-from tests.robot.firmware.rig import MS, Rig
+from tests.robot.firmware.rig import CHARACTER, MS, Rig
 
-RSTI, MSKI, LFIL, UDF, LTRJ, STT = 0x1D, 0x1C, 0x1E, 0x04, 0x1F, 0x01
-START_UP = [
-    (RSTI, "0000"),
-    (MSKI, "0000"),
-    (LFIL, "030f 0190 0028 0bb8 07d0"),  # ds 3; kp 400, ki 40, kd 3000, il 2000
-    (UDF, ""),
-    (LTRJ, "0020 0000 1755"),  # acceleration 5973
-]
-EXPECTED = [(opcode, bytes.fromhex(data)) for opcode, data in START_UP]
+LFIL, LTRJ, STT = 0x1E, 0x1F, 0x01
 RESET_PINS = 0x20
 
 
 @pytest.fixture
 def cold():
     return Rig(boot=False)
-
-
-def test_both_chips_are_set_up_alike(cold):
-    cold.run_to(4 * MS)
-    for chip in (cold.board.left, cold.board.right):
-        assert [(command.opcode, command.data) for command in cold.told(chip)] == EXPECTED
-        assert chip.status == 0x80  # motor off, no flags
 
 
 def test_reset_lasts_eight_lm629_clocks_and_is_given_once(cold):
@@ -50,12 +36,19 @@ def test_the_robot_is_ready_within_three_milliseconds_and_sleeps(cold):
     idle = cold.cpu.idle_cycles
     cold.run_ms(10)
     assert cold.cpu.idle_cycles - idle > 0.9 * 20_000
+    assert cold.board.left.status == cold.board.right.status == 0x80  # motor off, no flags
 
 
 def broken_board(**nets):
     wiring = load_wiring()
     changed = {net.replace("_", "."): source for net, source in nets.items()}
     return Rig(wiring=msgspec.structs.replace(wiring, nets={**wiring.nets, **changed}), boot=False)
+
+
+def resets(rig):
+    """How often the pin of both chips went up."""
+    levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
+    return sum(1 for before, after in pairwise(levels) if after and not before)
 
 
 def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported():
@@ -76,9 +69,7 @@ def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported():
 def test_the_reset_is_tried_again_eight_times_before_it_gives_up():
     rig = broken_board(left_rst="0")
     rig.run_to(100 * MS)
-    levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
-    rises = sum(1 for before, after in pairwise(levels) if after and not before)
-    assert rises == 8
+    assert resets(rig) == 8
 
 
 @pytest.mark.parametrize(("busy_clocks", "works"), [(600, True), (6000, False)])
@@ -93,8 +84,7 @@ def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks, works):
 def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try():
     rig = Rig(options=Lm629Options(reset_disarms_breakpoint=False), boot=False)
     rig.run_to(100 * MS)
-    levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
-    assert sum(1 for before, after in pairwise(levels) if after and not before) == 1
+    assert resets(rig) == 1
     rig.team(0, 5000, 5000)
     assert rig.told(rig.board.left)
 
@@ -119,3 +109,22 @@ def test_chips_that_stop_answering_are_reset_and_set_up_again():
     assert (LTRJ, bytes.fromhex("0020 00000fa0")) in commands
     assert commands[-2:] == [(LTRJ, bytes.fromhex("1808 00177000")), (STT, b"")]
     assert not rig.board.left.status & 0x80
+
+
+def test_a_reset_at_any_moment_is_no_fault_of_the_firmware():
+    rig = Rig()
+    tick = rig.send(encode(TeamFrame(0, 1, ((100, -100),) * 3), 3)) + CHARACTER
+    rig.run_to(tick)
+    state = Flat(rig.board)
+    decoding = state.save()
+    writing = 0
+    for later in range(0, 2 * MS, 36):  # the frame is tested, then both LM629 are written
+        state.load(decoding)
+        rig.board.run(tick + later)
+        writing += not rig.cpu.idle
+        rig.board.set_reset(1)
+        rig.board.run(tick + later + 48)
+        rig.board.set_reset(0)
+        rig.board.run(tick + later + MS)
+        assert not rig.board.faults, later
+    assert writing > 800

@@ -5,11 +5,10 @@ import shutil
 
 import pytest
 
-from miro_robot.firmware import image_path, source_folder
+from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.image.symbol_files import SourceLine
-from tests import children
 from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 
@@ -76,13 +75,6 @@ def test_the_robots_image_has_the_lines_of_inlined_functions_too():
     nibble = next(function for function in debug.functions if function.name == "_crc_nibble")
     inlined = {debug.line_at(address) for address in range(byte.first, byte.end)}
     assert inlined & {debug.line_at(address) for address in range(nibble.first, nibble.end)}
-
-
-def test_the_listing_beside_the_robots_image_is_what_its_makefile_writes(tmp_path, program):
-    folder = source_folder()
-    command = ["make", "-s", "-C", folder, f"OUT={tmp_path}", f"BUILD={tmp_path / 'build'}"]
-    children.run(command, check=True, capture_output=True)
-    assert (tmp_path / "miro.rst").read_text() == image_path().with_suffix(".rst").read_text()
 
 
 def test_sources_are_taken_from_the_first_folder_that_has_them(program, tmp_path):
