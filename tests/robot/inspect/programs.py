@@ -50,11 +50,11 @@ def build(folder, text=PROGRAM, *options):
     return folder / "program.ihx"
 
 
-def build_modules(folder, *modules):
+def build_modules(folder, *modules, options=()):
     """An image of several C files that are in `folder` already; it has the first one's name."""
     for module in modules:
-        _sdcc(folder, "--debug", "-c", f"{module}.c")
-    _sdcc(folder, "--debug", *(f"{module}.rel" for module in modules))
+        _sdcc(folder, "--debug", *options, "-c", f"{module}.c")
+    _sdcc(folder, "--debug", *options, *(f"{module}.rel" for module in modules))
     return folder / f"{modules[0]}.ihx"
 
 

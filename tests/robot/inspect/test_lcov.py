@@ -94,37 +94,9 @@ end_of_record
 NOT_KEPT = "not kept; add the files up with `lcov --add-tracefile`"
 
 
-def as_lcov_2(text):
-    """The same with functions as lcov writes them since 2.2: a leader for each first line, then its names."""
-    lines, indices, counts = [], {}, {}
-    for line in text.splitlines():
-        kind, _, value = line.partition(":")
-        if kind == "FN":
-            first, name = value.split(",")
-            counts.setdefault(first, []).append(name)
-        elif kind == "FNDA":
-            count, name = value.split(",")
-            first = next(first for first, names in counts.items() if name in names)
-            if first not in indices:
-                indices[first] = len(indices)
-                lines.append(f"FNL:{indices[first]},{first}")
-            lines.append(f"FNA:{indices[first]},{count},{name}")
-        else:
-            if kind == "SF":
-                indices, counts = {}, {}
-            lines.append(line)
-    return "\n".join(lines)
-
-
 def test_functions_are_read_as_lcov_2_writes_them():
     functions = {"_Z1fIiE": (3, 2), "_Z1fIcE": (3, 0), "main": (12, 5)}
     assert decode(LCOV_2, "x.info") == {"a.cpp": FileRecord({3: 2, 12: 5}, functions)}
-
-
-@settings(max_examples=40)
-@given(TRACEFILES)
-def test_both_forms_of_functions_say_the_same(tracefile):
-    assert decode(as_lcov_2(encode(tracefile)), "x.info") == tracefile
 
 
 @pytest.mark.parametrize(

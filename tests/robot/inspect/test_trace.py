@@ -4,9 +4,8 @@ from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, InstructionTrace, registers
 from miro_robot.inspect.watcher import attach, detach
-from miro_robot.mcs51.cpu import Cpu
-from tests.robot.mcs51.asm import assemble, image_of
-from tests.robot.mcs51.rig import RecordingBus
+from tests.robot.mcs51.asm import image_of
+from tests.robot.mcs51.rig import cpu_with
 
 PROGRAM = """
     LJMP main
@@ -31,12 +30,15 @@ sub:
 """
 
 
-def traced(cycles, only=None):
-    code = assemble(PROGRAM)
-    cpu = Cpu(RecordingBus())
-    cpu.load(code)
-    lines = []
-    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append, only))
+def attached(text=PROGRAM, **options):
+    """A CPU and the lines of the trace of what it will run."""
+    cpu, lines = cpu_with(text), []
+    attach(cpu, InstructionTrace(SymbolNames(image_of(text)), lines.append, **options))
+    return cpu, lines
+
+
+def traced(cycles, text=PROGRAM, **options):
+    cpu, lines = attached(text, **options)
     cpu.run(cycles)
     return lines
 
@@ -65,11 +67,9 @@ def test_sleep_and_the_interrupt_that_ends_it_have_lines_of_their_own():
 
 
 def test_sleep_is_one_line_however_the_run_is_cut():
-    code = assemble("NOP\nMOV PCON,#01h\nSJMP $")
-    cpu = Cpu(RecordingBus())
-    cpu.load(code)
-    lines = []
-    trace = InstructionTrace(SymbolNames(image_of(code)), lines.append, heading="heading")
+    text, lines = "NOP\nMOV PCON,#01h\nSJMP $", []
+    cpu = cpu_with(text)
+    trace = InstructionTrace(SymbolNames(image_of(text)), lines.append, heading="heading")
     attach(cpu, trace)
     for cycle in (10, 20, 500):
         cpu.run(cycle)
@@ -79,10 +79,9 @@ def test_sleep_is_one_line_however_the_run_is_cut():
 
 
 def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
-    code = assemble("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h")
-    machine = BareMachine(image_of(code), code_in_xram=True)
-    lines = []
-    attach(machine.cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
+    image, lines = image_of("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h"), []
+    machine = BareMachine(image, code_in_xram=True)
+    attach(machine.cpu, InstructionTrace(SymbolNames(image), lines.append))
     machine.run(max_cycles=30)
     shown = [line.split("MOV A,")[1].split()[0] for line in lines if "MOV A," in line]
     assert shown == ["#00h", "#01h", "#02h", "#03h", "#04h"]
@@ -91,7 +90,7 @@ def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
 def test_only_the_functions_asked_for_are_written():
     whole = traced(60)
     main = next(int(line.split()[1], 16) for line in whole if "MOV A,#12h" in line)
-    only = traced(60, {main})
+    only = traced(60, only={main})
     assert only
     assert [line for line in whole if f"  {main:04X}h" in line and "--" not in line] == [
         line for line in only if "--" not in line
@@ -99,12 +98,8 @@ def test_only_the_functions_asked_for_are_written():
 
 
 def test_the_changed_registers_lead_from_the_first_state_to_the_last():
-    code = assemble(PROGRAM)
-    cpu = Cpu(RecordingBus())
-    cpu.load(code)
+    cpu, lines = attached()
     state = dict(zip(REGISTERS, registers(cpu), strict=True))
-    lines = []
-    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
     cpu.run(24)  # before the first interrupt, which pushes
     for line in lines:
         for change in line[78:].split():
@@ -120,10 +115,5 @@ def test_of_a_program_that_changes_itself_only_so_many_instructions_are_remember
 
 
 def test_ports_show_the_pins_that_changed():
-    lines = []
-    code = assemble("CLR P1.3\nMOV P1,#5Ah\nMOV P1,#5Ah\nSETB P1.0\nMOV P2,#0Fh\nNOP")
-    cpu = Cpu(RecordingBus())
-    cpu.load(code)
-    attach(cpu, InstructionTrace(SymbolNames(image_of(code)), lines.append))
-    cpu.run(8)
+    lines = traced(8, "CLR P1.3\nMOV P1,#5Ah\nMOV P1,#5Ah\nSETB P1.0\nMOV P2,#0Fh\nNOP")
     assert [line[82:] for line in lines] == ["P1.3=0", "P1=5A", "", "P1.0=1", "P2=0F"]

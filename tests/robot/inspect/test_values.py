@@ -15,7 +15,7 @@ from miro_robot.image.variables import parse_variables, variables_of
 from miro_robot.inspect.values import read_value, write_value
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
-from tests import children
+from tests.robot.inspect.programs import build_modules
 
 PROGRAM = """
 #include <8052.h>
@@ -49,20 +49,13 @@ void main(void) {
 """
 OTHER = "static int twice = 7; int other(void) { return twice + 3; }\n"
 
-needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
-
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     folder = tmp_path_factory.mktemp("typed")
     (folder / "typed.c").write_text(PROGRAM)
     (folder / "other.c").write_text(OTHER)
-    flags = ["-mmcs51", "--iram-size", "256", "--xram-size", "256", "--std-sdcc11", "--debug"]
-    for file in ("typed.c", "other.c"):
-        children.run(["sdcc", *flags, "-c", file], cwd=folder, check=True, capture_output=True)
-    link = ["sdcc", *flags, "typed.rel", "other.rel", "-o", "typed.ihx"]
-    children.run(link, cwd=folder, check=True, capture_output=True)
-    return load_hex(folder / "typed.ihx")
+    return load_hex(build_modules(folder, "typed", "other", options=("--xram-size", "256", "--std-sdcc11")))
 
 
 def at_rest(image):
@@ -111,7 +104,6 @@ VALUES = {
 }
 
 
-@needs_sdcc
 @pytest.mark.parametrize("name", VALUES)
 def test_a_variable_has_the_value_that_the_program_gave_it(name, program, cpu):
     value = read_value(cpu, program, name)
@@ -119,7 +111,6 @@ def test_a_variable_has_the_value_that_the_program_gave_it(name, program, cpu):
     assert type(value) is type(VALUES[name])
 
 
-@needs_sdcc
 def test_a_pointer_is_an_int_the_address_below_the_mark_of_the_memory(program, cpu):
     places = {one.name: one.address for each in variables_of(program).by_name.values() for one in each}
     assert read_value(cpu, program, "gp") & 0xFFFF == places["pc"]
@@ -147,7 +138,6 @@ WRITTEN = {
 }
 
 
-@needs_sdcc
 @pytest.mark.parametrize("name", WRITTEN)
 def test_what_is_written_is_read_and_nothing_beside_it_changes(name, program, cpu):
     others = [
@@ -159,7 +149,6 @@ def test_what_is_written_is_read_and_nothing_beside_it_changes(name, program, cp
     assert {other: read_value(cpu, program, other) for other in others} == before
 
 
-@needs_sdcc
 def test_members_that_are_not_named_stay(program, cpu):
     write_value(cpu, program, "fl", {"b": 0})
     assert read_value(cpu, program, "fl") == {"a": 1, "b": 0, "c": 300, "d": -2}
@@ -180,14 +169,12 @@ REFUSED = {
 }
 
 
-@needs_sdcc
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_name_that_cannot_be_read_is_refused_with_the_remedy(name, program, cpu):
     with pytest.raises(BadInput, match=REFUSED[name]):
         read_value(cpu, program, name)
 
 
-@needs_sdcc
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
@@ -218,12 +205,6 @@ def test_the_shipped_firmwares_variables_have_their_types():
     assert read_value(cpu, image, "tx_busy") == 0
     write_value(cpu, image, "acceleration_waits", 1)
     assert (read_value(cpu, image, "acceleration_waits"), read_value(cpu, image, "tx_busy")) == (1, 0)
-
-
-def test_a_misspelt_name_of_the_shipped_firmware_is_answered_with_what_comes_close():
-    image = load_hex(image_path())
-    with pytest.raises(BadInput, match=r"last_lef: there is no such variable; did you mean last_left"):
-        read_value(at_rest(image), image, "last_lef")
 
 
 def test_without_a_debug_file_the_test_says_the_type(tmp_path):

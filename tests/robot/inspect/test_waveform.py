@@ -18,12 +18,11 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform, nanoseconds
 from miro_robot.lm629.chip import PWM_TICKS
-from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.cpu import Cpu
 from miro_robot.wiring import Latch, load_wiring
 from tests.naive.waveform import Sampler, Treadmill
 from tests.robot.inspect.reading import read, tick_of
 from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import cpu_with
 
 MS = 24_000
 BIT = 2500
@@ -54,6 +53,16 @@ def waveform_of(board, begin, end, piece=2 * MS, **window):
         board.run(tick)
     waveform.close()
     return out.getvalue()
+
+
+def recorded(cpu, *cycles):
+    """The waveform of a CPU without a board that is run to these cycles."""
+    out = io.StringIO()
+    waveform = Waveform(out).attach(cpu)
+    for cycle in cycles:
+        cpu.run(cycle)
+    waveform.close()
+    return read(out.getvalue().encode())
 
 
 def sampled(sampler, first_tick, end_tick):
@@ -118,27 +127,17 @@ def test_a_pulse_of_the_bridge_has_the_length_that_its_magnitude_says():
 
 
 def test_without_a_board_there_are_the_wires_of_the_cpu_alone():
-    cpu = Cpu(Bus())
-    cpu.load(assemble("loop:\nCPL P1.3\nSJMP loop"))
-    out = io.StringIO()
-    waveform = Waveform(out).attach(cpu)
-    cpu.run(100)
-    waveform.close()
-    vcd = read(out.getvalue().encode())
+    cpu = cpu_with("loop:\nCPL P1.3\nSJMP loop")
+    vcd = recorded(cpu, 100)
     assert vcd.last_tick == 12 * cpu.cycles
     assert vcd.wires["p1_3"] == [(0, 1)] + [(12 + 36 * n, n & 1) for n in range(33)]
     assert not {wire for wire in vcd.wires if wire.startswith(("left", "right", "d"))}
 
 
 def test_more_edges_than_a_line_keeps_are_all_there():
-    cpu = Cpu(Bus())
-    cpu.load(assemble("loop:\nCPL P3.1\nSJMP loop"))
+    cpu = cpu_with("loop:\nCPL P3.1\nSJMP loop")
     cpu.txd.unread = True
-    out = io.StringIO()
-    waveform = Waveform(out).attach(cpu)
-    cpu.run(15_000)
-    waveform.close()
-    assert len(read(out.getvalue().encode()).wires["txd"]) == 1 + 5_000
+    assert len(recorded(cpu, 15_000).wires["txd"]) == 1 + 5_000
 
 
 TWO_PRIORITIES = """
@@ -169,30 +168,24 @@ SJMP loop
 """
 
 
+def looked_at_on_every_tick(text, end_tick):
+    sampler = Sampler(cpu_with(text))
+    sampler.run(end_tick)
+    return sampled(sampler, 0, end_tick)
+
+
 @pytest.mark.parametrize("mode", ["#00h", "#80h"], ids=["shift register", "mode 2"])
 def test_a_cpu_with_two_priorities_and_sleep_is_as_a_look_on_every_tick_finds_it(mode):
-    code = assemble(TWO_PRIORITIES.replace("MOV SP,#40h", f"MOV SP,#40h\nMOV SCON,{mode}"))
-    cpus = [Cpu(Bus()) for _ in range(2)]
-    out = io.StringIO()
-    for cpu in cpus:
-        cpu.load(code)
-    waveform = Waveform(out).attach(cpus[0])
-    for cycle in (1, 500, 501, 502, 600, 3000):
-        cpus[0].run(cycle)
-    waveform.close()
-    vcd = read(out.getvalue().encode())
-    sampler = Sampler(cpus[1])
-    sampler.run(vcd.last_tick)
-    expected = sampled(sampler, 0, vcd.last_tick)
-    assert vcd.until(vcd.last_tick) == expected
+    text = TWO_PRIORITIES.replace("MOV SP,#40h", f"MOV SP,#40h\nMOV SCON,{mode}")
+    vcd = recorded(cpu_with(text), 1, 500, 501, 502, 600, 3000)
+    assert vcd.until(vcd.last_tick) == looked_at_on_every_tick(text, vcd.last_tick)
     assert min(len(vcd.wires[wire]) for wire in ("isr_timer1", "asleep", "txd", "p3_1")) > 20
     both = [tick for tick, level in vcd.wires["isr_timer0"] if level and vcd.level_at("isr_timer1", tick)]
     assert both, "no routine was interrupted"
 
 
 def test_a_routine_that_began_before_the_recording_is_unknown_until_none_is_in_service():
-    cpu = Cpu(Bus())
-    cpu.load(assemble(TWO_PRIORITIES))
+    cpu = cpu_with(TWO_PRIORITIES)
     while cpu.pc != 0x1B:
         cpu.step()
     began = 12 * cpu.cycles
@@ -264,49 +257,24 @@ def test_the_header_has_no_clock_and_every_wire_one_bit():
     assert vcd.scopes["left_wr_n"] == "robot.left"
 
 
-ACTIONS = (
-    *(
-        "CPL P1.3",
-        "CPL P2.0",
-        "MOV P2,#5Ah",
-        "MOV P0,R0",
-        "MOV P3,#0FDh",
-        "MOV P3,#0FEh",
-        "MOV P3,#0FFh",
-        "XRL P1,#18h",
-    ),
-    *(
-        "INC R0",
-        "MUL AB",
-        "MOV SBUF,R0",
-        "MOV SCON,#00h",
-        "MOV SCON,#90h",
-        "MOV IP,#02h",
-        "MOV IP,#08h",
-        "CLR TXD",
-    ),
-    *("MOV PCON,#01h", "MOV IE,#8Ah", "MOV IE,#00h", "MOVX @DPTR,A", "SETB TF1", "NOP"),
-)
+ACTIONS = """
+CPL P1.3; CPL P2.0; MOV P2,#5Ah; MOV P0,R0; MOV P3,#0FDh; MOV P3,#0FEh; MOV P3,#0FFh; XRL P1,#18h; INC R0; MUL AB;
+MOV SBUF,R0; MOV SCON,#00h; MOV SCON,#90h; MOV IP,#02h; MOV IP,#08h; CLR TXD; MOV PCON,#01h; MOV IE,#8Ah;
+MOV IE,#00h; MOVX @DPTR,A; SETB TF1; NOP
+"""
 
 
 @pytest.mark.slow
 @settings(max_examples=40)
-@given(st.lists(st.sampled_from(ACTIONS), min_size=1, max_size=30), st.lists(st.integers(1, 300), max_size=4))
+@given(
+    st.lists(st.sampled_from(re.split(r";\s", ACTIONS.strip())), min_size=1, max_size=30),
+    st.lists(st.integers(1, 300), max_size=4),
+)
 def test_whatever_a_program_does_is_as_a_look_on_every_tick_finds_it(actions, cuts):
     head, _, _ = TWO_PRIORITIES.partition("loop:")
-    code = assemble("\n".join([head, "loop:", *actions, "LJMP loop"]))
-    cpus = [Cpu(Bus()) for _ in range(2)]
-    out = io.StringIO()
-    for cpu in cpus:
-        cpu.load(code)
-    waveform = Waveform(out).attach(cpus[0])
-    for cycle in [*sorted(cuts), 400]:
-        cpus[0].run(cycle)
-    waveform.close()
-    vcd = read(out.getvalue().encode())
-    sampler = Sampler(cpus[1])
-    sampler.run(vcd.last_tick)
-    assert vcd.until(vcd.last_tick) == sampled(sampler, 0, vcd.last_tick)
+    text = "\n".join([head, "loop:", *actions, "LJMP loop"])
+    vcd = recorded(cpu_with(text), *sorted(cuts), 400)
+    assert vcd.until(vcd.last_tick) == looked_at_on_every_tick(text, vcd.last_tick)
 
 
 def test_a_strobe_on_an_output_latch_moves_when_movx_writes_it():

@@ -1,7 +1,5 @@
 """SP leaves its stack: by each instruction that can write it, past data, round the top of RAM, below the start."""
 
-import shutil
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,8 +7,8 @@ from hypothesis import strategies as st
 from miro_robot.bare.machine import BareMachine
 from miro_robot.faults import FaultKind
 from miro_robot.image import Symbol, Symbols, load_hex
-from tests import children
 from tests.naive import stack as naive
+from tests.robot.inspect.programs import build
 from tests.robot.mcs51.rig import cpu_with
 
 OVER, UNDER = FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW
@@ -146,16 +144,9 @@ void main(void) { P1 = eat(12); while (1) PCON |= 1; }
 """
 
 
-@pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
 def test_firmware_whose_local_variables_leave_ram_is_caught(tmp_path):
     """No PUSH goes past FFh: SDCC's reentrant functions add to SP."""
-    (tmp_path / "dying.c").write_text(DYING)
-    children.run(
-        ["sdcc", "-mmcs51", "--iram-size", "256", "--stack-auto", "--debug", "dying.c"],
-        cwd=tmp_path,
-        check=True,
-    )
-    machine = BareMachine(load_hex(tmp_path / "dying.ihx"))
+    machine = BareMachine(load_hex(build(tmp_path, DYING, "--stack-auto", "--debug")))
     machine.run(max_cycles=200_000)
     assert [fault.kind for fault in machine.faults][:1] == [OVER]
     assert machine.faults[0].symbol == "_eat"
