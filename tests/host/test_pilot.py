@@ -10,10 +10,7 @@ from miro_host.integrator import AdamsBashforth, Integrator, Limits, integrator_
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
-from miro_host.references.arc import Arc
 from miro_host.references.line import StraightLine
-from miro_host.station import Station
-from miro_host.vision import Vision, VisionErrors
 
 LAW = YangKim(Gains())
 START = Posture(0.07, 0.02, -0.38)
@@ -130,33 +127,3 @@ def test_limits_name_what_is_wrong_with_them(name):
         Limits(**{name: 0.0})
     with pytest.raises(ValueError, match="period_s"):
         Integrator(Limits(), 0.0)
-
-
-def chain():
-    return Pilot(Arc(), LAW), Vision(VisionErrors(), 2), Station(3)
-
-
-def run(parts, frames):
-    steering, vision, station = parts
-    sent = []
-    for k in frames:
-        if k == 3:
-            station.request(1, 0)
-            station.request(2, 2, (5973,))
-        seen = vision.frame(Posture(0.01 * k, 0.02, 0.9), (0.3 * (k % 5), -0.2, 0.1))
-        command = steering.update(seen, k * PERIOD_S)
-        sent.append(station.frame([(command.left, command.right)] * 3))
-    return sent
-
-
-@pytest.mark.parametrize("cut", [0, 1, 2, 4, 5, 11])
-def test_saved_after_any_frame_and_continued_the_bytes_are_the_same(cut):
-    whole = run(chain(), range(20))
-    parts = chain()
-    run(parts, range(cut))
-    states = [snapshot(part) for part in parts]
-    copies = chain()
-    for copy, state in zip(copies, states, strict=True):
-        restore(copy, state)
-        assert snapshot(copy) == state
-    assert run(copies, range(cut, 20)) == whole[cut:]

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from miro_host.pilot import STANDSTILL, WheelCommand
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
-from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.scenario.keys import ControlNoise
 from miro_sim.world.control_noise import NoisyCommands
 from tests.sim.world.rig import world_of
@@ -93,22 +92,3 @@ def test_the_robot_drives_what_it_was_sent():
     quiet, noisy = run("")[1], run("control_noise = { w_rad_s = 4.0 }")[1]
     assert quiet[-1].robots[0].truth.theta_rad == pytest.approx(0.0, abs=1e-3)
     assert abs(noisy[-1].robots[0].truth.theta_rad) > 0.01
-
-
-@pytest.mark.parametrize(
-    ("lines", "expected"),
-    [
-        (
-            "control_noise.v_cm_s = 5",
-            "network[0].control_noise.v_cm_s: unknown key; use v_m_s, in metres per second",
-        ),
-        (
-            "control_noise.w_rad_s = -1",
-            "network[0].control_noise.w_rad_s: -1 is out of range; must be >= 0.0 in rad",
-        ),
-    ],
-)
-def test_a_bad_bound_is_named_with_its_place_and_its_remedy(lines, expected):
-    with pytest.raises(ScenarioError) as caught:
-        parse(TEXT.format(lines), "noisy.toml")
-    assert str(caught.value).startswith(f"noisy.toml: {expected}")

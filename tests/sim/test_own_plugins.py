@@ -86,18 +86,6 @@ def test_what_was_heard_is_saved_and_hashed():
     assert second.state.hashed() != first.state.hashed()
 
 
-def test_what_was_announced_and_waits_is_saved_but_not_hashed():
-    first, second, third = world(ByEar()), world(ByEar()), world(ByEar())
-    for one in (first, second):
-        one.run_to(10 * CONTROL_PERIOD_TICKS)
-    second.inject(b"\x55", at_tick=9_000_000)
-    assert second.state.hashed() == first.state.hashed()
-    assert second.state.save() != first.state.save()
-    third.load(second.save())
-    assert third.networks[0].outbox.waiting == second.networks[0].outbox.waiting != []
-    assert finish(second) != finish(first)  # a law that listens shows it
-
-
 def test_the_memory_of_a_law_is_part_of_the_digest():
     one, other = world(LeakyParameters()), world(LeakyParameters())
     for each in (one, other):

@@ -140,6 +140,8 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too():
         ("network.robot.reference.curvature_per_m=1", "unknown key; it belongs to the reference 'arc', which kind"),
         (".".join("abcdefghijklmnopqrstuvwxyz") + "=1", "a key of more than 16 parts; remove it"),
         ("network=" + "[" * 100_000, "nested too deeply"),
+        ("network.control_noise.v_cm_s=5", "unknown key; use v_m_s, in metres per second"),
+        ("network.control_noise.w_rad_s=-1", "-1 is out of range; must be >= 0.0 in rad"),
         ("title=" + "x" * (513 << 10), "holds more than 512 KiB"),
         ("x\ny\x1b[2J=1", "unknown key"),
     ],

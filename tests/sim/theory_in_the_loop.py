@@ -28,6 +28,11 @@ RUNS = {
     "fig6, body_frame and predict": ("fig6", BODY),
     "fig8, body_frame and predict": ("fig8", BODY),
 }
+COLUMNS = (
+    *("run", "f1 m/s2 (a period later)", "P1: |f1| above / above P1 |sat s1|"),
+    *("f2 rad/s2 (..)", "P2: |f2| above / above P2 |sat s2|"),
+    *("near / across", "reversals / back", "chattering m/s2"),
+)
 
 
 def run(name, seed):
@@ -84,18 +89,7 @@ def main():
     arguments = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     arguments.add_argument("--seeds", type=int, default=10)
     seeds = arguments.parse_args().seeds
-    table = Table(box=None, pad_edge=False)
-    for column in (
-        "run",
-        "f1 m/s2 (a period later)",
-        "P1: |f1| above / above P1 |sat s1|",
-        "f2 rad/s2 (..)",
-        "P2: |f2| above / above P2 |sat s2|",
-        "near / across",
-        "reversals / back",
-        "chattering m/s2",
-    ):
-        table.add_column(column)
+    table = Table(*COLUMNS, box=None, pad_edge=False)
     for name in RUNS:
         table.add_row(*row(name, seeds))
     Console(width=200).print(table)

@@ -1,16 +1,7 @@
-"""Pictures for tests of the tracker: robots on a pitch, and a tracker that has seen them.
-
-`python -m tests.host.eye.scenes python` prints what a tracker makes of twelve pictures, and its state, in that engine.
-"""
+"""Pictures for tests of the tracker: robots on a pitch, and a tracker that has seen them."""
 
 import hashlib
 import math
-import sys
-
-from miro_exact import engine
-
-if __name__ == "__main__":
-    engine.select(sys.argv[1])
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_exact.rng import Stream
@@ -56,7 +47,7 @@ def beside(posture, ahead_m, left_m, turn_rad=0.0):
 
 
 def session():
-    """Engine, SHA-256 of what two trackers make of twelve pictures with six robots."""
+    """SHA-256 of what two trackers make of twelve pictures with six robots, and how many they lost."""
     found = hashlib.sha256()
     trackers = [tracker("yellow", (0, 1, 2)), tracker("blue", (0, 1, 2), centroid="binary")]
     start = [drawn(index, "session") for index in range(6)]
@@ -68,8 +59,4 @@ def session():
         picture = PaintedFrame(robots, noise=frame)
         for one in trackers:
             found.update(repr(one.track(picture, frame * FRAME)).encode() + snapshot(one))
-    return f"{engine.active()} {found.hexdigest()} {[one.lost_frames for one in trackers]}"
-
-
-if __name__ == "__main__":
-    print(session())
+    return f"{found.hexdigest()} {[one.lost_frames for one in trackers]}"

@@ -1,8 +1,5 @@
 """The tracker on painted pictures: how well it measures, when it says that a robot is lost, and what it remembers."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
 from miro_exact import engine
@@ -12,9 +9,8 @@ from miro_host.eye.colours import classes_of
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.track import Sighting, Track
 from miro_host.posture import Posture
-from tests import children
-from tests.host.eye import scenes
-from tests.host.eye.scenes import CAMERA, FRAME, beside, drawn, errors, tracker
+from tests.children import uncompiled
+from tests.host.eye.scenes import CAMERA, FRAME, beside, drawn, errors, session, tracker
 from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
 
 MIDDLE = Posture(0.5, 0.35, 0.4)
@@ -167,20 +163,6 @@ def test_a_team_patch_serves_one_robot_and_the_better_one_keeps_it():
 # ---- memory
 
 
-def test_a_tracker_that_was_saved_goes_on_with_the_same_bits():
-    one, other = tracker(robots=(0, 1)), tracker(robots=(0, 1))
-    frames = [
-        picture(PaintedRobot(beside(MIDDLE, 0.02 * n, 0.0)), PaintedRobot(drawn(4), "yellow", 1), noise=n)
-        for n in range(6)
-    ]
-    for n in range(3):
-        one.track(frames[n], n * FRAME)
-    restore(other, snapshot(one))
-    for n in range(3, 6):
-        assert one.track(frames[n], n * FRAME) == other.track(frames[n], n * FRAME)
-        assert snapshot(one) == snapshot(other)
-
-
 def test_sightings_in_the_wrong_order_are_no_state():
     one = tracker()
     one.tracks[0].seen, one.tracks[0].tick, one.tracks[0].before_tick = 2, 5, 5
@@ -190,18 +172,9 @@ def test_sightings_in_the_wrong_order_are_no_state():
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(engine.active() != "compiled", reason="nothing is compiled here")
 def test_compiled_and_uncompiled_trackers_see_the_same():
-    if engine.active() != "compiled":
-        pytest.skip("nothing is compiled here")
-    done = children.run(
-        [sys.executable, "-m", "tests.host.eye.scenes", "python"],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=Path(__file__).parents[3],
-    )
-    assert done.stdout.split()[0] == "python"
-    assert done.stdout.split()[1:] == scenes.session().split()[1:]
+    assert uncompiled("from tests.host.eye.scenes import session; print(session())").strip() == session()
 
 
 @pytest.mark.parametrize(

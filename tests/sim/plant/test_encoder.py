@@ -6,7 +6,7 @@ from itertools import accumulate
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
+from miro_exact.state import snapshot
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_sim.plant.drive import Quadrature
@@ -100,13 +100,3 @@ def test_a_shaft_at_rest_shows_no_edge():
     encoder = Quadrature(2048.0)
     assert edges(encoder, 0.0, 0, 2048) == []
     assert encoder.position == 0.5
-
-
-def test_a_snapshot_keeps_position_and_count():
-    encoder = Quadrature(3.0)
-    edges(encoder, -7.3, 0, 100)
-    other = Quadrature(3.0)
-    restore(other, snapshot(encoder))
-    assert snapshot(other) == snapshot(encoder)
-    assert repr(other) == repr(encoder)
-    assert edges(other, 5.0, 0, 99) == edges(encoder, 5.0, 0, 99)
