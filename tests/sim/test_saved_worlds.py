@@ -71,13 +71,6 @@ def test_characters_that_wait_for_a_busy_transmitter_are_refused(saved):
         fresh().load(with_field(fresh(), saved, path, struct.pack("<q", busy)))
 
 
-def test_any_byte_that_changes_is_noticed(saved):
-    world = fresh()
-    for place in range(0, len(saved), 101):
-        with pytest.raises(ValueError, match="saved world"):
-            world.load(saved[:place] + bytes([saved[place] ^ 1]) + saved[place + 1 :])
-
-
 def test_a_world_that_was_cut_off_is_refused(saved):
     for size in (0, 1, 8, 144, len(saved) - 1):
         with pytest.raises(ValueError, match="saved world"):

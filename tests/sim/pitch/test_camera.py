@@ -19,6 +19,7 @@ from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.picture_settings import PictureSettings
 from tests.children import uncompiled
 from tests.naive.camera import Body
+from tests.sim.pitch.crowd import Crowd
 from tests.sim.pitch.scenes import Rig, Scene, check_rig, digest
 
 LENS = CameraParameters()
@@ -270,3 +271,17 @@ def test_the_gamma_curve_goes_from_black_to_white():
     assert (shown[0], shown[4095]) == (0, 4080)
     assert shown == sorted(shown)
     assert shown[2048] == math.floor(4080 * (2048 / 4095) ** 0.45 + 0.5)
+
+
+@RUNS_COMPILED
+@pytest.mark.parametrize(("centroid", "dropped", "mains_hz"), [("binary", 0.0, 60), ("weighted", 0.05, 50)])
+def test_in_a_crowd_no_robot_is_swapped_or_wrong_and_few_are_lost(centroid, dropped, mains_hz):
+    crowd = Crowd(7, PictureSettings(mains_hz=mains_hz), centroid)
+    drops = random.Random(8)
+    for frame in range(1, 401):
+        crowd.step(frame, drops.random() < dropped)
+    counts = crowd.counts
+    assert counts.together > 100
+    assert counts.fastest_m_s > 1.3
+    assert (counts.swapped, counts.wrong) == (0, 0), counts.wrong_at
+    assert counts.seen > 0.99 * (counts.seen + counts.lost) > 2000

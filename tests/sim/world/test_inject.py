@@ -105,15 +105,10 @@ def test_the_earliest_tick_is_kept_and_the_one_before_refused():
     assert world.inject(FRAME, at_tick=earliest) == earliest
 
 
-@pytest.mark.parametrize("tick", [2_073_600_000_001, 1 << 62, 1 << 63, 10**30])
-def test_a_tick_after_a_day_is_refused(tick):
-    with pytest.raises(ValueError, match=f"net0: tick {tick} is out of range; .* the latest 2073600000000"):
-        silent().inject(FRAME, at_tick=tick)
-
-
-@pytest.mark.parametrize("tick", [-1, -(1 << 63)])
-def test_a_negative_tick_is_refused_with_the_range(tick):
-    with pytest.raises(ValueError, match="the earliest is 24120, the latest 2073600000000"):
+@pytest.mark.parametrize("tick", [2_073_600_000_001, 1 << 62, 1 << 63, 10**30, -1, -(1 << 63)])
+def test_a_tick_before_the_start_or_after_a_day_is_refused_with_the_range(tick):
+    within = "the earliest is 24120, the latest 2073600000000"
+    with pytest.raises(ValueError, match=f"net0: tick {tick} is out of range; {within}"):
         silent().inject(FRAME, at_tick=tick)
 
 
