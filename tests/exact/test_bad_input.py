@@ -1,10 +1,15 @@
-"""The one line of input that cannot be used."""
+"""The one line of input that cannot be used, its remedy for a misspelt word, and files that a user names."""
 
+import os
 import pickle
+from pathlib import Path
 
 import pytest
 
-from miro_exact.bad_input import BadInput, amount
+from miro_exact.bad_input import BadInput, amount, did_you_mean
+from miro_exact.inputs import InputError, check_regular, read_input
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
@@ -59,3 +64,54 @@ def test_an_amount_of_one_is_singular():
         "1 crash",
         "2 crashes",
     ]
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "remedy", "said"),
+    [
+        ("rnu", ["run", "report"], "", "did you mean run?"),
+        ("rnu", ["run", "report"], "there are two", "did you mean run? there are two"),
+        ("rUN", ["Run", "REPORT"], "", "did you mean Run?"),
+        ("x", ["run", "report"], "there are two", "there are two"),
+        ("x", [], "", ""),
+        ("run" * 100_000, ["run"], "", ""),
+    ],
+)
+def test_the_nearest_known_word_comes_first(word, known, remedy, said):
+    assert did_you_mean(word, known, remedy) == said
+
+
+def test_it_is_the_only_place_that_guesses_what_was_meant():
+    folders = ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    guessing = [path.name for path in files if "get_close_matches" in path.read_text(encoding="utf-8")]
+    assert guessing == ["bad_input.py"]
+
+
+def test_a_file_up_to_the_limit_is_read(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"x" * (1 << 20))
+    assert read_input(path, 1 << 20) == path.read_bytes()
+    path.write_bytes(b"x" * ((1 << 20) + 1))
+    with pytest.raises(InputError, match=r"holds more than 1 MiB; is this the right file\?"):
+        read_input(path, 1 << 20)
+
+
+def test_a_file_with_the_prefix_has_a_limit_of_its_own(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"ab" * 100)
+    assert read_input(path, 10, prefix=b"ab", prefix_limit=200) == path.read_bytes()
+    with pytest.raises(InputError):
+        read_input(path, 10, prefix=b"ab", prefix_limit=199)
+    with pytest.raises(InputError):
+        read_input(path, 10, prefix=b"ba", prefix_limit=200)
+
+
+def test_devices_are_refused_but_the_empty_one(tmp_path):
+    if not os.path.exists("/dev/zero"):
+        pytest.skip("this system has no /dev/zero")
+    with pytest.raises(InputError, match="/dev/zero: is a device"):
+        read_input("/dev/zero")
+    with pytest.raises(InputError, match="/dev/zero: is not a regular file"):
+        check_regular("/dev/zero")
+    assert read_input("/dev/null") == b""

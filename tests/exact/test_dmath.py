@@ -1,34 +1,22 @@
 """dmath against mpmath, against its own uncompiled source, and at the edges of its domain."""
 
-import importlib.util
 import math
 import random
-from pathlib import Path
 
 import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import miro_exact
 from miro_exact import dmath
+from tests.exact.uncompiled import uncompiled
 
 mpmath.mp.prec = 160
 ANGLES = st.floats(-1.59e6, 1.59e6)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-def load_source():
-    path = Path(miro_exact.__file__).with_name("dmath.py")
-    spec = importlib.util.spec_from_file_location("dmath_source", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SOURCE = load_source()
+SOURCE = uncompiled(dmath)
 
 
 def angles(rng, count):
@@ -59,29 +47,29 @@ def worst_ulp(function, exact, cases):
     return worst
 
 
-@pytest.mark.parametrize("name", ["sin", "cos"])
-def test_sine_and_cosine_are_within_one_ulp_over_the_whole_domain(name):
-    cases = [(x,) for x in angles(random.Random(1), 1500)]
-    assert worst_ulp(getattr(dmath, name), getattr(mpmath, name), cases) < 0.8
+def exponents(rng, count):
+    yield from (rng.uniform(-745.13, 709.78) for _ in range(count))
+    yield from (rng.uniform(-2, 2) for _ in range(count))
 
 
-def test_atan2_is_within_one_ulp_in_every_quadrant():
-    assert worst_ulp(dmath.atan2, mpmath.atan2, list(points(random.Random(2), 1500))) < 1.0
+def positive(rng, count):
+    yield from (10.0 ** rng.uniform(-320, 308) for _ in range(count))
+    yield from (1.0 + rng.uniform(-1e-3, 1e-3) for _ in range(count))
 
 
-def test_exp_is_within_one_ulp_down_to_the_subnormals():
-    rng = random.Random(3)
-    cases = [(rng.uniform(-745.13, 709.78),) for _ in range(1500)] + [
-        (rng.uniform(-2, 2),) for _ in range(1500)
-    ]
-    assert worst_ulp(dmath.exp, mpmath.exp, cases) < 0.9
-
-
-def test_log_is_within_one_ulp_also_near_one():
-    rng = random.Random(4)
-    cases = [(10.0 ** rng.uniform(-320, 308),) for _ in range(1500)]
-    cases += [(1.0 + rng.uniform(-1e-3, 1e-3),) for _ in range(1500)]
-    assert worst_ulp(dmath.log, mpmath.log, cases) < 0.9
+@pytest.mark.parametrize(
+    ("name", "draw", "bound"),
+    [
+        ("sin", angles, 0.8),
+        ("cos", angles, 0.8),
+        ("atan2", points, 1.0),
+        ("exp", exponents, 0.9),
+        ("log", positive, 0.9),
+    ],
+)
+def test_functions_are_within_one_ulp_over_the_whole_domain(name, draw, bound):
+    cases = [case if isinstance(case, tuple) else (case,) for case in draw(random.Random(1), 1500)]
+    assert worst_ulp(getattr(dmath, name), getattr(mpmath, name), cases) < bound
 
 
 @settings(max_examples=300)
@@ -155,8 +143,7 @@ def test_the_module_in_use_and_its_source_give_the_same_bits():
         assert dmath.wrap_pi(x) == SOURCE.wrap_pi(x)
     for y, x in points(rng, 1000):
         assert dmath.atan2(y, x) == SOURCE.atan2(y, x)
-    for _ in range(3000):
-        x = rng.uniform(-745.5, 709.7)
+    for x in exponents(rng, 1500):
         assert dmath.exp(x) == SOURCE.exp(x)
-        x = 10.0 ** rng.uniform(-320, 308)
+    for x in positive(rng, 1500):
         assert dmath.log(x) == SOURCE.log(x)
