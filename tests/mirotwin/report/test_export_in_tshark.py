@@ -1,7 +1,8 @@
 """An exported recording in tshark: the fields it prints are those that were sent."""
 
+import re
+
 import pytest
-from click.testing import CliRunner
 
 from miro_protocol.decoder import Decoder, Received, TelemetryDecoder
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame
@@ -10,7 +11,6 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.commands import main
 from mirotwin.recording.recorder import Recorder, RunSource
 from tests.protocol.test_dissector import dissected, values
 
@@ -35,7 +35,7 @@ def shown_frame(fields):
     number = {name.removeprefix("miro."): int(value, 0) for name, value in fields.items() if is_number(value)}
     kind, seq = number["type"], number["seq"]
     if kind == 2:
-        raised = [flag for flag in Flags if flag_is_set(fields[f"miro.telemetry.{flag.name.lower()}"])]
+        raised = [flag for flag in Flags if fields[f"miro.telemetry.{flag.name.lower()}"] in ("1", "True")]
         rest = {name: number[f"telemetry.{name}"] for name in TelemetryFrame.__struct_fields__[3:]}
         return TelemetryFrame(seq, number["telemetry.slot"], sum(raised), **rest)
     if kind == 1:
@@ -47,36 +47,25 @@ def shown_frame(fields):
 
 
 def is_number(value):
-    return (
-        isinstance(value, str)
-        and value.lstrip("-").removeprefix("0x").isalnum()
-        and value[-1] in "0123456789abcdef"
-    )
-
-
-def flag_is_set(value):
-    return value in ("1", "True")
+    return isinstance(value, str) and re.fullmatch("-?[0-9]+|0x[0-9a-f]+", value)
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(mirotwin, tmp_path_factory):
     """A world of two networks, 3 and 5 robots, with settings sent: what was sent and heard, and its capture."""
     folder = tmp_path_factory.mktemp("run")
-    text = SCENARIO
-    loaded = scenario_file.parse(text, "two")
     image = load_hex(image_path())
-    world = World(loaded, 3, image)
+    world = World(scenario_file.parse(SCENARIO, "two"), 3, image)
     world.networks[0].station.request(2, 1, (1, 2, 3, 4))
     world.networks[1].station.request(4, 2, (5973,))
     wire = []
-    source = RunSource("two", text, 3, image.path.read_bytes(), image.sha256)
+    source = RunSource("two", SCENARIO, 3, image.path.read_bytes(), image.sha256)
     with (folder / "run.mcap").open("wb") as stream, Recorder(stream, source) as recorder:
         for _ in range(12):
             period = world.step()
             recorder.write(period)
             wire += period.wire
-    arguments = ["export", str(folder / "run.mcap"), "--out", str(folder / "run.pcapng")]
-    assert CliRunner().invoke(main, arguments).exit_code == 0
+    mirotwin.ends(0, "export", folder / "run.mcap", "--out", folder / "run.pcapng")
     return wire, dissected(folder / "run.pcapng")
 
 
@@ -85,9 +74,8 @@ def test_tshark_shows_of_an_exported_recording_the_fields_that_were_sent(run):
     wire, layers = run
     sent = {}
     for run_of_bytes in wire:
-        decoder = sent.setdefault(
-            (run_of_bytes.network, run_of_bytes.direction), ([], decoder_of(run_of_bytes))
-        )
+        key = run_of_bytes.network, run_of_bytes.direction
+        decoder = sent.setdefault(key, ([], decoder_of(run_of_bytes)))
         n = 5 if run_of_bytes.network else 3
         events = decoder[1].feed(run_of_bytes.data, run_of_bytes.tick)
         decoder[0].extend(event.message(n) for event in events if isinstance(event, Received))

@@ -32,12 +32,9 @@ def test_the_same_run_gives_the_same_picture_whatever_its_title(tmp_path):
 @pytest.mark.parametrize(("count", "panels"), [(0, 4), (4, 8), (8, 12), (40, 12)])
 def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path, count, panels):
     inner = {f"value_{index}": 0.5 * index for index in range(count)}
+    control = Control(0.2, 0.0, 1, 1, inner)
     run = [
-        replace(
-            period,
-            robots=tuple(replace(robot, control=Control(0.2, 0.0, 1, 1, inner)) for robot in period.robots),
-        )
-        for period in periods(5)
+        replace(one, robots=tuple(replace(it, control=control) for it in one.robots)) for one in periods(5)
     ]
     tree = drawn(tmp_path / "a.svg", run)
     assert sum(one.get("class") == "frame" for one in tree.iter(f"{SVG}rect")) == panels

@@ -1,4 +1,4 @@
-"""`mirotwin run`: the files it writes, and that nothing is half-written whatever happens."""
+"""`mirotwin run`: the files it writes, frames as pictures, and runs that go on as if they had never stopped."""
 
 import json
 import subprocess
@@ -6,12 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
+from mirotwin.recording.reader import read
 from tests import children
 from tests.mirotwin.conftest import SHORT, hex_file
 
@@ -151,12 +153,9 @@ def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
     Path("far.toml").write_text(SHORT + "drive.chassis.track_m = 1e-200\n")
     words = list(command)
     words.insert(2 if command[0] == "fw" else 1, "far.toml")
-    code, out, err = mirotwin(*words)
-    assert (code, out) == (2, "")
-    assert err == (
-        "mirotwin: error: far.toml: network[0].robot[1].drive.chassis.track_m: 1e-200 is out of range; must be 0.001"
-        " to 10 in metres\n"
-    )
+    key = "network[0].robot[1].drive.chassis.track_m"
+    said = f"far.toml: {key}: 1e-200 is out of range; must be 0.001 to 10 in metres"
+    assert mirotwin.refuses(*words) == said
     assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
 
 
@@ -181,13 +180,6 @@ def test_an_option_that_means_nothing_is_refused_in_plain_words(mirotwin, short,
     assert expected in mirotwin.refuses("run", short, *arguments)
 
 
-@pytest.mark.parametrize("arguments", [["info"], ["scenarios"]])
-def test_a_table_in_a_pipe_has_no_trailing_blanks(mirotwin, arguments):
-    lines = mirotwin(*arguments)[1].splitlines()
-    assert lines
-    assert [line for line in lines if line != line.rstrip()] == []
-
-
 def test_a_run_that_takes_the_default_place_of_another_one_says_so(mirotwin, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     short = ("run", "fig6", "-q", "--no-figure", "--set", "duration_s=0.2")
@@ -196,3 +188,256 @@ def test_a_run_that_takes_the_default_place_of_another_one_says_so(mirotwin, tmp
     err = mirotwin.ends(0, *short, "--set", "network.radio.bit_error_rate=0.01")
     assert err.startswith("mirotwin: note: runs/fig6-0 held a run with other bits (digest ")
     assert err.endswith("..), now replaced; --out keeps both\n")
+
+
+LEARNING = (
+    *("--set", "camera.self_calibration=lines", "--set", "network.robot.controller={law = 'body_frame'}"),
+    *("--set", "network.robot.estimator={kind = 'ekf'}", "--set", "duration_s=2.0"),
+)
+
+
+def test_what_a_host_learnt_of_camera_and_wheels_stands_beside_the_truth(mirotwin, tmp_path):
+    out = mirotwin.succeeds("run", "fig6", "--out", tmp_path, "--no-figure", *LEARNING)
+    summary = json.loads((tmp_path / "summary.json").read_bytes())
+    (camera,) = summary["calibrations"]
+    assert camera["worst_learnt_cm"] < 0.1 < 2.3 < camera["worst_told_cm"] < 2.5
+    focal = camera["parameters"]["focal_px"]
+    assert abs(focal["learnt"] - focal["true"]) < 0.2 < 2.0 < abs(focal["told"] - focal["true"])
+    (wheels,) = summary["wheels"]
+    for side in ("left", "right"):
+        assert abs(wheels[side]["learnt"] - wheels[side]["true"]) < 0.006
+    assert "2.40 cm wrong at worst" in out
+    assert "radius left " in out
+
+
+def test_a_host_that_learns_nothing_says_nothing_of_it(mirotwin, tmp_path):
+    mirotwin("run", "fig6", "--out", tmp_path, "--no-figure", "--set", "duration_s=0.2")
+    summary = json.loads((tmp_path / "summary.json").read_bytes())
+    assert "calibrations" not in summary
+    assert "wheels" not in summary
+
+
+FRAMES = [f"frame-{number:06d}.png" for number in range(6)]
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_every_frame_is_saved_and_the_run_is_the_same(mirotwin, short, finished, tmp_path):
+    arguments = ("run", short, "--seed", 5, "-q", "--out", tmp_path / "out")
+    assert mirotwin(*arguments, "--frames", tmp_path / "frames") == (0, "", "")
+    assert names(tmp_path / "frames") == FRAMES
+    assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
+    for name in FRAMES:
+        with Image.open(tmp_path / "frames" / name) as image:
+            image.load()
+            assert image.size == (320, 240)
+    out = tmp_path / "look.png"
+    at = ("--at", "0.167s", "--seed", 5, "--out", out)
+    assert mirotwin("camera", "look", short, *at, "--plain")[0] == 0
+    assert out.read_bytes() == (tmp_path / "frames" / FRAMES[5]).read_bytes()
+
+
+def test_frames_of_several_networks_have_the_network_in_their_names(mirotwin, tmp_path):
+    two = tmp_path / "two.toml"
+    two.write_text(
+        SHORT.replace("duration_s = 0.2", "duration_s = 0.04")
+        + '[[network]]\nhost = "silent"\n[[network.robot]]\nslot = 1\nstart_error_x_cm = 60.0\n'
+        + 'reference.kind = "line"\n'
+    )
+    mirotwin.succeeds("run", two, "--out", tmp_path / "out", "--frames", tmp_path / "out" / "frames", "-q")
+    frames = [f"net{network}-frame-00000{number}.png" for network in (0, 1) for number in (0, 1)]
+    assert names(tmp_path / "out" / "frames") == frames
+
+
+def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(mirotwin, short, tmp_path):
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for name in ("frame-000000.png", "frame-000999.png", "frame-000003.part.png", "mine.png"):
+        (folder / name).write_text("before")
+    arguments = ("run", short, "-q", "--no-figure", "--out", tmp_path / "out", "--frames", folder)
+    there = "frame-000000.png, frame-000003.part.png, frame-000999.png, .."
+    remedy = "choose another with --frames, or replace frame-*.png in it with --force"
+    assert mirotwin.refuses(*arguments) == f"{folder}: the folder is not empty ({there}); {remedy}"
+    assert (len(names(folder)), (tmp_path / "out").exists()) == (4, False)
+    assert mirotwin(*arguments, "--force") == (0, "", "")
+    assert names(folder) == [*FRAMES, "mine.png"]
+    assert (folder / "mine.png").read_text() == "before"
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("--frames", "{short}"), "{short}: exists and is not a folder; choose another folder with --frames"),
+        (
+            ("--frames", "frames", "--set", "camera.kind=gaussian"),
+            "{short}: camera.kind: this camera renders no pixels; choose kind =",
+        ),
+        (
+            ("--frames", "--record-frames"),
+            "Invalid value for '--frames': the path is missing before --record-frames; a file of this name is ./--rec",
+        ),
+        (("--frames", ""), "Invalid value for '--frames': the path is empty."),
+    ],
+)
+def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
+    mirotwin, short, tmp_path, monkeypatch, options, expected
+):
+    monkeypatch.chdir(tmp_path)
+    err = mirotwin.refuses("run", short, *(option.format(short=short) for option in options))
+    assert err.startswith(expected.format(short=short))
+    assert names(tmp_path) == []
+
+
+ROOM = "No space left on device; make room, or choose another folder with --frames\n"
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "mirotwin: interrupted\n"),
+        (OSError(28, "No space left on device"), 2, ROOM),
+    ],
+)
+def test_a_run_that_breaks_off_leaves_whole_frames_only(
+    mirotwin, short, tmp_path, monkeypatch, raised, code, said
+):
+    write = Path.write_bytes
+
+    def breaking(path, data):
+        if path.name == "frame-000003.part.png":
+            write(path, data[:100])
+            raise raised
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", breaking)
+    folder = tmp_path / "frames"
+    words = ("run", short, "-q", "--out", tmp_path / "out", "--frames", folder)
+    assert mirotwin.ends(code, *words).endswith(said)
+    assert names(folder) == FRAMES[:3]
+    assert json.loads((tmp_path / "out" / "summary.part.json").read_bytes())["complete"] is False
+
+
+QUIET = ("--no-figure", "-q")
+
+
+def resumed(mirotwin, short, folder, at="100ms", words=()):
+    """The folders of a run that saved its world, and of one that went on from there."""
+    whole, rest = folder / "whole", folder / "rest"
+    mirotwin.succeeds("run", short, "--out", whole, "--save-at", at, *words, *QUIET)
+    (saved,) = whole.glob("at-*.world")
+    mirotwin.succeeds("run", short, "--out", rest, "--resume", saved, *words, *QUIET)
+    return whole, rest
+
+
+@pytest.fixture(scope="module")
+def halves(mirotwin, short, tmp_path_factory):
+    return resumed(mirotwin, short, tmp_path_factory.mktemp("halves"))
+
+
+@pytest.mark.parametrize("at", ["2402400t", "2500001t", "100ms"])
+def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(mirotwin, tmp_path, short, at):
+    whole, rest = resumed(mirotwin, short, tmp_path, at, ("--seed", 5))
+    periods, more = read(whole / "run.mcap").periods, read(rest / "run.mcap").periods
+    assert more[1:] == periods[more[1].index :]
+    assert more[0].digest == periods[more[0].index].digest
+    assert more[0].index in (3, 4)
+    mirotwin.succeeds("replay", rest / "run.mcap", "-q")
+
+
+@pytest.mark.parametrize("to", ["4000000t", "4004000t", "4804800t"])
+def test_a_resumed_run_that_is_told_where_to_end_has_the_digest_of_an_unbroken_one(
+    mirotwin, tmp_path, short, to
+):
+    whole, rest = resumed(mirotwin, short, tmp_path, words=("--to", to))
+    digests = [json.loads((run / "summary.json").read_text())["digest"] for run in (whole, rest)]
+    assert digests[0] == digests[1]
+    mirotwin.succeeds("replay", rest / "run.mcap", "-q")
+
+
+def test_figures_of_a_resumed_run_say_what_time_they_cover(mirotwin, tmp_path, short):
+    whole, rest = tmp_path / "whole", tmp_path / "rest"
+    _, table, _ = mirotwin("run", short, "--out", whole, "--save-at", "100ms", "--no-figure")
+    assert "rms (0.00 s to 0.20 s)" in table
+    assert "resumed  " not in table
+    saved = whole / "at-2400000.world"
+    _, table, _ = mirotwin("run", short, "--out", rest, "--resume", saved, "--no-figure")
+    assert "rms (0.10 s to 0.20 s)" in table
+    assert "0.10 s to 0.20 s in " in table
+    assert "resumed   at 0.10 s" in table
+    summary = json.loads((rest / "summary.json").read_text())
+    assert summary["resumed_s"] == 2_402_400 / 24e6
+    assert summary["realtime_factor"] == (summary["simulated_s"] - summary["resumed_s"]) / summary["wall_s"]
+
+
+def test_a_resumed_run_is_not_compared_with_a_whole_one(mirotwin, halves):
+    said = mirotwin.refuses("diff", *(run / "run.mcap" for run in halves))
+    assert "a run that was resumed: it begins with control period 3" in said
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["replay"], ["fw", "trace"], ["fw", "coverage"], ["fw", "vcd", "--out", "a.vcd"]],
+    ids=" ".join,
+)
+def test_what_was_before_a_resumed_run_cannot_be_looked_at(mirotwin, halves, command):
+    said = mirotwin.refuses(*command, halves[1] / "run.mcap", "--to", "100ms")
+    assert said.endswith(": --to 2400000t: the run begins at tick 2402400; look later")
+
+
+def test_a_resumed_run_is_looked_at_from_its_begin_on(mirotwin, halves):
+    assert mirotwin("replay", halves[1] / "run.mcap", "--to", "2402401t")[0] == 0
+
+
+def test_a_run_ends_where_it_is_told_to(mirotwin, tmp_path, short):
+    assert mirotwin("run", short, "--out", tmp_path / "a", "--to", "2500000t", *QUIET)[0] == 0
+    summary = json.loads((tmp_path / "a" / "summary.json").read_text())
+    assert summary["simulated_s"] == 2_500_000 / 24e6
+    assert len(read(tmp_path / "a" / "run.mcap").periods) == 3
+
+
+@pytest.mark.parametrize(
+    ("to", "frames", "verdict"),
+    [
+        ("10ms", 1, "not judged"),
+        ("150ms", 1, "passed"),
+        ("150ms", 99, "not judged"),
+        ("4804800t", 99, "failed"),
+    ],
+)
+def test_a_run_that_is_cut_short_does_not_fail_by_frames_to_come(
+    mirotwin, tmp_path, short, to, frames, verdict
+):
+    expect = f"frames_accepted_min={frames}"
+    code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--to", to, "--expect", expect, *QUIET)
+    assert (code, f"expectation {verdict}: " in err) == (int(verdict == "failed"), verdict != "passed")
+    found = json.loads((tmp_path / "a" / "summary.json").read_text())["expectations"]
+    assert verdict in [one["verdict"] for one in found if one["name"] == "frames_accepted_min"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (("--save-at", "1s"), "--save-at 24000000t: the run goes from tick 0 to tick 4804800; give a tick between"),
+        (("--to", "0t"), "--to 0t: the run goes from tick 0 to tick 4804800; give a tick between"),
+        (("--save-at", "2s", "--to", "100ms"), "--save-at 48000000t: the run goes from tick 0 to tick 2400000"),
+        (("--resume", "{saved}", "--seed", "6"), "cannot be resumed: the saved world has seed 5, this world has 6"),
+        (("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"), "the run goes from tick 2402400 to tick"),
+        (("--resume", "{short}"), "cannot be resumed: not a saved world, or one of a version of this program"),
+        (("--resume", "{saved}.none"), "no such file"),
+        (("--save-at", "soon"), "'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks."),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_refused_and_nothing_is_written(mirotwin, tmp_path, short, arguments, what):
+    first = tmp_path / "first"
+    mirotwin("run", short, "--out", first, "--seed", 5, "--save-at", "2402400t", *QUIET)
+    given = [one.format(saved=first / "at-2402400.world", short=short) for one in arguments]
+    err = mirotwin.refuses("run", short, "--out", tmp_path / "second", *given, *QUIET)
+    assert what.lower() in err.lower()
+    assert not (tmp_path / "second").exists()
+
+
+def test_full_recordings_do_not_stop(mirotwin, tmp_path, short):
+    err = mirotwin.refuses("run", short, "--out", tmp_path / "a", "--record", "full", "--to", "1000t")
+    assert "do not go with --record full" in err

@@ -69,7 +69,7 @@ def test_bad_input_is_one_line_on_stderr_and_exit_code_2(mirotwin, arguments, ex
 
 
 def test_without_a_command_the_help_is_shown(mirotwin):
-    assert "Simulate:" in mirotwin.refuses()
+    assert "Simulate:" in mirotwin.ends(2)
 
 
 @pytest.mark.parametrize(

@@ -19,13 +19,8 @@ MISSING = (
 PICTURES = Path(__file__).parent / "pictures"
 SMALL = (96, 66)
 OPTIONS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-dev-shm-usage",
-    "--hide-scrollbars",
-    "--force-device-scale-factor=1",
-    "--window-size=1400,900",
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"),
+    *("--force-device-scale-factor=1", "--window-size=1400,900"),
 )
 PATIENCE_S = 60.0
 SHOWN = 20
@@ -131,14 +126,14 @@ def apart(one, other):
 
 
 def _renew():
-    from tests.mirotwin.report.page.conftest import SEED, called
+    from tests.mirotwin.program import mirotwin
+    from tests.mirotwin.report.page.conftest import FIG6
 
     PICTURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name, chromium() as driver:
         folder = Path(name)
-        options = ["--set", "duration_s=1.5", "--expect", "settles_within_s=0.4"]
-        called("run", "fig6", "--seed", SEED, *options, "--out", folder / "fig6", "--no-figure", "-q")
-        called("report", folder / "fig6", "-o", folder / "fig6.html", "-q")
+        mirotwin("run", *FIG6, "--out", folder / "fig6", "--no-figure", "-q")
+        mirotwin("report", folder / "fig6", "-o", folder / "fig6.html", "-q")
         for theme in ("light", "dark"):
             open_page(driver, folder / "fig6.html", theme)
             driver.execute_script("run.show(arguments[0])", SHOWN)

@@ -4,14 +4,16 @@ import json
 import shlex
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
 
 from mirotwin import campaign
-from mirotwin.commands import main
+from mirotwin.campaign.plots import LEAST, spread, wrapped
+from mirotwin.campaign.statistics import figures
 from tests.mirotwin.campaign.conftest import InThisProcess, plan_of
+from tests.mirotwin.program import mirotwin
 from tests.mirotwin.report.page import browser
-from tests.mirotwin.report.page.conftest import called
 from tests.mirotwin.report.page.test_run_page import Markup
 
 TEXT = """
@@ -41,7 +43,7 @@ def results(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(results):
     path = results.with_name("mine.html")
-    assert called("campaign", "page", results, "-o", path, "-q") == (0, "")
+    mirotwin.succeeds("campaign", "page", results, "-o", path, "-q")
     return path
 
 
@@ -51,7 +53,7 @@ def markup(page):
 
 
 def shown(results, *options):
-    return json.loads(CliRunner().invoke(main, ["campaign", "show", str(results), "--json", *options]).stdout)
+    return json.loads(mirotwin("campaign", "show", results, "--json", *options)[1])
 
 
 @pytest.mark.slow
@@ -84,7 +86,7 @@ def test_what_failed_is_listed(results, markup):
 
 
 def test_the_command_of_a_row_gives_its_digest_again(results, markup, tmp_path):
-    data = json.loads(next(one for one in markup.scripts if one.startswith('{"arms"')))
+    data = markup.data
     table, _ = campaign.read(results)
     for number in (3, 77):
         row = table.to_pylist()[number]
@@ -92,27 +94,23 @@ def test_the_command_of_a_row_gives_its_digest_again(results, markup, tmp_path):
         words = shlex.split(f"{data['arms'][arm]} {drawn} --seed {seed}")
         assert words[:2] == ["mirotwin", "run"]
         out = tmp_path / f"run{number}"
-        called(*words[1:], "--out", out, "--no-figure", "-q")
+        mirotwin(*words[1:], "--out", out, "--no-figure", "-q")
         assert json.loads((out / "summary.json").read_text())["digest"] == row["digest"]
 
 
 def test_the_same_results_give_the_same_bytes(results, page, tmp_path):
     again = tmp_path / "again.html"
-    assert called("campaign", "page", results, "-o", again, "-q") == (0, "")
+    mirotwin.succeeds("campaign", "page", results, "-o", again, "-q")
     assert again.read_bytes() == page.read_bytes()
 
 
 def test_what_is_no_campaign_is_refused(tmp_path):
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = tmp_path / "other.parquet"
     pq.write_table(pa.table({"x": [1]}), path)
-    code, said = called("campaign", "page", path, "-o", tmp_path / "page.html", "-q")
-    assert (code, len(said.splitlines())) == (2, 1)
+    said = mirotwin.refuses("campaign", "page", path, "-o", tmp_path / "page.html", "-q")
     assert "is no campaign's results" in said
     path.write_bytes(b"PAR1 and no more")
-    assert called("campaign", "page", path, "-o", tmp_path / "page.html", "-q")[0] == 2
+    mirotwin.refuses("campaign", "page", path, "-o", tmp_path / "page.html", "-q")
     assert not (tmp_path / "page.html").exists()
 
 
@@ -161,9 +159,7 @@ def test_a_campaign_says_what_is_missing_without_javascript(page):
 
 
 def test_axes_do_not_show_rounding_noise():
-    from mirotwin.campaign.plots import LEAST, spread
     from mirotwin.campaign.rows import Arm
-    from mirotwin.campaign.statistics import figures
 
     numbers = np.array([1.0, 1.0 + 2e-16, 1.0 - 1e-16, 1.0])
     for metric, least in LEAST.items():
@@ -173,8 +169,6 @@ def test_axes_do_not_show_rounding_noise():
 
 
 def test_long_names_of_arms_are_wrapped():
-    from mirotwin.campaign.plots import wrapped
-
     lines = wrapped("bit_error_rate 0.001, far away, and turned a quarter to the left").split("\n")
     assert lines == ["bit_error_rate 0.001,", "far away, and turned a", "quarter to the left"]
     assert wrapped("near") == "near"

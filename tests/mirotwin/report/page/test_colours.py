@@ -38,25 +38,21 @@ def test_both_themes_have_the_same_colours():
     assert len(COLOURS["light"]) > 30
 
 
+GROUNDS = {
+    "page": ("ink", "muted", "link"),
+    "card": ("ink", "muted", "link", "good", "bad"),
+    "good-soft": ("good",),
+    "bad-soft": ("bad", "ink", "link"),
+    "warn-soft": ("warn",),
+    "ran": ("ink", "muted"),
+    "missed": ("ink", "muted"),
+}
+"""What is written on each."""
+
+
 @pytest.mark.parametrize("theme", THEMES)
 @pytest.mark.parametrize(
-    ("text", "ground"),
-    [(text, ground) for text in ("ink", "muted", "link") for ground in ("page", "card")]
-    + [
-        ("good", "good-soft"),
-        ("bad", "bad-soft"),
-        ("warn", "warn-soft"),
-        ("ink", "bad-soft"),
-        ("link", "bad-soft"),
-    ]
-    + [
-        ("good", "card"),
-        ("bad", "card"),
-        ("ink", "ran"),
-        ("ink", "missed"),
-        ("muted", "ran"),
-        ("muted", "missed"),
-    ],
+    ("text", "ground"), [(text, ground) for ground in GROUNDS for text in GROUNDS[ground]]
 )
 def test_text_has_a_contrast_of_4_5(theme, text, ground):
     assert contrast(COLOURS[theme][text], COLOURS[theme][ground]) >= 4.5

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.mirotwin.report.page.conftest import called
+from tests.mirotwin.program import mirotwin
 from tests.mirotwin.testing.sessions import session
 
 pytestmark = pytest.mark.slow
@@ -70,7 +70,7 @@ def test_the_digest_of_the_page_is_that_of_the_test(left):
 @pytest.mark.parametrize("name", ["an_answer_that_does_not_come", "a_comparison"])
 def test_the_folder_of_a_failed_test_has_a_page(left, name, tmp_path):
     page = tmp_path / "page.html"
-    assert called("report", left[name], "-o", page, "-q") == (0, "")
+    mirotwin.succeeds("report", left[name], "-o", page, "-q")
     text = page.read_text()
     assert '<p class="kind">failed test</p>' in text
     assert "<strong>failed</strong>" in text
@@ -82,14 +82,14 @@ def test_a_case_by_itself_has_one_too_and_says_when_it_is_cured(left, tmp_path):
     text = (left["a_check"] / "case.stream").read_text()
     case.write_text(text)
     page = tmp_path / "page.html"
-    assert called("report", case, "-o", page, "-q") == (0, "")
+    mirotwin.succeeds("report", case, "-o", page, "-q")
     assert '<p class="kind">case</p>' in page.read_text()
     assert "Recorded:" not in page.read_text()
     assert "mirotwin replay mine.stream" in page.read_text()
     lenient = text.replace("0.05", "1.0")
     assert lenient != text
     case.write_text(lenient)
-    assert called("report", case, "-o", page, "-q", "--force") == (0, "")
+    mirotwin.succeeds("report", case, "-o", page, "-q", "--force")
     assert "does not fail any more. Recorded: wheels_within_m_s" in page.read_text()
     assert "<strong>passed</strong>" in page.read_text()
 
@@ -100,5 +100,5 @@ def test_without_the_option_no_page_is_made_and_the_report_names_the_line_for_it
     lines = [line for line in done.stdout.splitlines() if line.startswith("page: mirotwin report left/")]
     assert len(lines) == 3  # not of the test that wrote into memory
     page = tmp_path / "page.html"
-    assert called("report", tmp_path / lines[0].split()[-1], "-o", page, "-q") == (0, "")
+    mirotwin.succeeds("report", tmp_path / lines[0].split()[-1], "-o", page, "-q")
     assert '<p class="kind">failed test</p>' in page.read_text()

@@ -23,16 +23,12 @@ from tests.mirotwin.report.page.browser import (
 )
 
 pytest.importorskip("selenium", reason=browser.MISSING)
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        not (browser.CHROMIUM and browser.CHROMEDRIVER), reason="needs chromium and chromedriver"
-    ),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)]
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +74,6 @@ def of(posture):
 
 def index(page):
     return page.execute_script("return run.index")
-
-
-def press(page, *keys):
-    page.find_element(By.TAG_NAME, "body").send_keys(*keys)
 
 
 def slide(page, to):
@@ -134,18 +126,18 @@ def test_the_frames_of_the_control_period_are_listed(page):
 
 def test_arrows_move_by_a_frame_and_home_and_end_to_the_ends(page, periods):
     seen = []
-    for keys in (
-        [Keys.ARROW_RIGHT] * 3,
-        [Keys.ARROW_LEFT],
-        [Keys.END],
-        [Keys.ARROW_RIGHT],
-        [Keys.HOME],
-        [Keys.ARROW_LEFT],
+    for key in (
+        *[Keys.ARROW_RIGHT] * 3,
+        Keys.ARROW_LEFT,
+        Keys.END,
+        Keys.ARROW_RIGHT,
+        Keys.HOME,
+        Keys.ARROW_LEFT,
     ):
-        press(page, *keys)
+        page.find_element(By.TAG_NAME, "body").send_keys(key)
         seen.append(index(page))
     last = len(periods) - 1
-    assert seen == [3, 2, last, last, 0, 0]
+    assert seen == [1, 2, 3, 2, last, last, 0, 0]
 
 
 def test_the_same_keys_move_it_once_while_the_slider_has_the_focus(page):
@@ -156,38 +148,40 @@ def test_the_same_keys_move_it_once_while_the_slider_has_the_focus(page):
 
 def test_space_plays_and_stops(page):
     page.execute_script("document.getElementById('speed').value = '0.1'")  # 15 s for the whole run
-    press(page, Keys.SPACE)
+    page.find_element(By.TAG_NAME, "body").send_keys(Keys.SPACE)
     button = page.find_element(By.ID, "play")
     assert (button.get_attribute("aria-pressed"), button.get_attribute("aria-label")) == ("true", "Pause")
     until = time.monotonic() + 30
     while index(page) < 3:
         assert time.monotonic() < until
         time.sleep(0.05)
-    press(page, Keys.SPACE)
+    page.find_element(By.TAG_NAME, "body").send_keys(Keys.SPACE)
     assert button.get_attribute("aria-pressed") == "false"
     stopped = index(page)
     time.sleep(0.2)
     assert index(page) == stopped
 
 
-def test_a_click_on_a_failure_goes_to_its_place_in_time(page, fig6):
+@pytest.fixture(scope="module")
+def failure(fig6):
+    """The control period of the failed check."""
     summary = json.loads((fig6 / "summary.json").read_text())
-    tick = next(one["first"]["tick"] for one in summary["expectations"] if one["verdict"] == "failed")
+    failed = [one["first"]["tick"] for one in summary["expectations"] if one["verdict"] == "failed"]
+    return failed[0] // 800800
+
+
+def test_a_click_on_a_failure_goes_to_its_place_in_time(page, failure):
     page.find_element(By.CSS_SELECTOR, ".failures .jump").click()
-    assert index(page) == tick // 800800
+    assert index(page) == failure
 
 
-def test_a_page_of_a_failed_run_opens_at_the_failure(driver, fig6_page, fig6):
+def test_a_page_of_a_failed_run_opens_at_the_failure(driver, fig6_page, failure):
     open_page(driver, fig6_page)
-    summary = json.loads((fig6 / "summary.json").read_text())
-    tick = next(one["first"]["tick"] for one in summary["expectations"] if one["verdict"] == "failed")
-    assert index(driver) == tick // 800800
+    assert index(driver) == failure
 
 
 def test_a_click_in_a_figure_goes_to_its_time(page, periods):
     place = page.find_element(By.ID, "plot-v")
-    from selenium.webdriver.common.action_chains import ActionChains
-
     page.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", place)
     ActionChains(page).move_to_element(place).click().perform()
     assert 0.4 * len(periods) < index(page) < 0.65 * len(periods)
@@ -298,7 +292,7 @@ def test_the_figures_are_those_of_the_robot_that_is_chosen_and_the_camera_follow
     driver, two, folder, mirotwin
 ):
     path = folder / "two.html"
-    assert mirotwin("report", two, "-o", path, "-q") == (0, "")
+    mirotwin.succeeds("report", two, "-o", path, "-q")
     open_page(driver, path)
     Select(driver.find_element(By.ID, "robot")).select_by_visible_text("net0/robot2")
     visible = driver.execute_script(

@@ -6,18 +6,19 @@ import json
 import re
 import shutil
 import struct
-import sys
 from array import array
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from intelhex import IntelHex
 
+from miro_robot.firmware import image_path
 from mirotwin.report.page import bokeh_page, document
 from mirotwin.report.page.axes import at_least
 from mirotwin.report.page.plots import LEAST_M_S, LEAST_RAD_S, figures_of
 from mirotwin.report.page.tracks import PageTrack, PageTracks
-from tests import children
+from tests.mirotwin import program
 
 ADDRESS = re.compile(r"(?:https?|wss?|ftp|file):", re.IGNORECASE)
 
@@ -41,6 +42,11 @@ class Markup(HTMLParser):
 
     def handle_data(self, data):
         {"script": self.scripts, "style": self.styles}.get(self._within, self.words).append(data)
+
+    @property
+    def data(self):
+        """What the script of the page draws."""
+        return json.loads(next(one for one in self.scripts if one.startswith('{"')))
 
     @property
     def text(self):
@@ -71,11 +77,7 @@ def test_a_page_forbids_the_browser_every_request(fig6_page):
 def test_the_header_says_what_ran_and_its_verdict(markup, fig6):
     summary = json.loads((fig6 / "summary.json").read_text())
     for said in (
-        "fig6",
-        "seed 3",
-        summary["firmware"]["sha256"][:12],
-        summary["digest"][:12],
-        "failed",
+        *("fig6", "seed 3", "failed", summary["firmware"]["sha256"][:12], summary["digest"][:12]),
         f"1 of {len(summary['expectations'])} checks failed",
         f"{summary['tracking']['rms_position_cm']:.2f} cm",
     ):
@@ -94,20 +96,13 @@ def test_the_run_of_the_page_equals_the_recording(markup):
     assert "This page's own run of it equals the recording" in markup.text
 
 
-def test_the_profile_and_coverage_are_those_of_the_fw_commands(markup, fig6, capsys):
-    from click.testing import CliRunner
-
-    from mirotwin.commands import main
-
-    recording = str(fig6 / "run.mcap")
-    profile = json.loads(CliRunner().invoke(main, ["fw", "profile", recording, "--json"]).stdout)
+def test_the_profile_and_coverage_are_those_of_the_fw_commands(markup, fig6, mirotwin):
+    profile = json.loads(mirotwin.succeeds("fw", "profile", fig6 / "run.mcap", "--json"))
+    awake = profile["cycles"] - profile["asleep_cycles"]
     assert f"{profile['cycles']:,} machine cycles" in markup.text
     for function in profile["functions"]:
-        assert (
-            f"{function['name']} {100 * function['cycles'] / (profile['cycles'] - profile['asleep_cycles']):.1f} %"
-            in (markup.text)
-        )
-    coverage = CliRunner().invoke(main, ["fw", "coverage", recording]).stdout
+        assert f"{function['name']} {100 * function['cycles'] / awake:.1f} %" in markup.text
+    coverage = mirotwin.succeeds("fw", "coverage", fig6 / "run.mcap")
     instructions = re.search(r"instructions of this run: (.*)", coverage)[1]
     assert f"instructions {instructions}" in markup.text
 
@@ -119,16 +114,10 @@ def test_a_page_names_no_folder_of_the_machine(fig6_page, fig6):
 
 
 @pytest.mark.slow
-def test_two_processes_make_the_same_bytes_and_a_second_page_of_one_process_too(fig6, fig6_page, tmp_path):
-    code = (
-        "import os, sys; from click.testing import CliRunner; from mirotwin.commands import main\n"
-        "for name in 'ab':\n"
-        "    result = CliRunner().invoke(main, ['report', sys.argv[1], '-o', name + '.html', '-q'])\n"
-        "    assert result.exit_code == 0, result.stderr\n"
-    )
-    children.run([sys.executable, "-c", code, fig6], cwd=tmp_path, check=True)
-    pages = [(tmp_path / name).read_bytes() for name in ("a.html", "b.html")]
-    assert pages == [fig6_page.read_bytes()] * 2
+def test_every_process_makes_the_same_bytes(fig6, fig6_page, tmp_path):
+    for name in ("a.html", "b.html"):
+        program.run("report", fig6, "-o", tmp_path / name, "-q", check=True)
+        assert (tmp_path / name).read_bytes() == fig6_page.read_bytes()
 
 
 def test_a_part_of_a_recording_has_a_page_that_says_so(fig6, tmp_path, mirotwin):
@@ -136,16 +125,14 @@ def test_a_part_of_a_recording_has_a_page_that_says_so(fig6, tmp_path, mirotwin)
     part = tmp_path / "run.part.mcap"
     part.write_bytes(whole[: len(whole) * 2 // 3])
     page = tmp_path / "part.html"
-    code, said = mirotwin("report", tmp_path, "-o", page, "-q")
-    if code:  # cut in the middle of the only chunk: its whole periods are there all the same
-        pytest.fail(said)
+    mirotwin.ends(0, "report", tmp_path, "-o", page, "-q")
     assert "broken off" in Markup(page).text
 
 
 def test_a_window_leaves_out_the_rest(fig6, tmp_path, mirotwin):
     page = tmp_path / "window.html"
-    assert mirotwin("report", fig6, "-o", page, "--from", "0.5s", "--to", "1s", "-q") == (0, "")
-    data = json.loads(next(one for one in Markup(page).scripts if one.startswith('{"first"')))
+    mirotwin.succeeds("report", fig6, "-o", page, "--from", "0.5s", "--to", "1s", "-q")
+    data = Markup(page).data
     ticks = data["ticks"]
     assert (data["first"], ticks[0], len(ticks)) == (14, 14 * 800800, 16)
     assert all(ticks[0] <= mark[0] < ticks[-1] + 800800 for mark in data["marks"])
@@ -154,16 +141,10 @@ def test_a_window_leaves_out_the_rest(fig6, tmp_path, mirotwin):
 @pytest.fixture(scope="module")
 def other(folder):
     """An image whose robot does nothing."""
-    from intelhex import IntelHex
-
-    from miro_robot.firmware import image_path
-
     image = IntelHex(str(image_path()))
-    image[0] = 0x80  # SJMP to itself
-    image[1] = 0xFE
-    path = folder / "other.ihx"
-    image.write_hex_file(str(path))
-    return path
+    image[0], image[1] = 0x80, 0xFE  # SJMP to itself
+    image.write_hex_file(str(folder / "other.ihx"))
+    return folder / "other.ihx"
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +172,7 @@ def test_a_page_says_at_its_head_that_another_firmware_played(other_page, fig6, 
 
 def test_the_path_and_the_digest_are_those_of_the_firmware_that_played(other_page, fig6):
     found = Markup(other_page)
-    data = json.loads(next(one for one in found.scripts if one.startswith('{"first"')))
+    data = found.data
     xs = struct.unpack(f"<{len(data['ticks'])}d", base64.b64decode(data["robots"][0]["truth"][0]))
     assert set(xs) == {xs[0]}, "a robot that does nothing stands still"
     recorded = json.loads((fig6 / "summary.json").read_text())["digest"][:12]
@@ -220,12 +201,8 @@ def test_an_axis_never_shows_rounding_noise():
         wheel.told, wheel.profile, wheel.actual = nothing, noise, noise
     made = figures_of(PageTracks(0, ticks, [robot]), [], [])
     for name, least in (("v", LEAST_M_S), ("w", LEAST_RAD_S), ("left", LEAST_M_S), ("right", LEAST_M_S)):
-        drawn = [
-            renderer.data_source.data[renderer.glyph.y]
-            for renderer in made[f"plot-{name}"].renderers
-            if renderer.glyph.y in renderer.data_source.data
-        ]
-        everything = np.concatenate([np.asarray(one) for one in drawn])
+        columns = [(one.glyph.y, one.data_source.data) for one in made[f"plot-{name}"].renderers]
+        everything = np.concatenate([np.asarray(data[y]) for y, data in columns if y in data])
         assert np.nanmax(everything) - np.nanmin(everything) == pytest.approx(least)
 
 
@@ -248,52 +225,28 @@ def test_texts_of_others_are_text(tmp_path, mirotwin):
     assert "<script>alert(1)</script>" in Markup(page).text
 
 
-# What is refused
-
-
-def test_a_page_that_is_there_is_replaced_by_force_only(fig6, tmp_path, mirotwin):
-    page = tmp_path / "page.html"
-    page.write_text("mine")
-    code, said = mirotwin("report", fig6, "-o", page, "-q")
-    assert (code, page.read_text()) == (2, "mine")
-    assert "is there already; choose another file with --out, or replace it with --force" in said
-    assert mirotwin("report", fig6, "-o", page, "--force", "-q") == (0, "")
-    assert page.stat().st_size > 1_000_000
-
-
 @pytest.mark.slow
 def test_a_page_in_the_default_place_is_replaced_and_anything_else_there_is_not(
     fig6, tmp_path, mirotwin, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    assert mirotwin("report", fig6, "-q") == (0, "")
-    assert mirotwin("report", fig6, "-q") == (0, "")
+    mirotwin.succeeds("report", fig6, "-q")
+    mirotwin.succeeds("report", fig6, "-q")
     (tmp_path / "report.html").write_text("mine")
-    code, said = mirotwin("report", fig6, "-q")
-    assert code == 2
+    said = mirotwin.refuses("report", fig6, "-q")
     assert "report.html: is there already" in said
-
-
-def test_a_page_says_what_is_missing_without_javascript(fig6_page):
-    assert "<noscript>" in fig6_page.read_text()
 
 
 @pytest.mark.slow
 def test_a_page_that_is_too_large_is_refused_and_the_remedy_works(two, tmp_path, mirotwin, monkeypatch):
     page = tmp_path / "large.html"
-    assert mirotwin("report", two, "-o", page, "--no-frames", "-q") == (0, "")
+    mirotwin.succeeds("report", two, "-o", page, "--no-frames", "-q")
     monkeypatch.setattr(document, "MOST_BYTES", page.stat().st_size + 1000)
     again = tmp_path / "again.html"
-    code, said = mirotwin("report", two, "-o", again, "-q")
-    assert code == 2
+    said = mirotwin.refuses("report", two, "-o", again, "-q")
     assert "leave the camera's frames out with --no-frames, or look at a part with --from and --to" in said
-    assert len(said.splitlines()) == 1
     assert not again.exists()
-    assert mirotwin("report", two, "-o", again, "--no-frames", "-q") == (0, "")
-
-
-def test_the_limit_is_50_mb():
-    assert document.MOST_BYTES == 50_000_000
+    mirotwin.succeeds("report", two, "-o", again, "--no-frames", "-q")
 
 
 @pytest.mark.parametrize(
@@ -315,22 +268,17 @@ def test_bad_input_is_one_line_and_nothing_is_written(arguments, said, fig6, tmp
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.txt").write_text("hello\n")
     shutil.copytree(fig6, tmp_path / "fig6")
-    code, found = mirotwin("report", *arguments, "-o", "page.html", "-q")
-    assert code == 2
-    assert said in found
-    assert len(found.splitlines()) == 1
+    assert said in mirotwin.refuses("report", *arguments, "-o", "page.html", "-q")
     assert not (tmp_path / "page.html").exists()
 
 
 def test_without_bokeh_it_says_what_to_install(fig6, tmp_path, mirotwin, monkeypatch):
     monkeypatch.setattr(bokeh_page, "find_spec", lambda name: None)
-    code, said = mirotwin("report", fig6, "-o", tmp_path / "page.html", "-q")
-    assert (code, said) == (2, "mirotwin: error: bokeh: is not installed; pip install 'mirotwin[report]'\n")
+    said = mirotwin.refuses("report", fig6, "-o", tmp_path / "page.html", "-q")
+    assert said == "bokeh: is not installed; pip install 'mirotwin[report]'"
 
 
 def test_a_case_of_a_bare_processor_has_no_page(tmp_path, mirotwin):
     case = tmp_path / "bare.stream"
     case.write_text("# mirotwin stream 2\n#: seed = 0\n#:\n#: [bare]\n#: crystal_hz = 11059200\n1000 > 55\n")
-    code, said = mirotwin("report", case, "-o", tmp_path / "page.html", "-q")
-    assert code == 2
-    assert len(said.splitlines()) == 1
+    mirotwin.refuses("report", case, "-o", tmp_path / "page.html", "-q")
