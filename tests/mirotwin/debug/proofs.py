@@ -1,8 +1,8 @@
-"""The debugger's last writers and stacks beside brute force: `python -m tests.mirotwin.debug.proofs`.
+"""The debugger beside brute force: last writers, stacks and random walks; `python -m tests.mirotwin.debug.proofs`.
 
 Which bytes an instruction writes is told by executing it twice on a copy of the processor, once with all variables
 complemented: a byte is written if one of the two changes it. Stacks are those of the calls, interrupts and returns that
-were executed. The tests prove a part of it.
+were executed. At each stop of a walk the state has to be that of a run that never stopped. The tests prove a part.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
 from mirotwin.rerun.inspected_run import BareRun
 from tests import children
-from tests.mirotwin.debug.runs import ASM, debugger_of, robot_run
+from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
 
 JBC = 0x10
 MIX = Path(__file__).parents[2] / "robot" / "ucsim" / "programs" / "mix.c"
@@ -139,10 +139,51 @@ def compiled(folder, source, *options):
     return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
 
 
+MOVES = ("go", "back", "into", "over", "out", "instruction", "goto", "near", "break")
+
+
+def walk(debugger, steps, end_tick, seed):
+    """(tick, state) of each stop of a walk forward and back, with breakpoints that come and go."""
+    chance = random.Random(seed)
+    timeline, places = debugger.timeline, sorted(debugger.symbols.line_begins)
+    for _ in range(steps):
+        move, back = chance.choice(MOVES), chance.random() < 0.6 or timeline.tick >= end_tick
+        if move == "break":
+            debugger.breakpoints.clear()
+            address = chance.choice(places)
+            debugger.add("one", [address], chance.choice(["", "R7 > 3", "tick % 7 == 0"]))
+        elif move in ("go", "back"):
+            debugger.go_on(back=move == "back")
+        elif move == "goto":
+            debugger.go_to(chance.randrange(end_tick))
+        elif move == "near":
+            debugger.go_to(min(max(timeline.tick + chance.randrange(-50_000, 50_000), 0), end_tick))
+        elif move == "instruction":
+            debugger.step(chance.choice(["into", "over"]), back, by_instruction=True)
+        elif move != "out" or len(debugger.frames()) > 1:
+            debugger.step(move, back)
+        yield timeline.tick, timeline.state()
+
+
+RESET_ENDS = range(35_280, 35_592)
+"""The chips' HI after their first reset: when the processor is told of it depends on how a run is cut."""
+
+
+def differences(stops, unbroken):
+    """The ticks of stops whose state a run that goes straight on does not have."""
+    found = []
+    for tick, state in sorted(stop for stop in stops if stop[0] not in RESET_ENDS):
+        unbroken.to(tick)
+        if unbroken.world.state.save() != state:
+            found.append(tick)
+    return found
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--writers", type=int, default=1000)
     parser.add_argument("--stacks", type=int, default=100_000, help="of each firmware")
+    parser.add_argument("--steps", type=int, default=10_000, help="of the walk")
     given = parser.parse_args()
     begun = time.process_time()
     wrong, asked = wrong_writers(24_000, 2_400_000, given.writers)
@@ -167,6 +208,12 @@ def main():
                 run.to(end_tick)
             print(f"stacks of {name}: {shadow.compared} compared, {len(shadow.wrong)} wrong")
             bad |= bool(shadow.wrong)
+    debugger = debugger_of(robot_run())
+    wrong = differences(walk(debugger, given.steps, 2 * SECOND, 0), robot_run())
+    debugger.go_to(debugger.timeline.run.end_tick)
+    golden = debugger.timeline.run.world.digest == golden_digest("fig6 6 s seed 7")
+    print(f"{given.steps} steps: {len(wrong)} states differ; the digest at the end is golden: {golden}")
+    bad |= bool(wrong) or not golden
     print(f"{time.process_time() - begun:.1f} s of processor time")
     return int(bad)
 

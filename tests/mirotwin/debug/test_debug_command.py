@@ -68,9 +68,8 @@ def test_an_image_without_symbols_has_addresses_and_says_so(console, bare):
 
 def test_a_case_stands_at_its_failed_check(mirotwin, console, tmp_path):
     scenario = tmp_path / "late.scenario.toml"
-    scenario.write_text(
-        'scenario = "fig6"\nname = "late"\nset = { duration_s = 0.3 }\n[expect]\nframes_accepted_min = 50\n'
-    )
+    text = 'scenario = "fig6"\nname = "late"\nset.duration_s = 0.3\nexpect.frames_accepted_min = 50\n'
+    scenario.write_text(text)
     mirotwin.ends(1, "test", scenario, "--artifacts", tmp_path / "out")
     folder = next(path.parent for path in (tmp_path / "out").rglob("case.stream"))
     out = console(folder, lines=["where"])
@@ -93,9 +92,8 @@ def test_a_case_of_a_bare_processor_stands_at_its_fault_and_goes_back(mirotwin, 
 
 def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
     firmware, check = hex_file(tmp_path / "sleeps.ihx", assemble(SLEEPS)), tmp_path / "mine.py"
-    check.write_text(
-        "def too_long(run):\n    return f'{len(run.sent)} are too many' if len(run.sent) > 2 else None\n"
-    )
+    said = "f'{len(run.sent)} are too many'"
+    check.write_text(f"def too_long(run):\n    return {said} if len(run.sent) > 2 else None\n")
     file = bare_case(tmp_path, b"abc", check=CHECK)
     given = ("debug", file, "--firmware", firmware)
     out = mirotwin.succeeds(*given, "--check", f"{check}:too_long", *commands("rstepi"))

@@ -5,16 +5,21 @@ import sys
 from itertools import pairwise
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from miro_exact.clock import CYCLE_TICKS
+from miro_exact.state import Flat
+from miro_robot.bare.machine import BareMachine
+from miro_robot.inspect.marks import MarkInspector
 from mirotwin.debug import timeline as timelines
 from mirotwin.debug.console import Console
 from mirotwin.debug.timeline import Timeline, Trap
 from mirotwin.shell.progress import ProgressBar
-from tests.mirotwin.debug.proofs import LIBRARY, MIX, assembled, compiled, stacks, wrong_writers
+from tests.mirotwin.debug import proofs
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
-from tests.mirotwin.debug.walks import differences, walk
 from tests.mirotwin.shell.test_screen import Screen
+from tests.mirotwin.verify.bare.firmwares import image
 from tests.mutants.sdcc import needs_sdcc
 from tests.naive.debugger import history, next_line
 
@@ -151,47 +156,46 @@ def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypa
     assert "the run ends here" in capsys.readouterr().out
 
 
-# A part of what `python -m tests.mirotwin.debug.proofs` compares with brute force
-
-
 def test_the_last_writer_is_that_of_brute_force():
-    wrong, asked = wrong_writers(SECOND // 50, SECOND // 40, 40)
+    wrong, asked = proofs.wrong_writers(SECOND // 50, SECOND // 40, 40)
     assert wrong == []
     assert asked > 10
 
 
-PROGRAMS = {"the robot": (), "mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
+PROGRAMS = {
+    "the robot": (),
+    "mix": (proofs.MIX,),
+    "library": (proofs.LIBRARY,),
+    "stack-auto": (proofs.LIBRARY, "--stack-auto"),
+}
 
 
 @needs_sdcc
 @pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS)
 def test_stacks_are_those_of_the_calls_and_interrupts(tmp_path, program):
-    shadow = stacks(compiled(tmp_path, *program) if program else robot_run(), SECOND // 10, 0.1)
+    shadow = proofs.stacks(proofs.compiled(tmp_path, *program) if program else robot_run(), SECOND // 10, 0.1)
     assert shadow.compared > 1000
     assert shadow.wrong == []
 
 
 def test_stacks_of_a_firmware_in_assembler_are_those_of_the_calls():
-    shadow = stacks(assembled(ASM), SECOND // 50, 0.1)
+    shadow = proofs.stacks(proofs.assembled(ASM), SECOND // 50, 0.1)
     assert shadow.compared > 1000
     assert shadow.wrong == []
-
-
-# Each moment is that of a run that never stopped
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_states_of_a_random_walk_are_those_of_an_unbroken_run(seed):
     debugger = debugger_of(robot_run())
-    stops = list(walk(debugger, 80, SECOND // 2, seed))
+    stops = list(proofs.walk(debugger, 80, SECOND // 2, seed))
     assert len(stops) == 80
-    assert differences(stops, robot_run()) == []
+    assert proofs.differences(stops, robot_run()) == []
 
 
 def test_the_digest_at_the_end_of_a_walk_is_the_golden_one():
     debugger = debugger_of(robot_run(settings=["duration_s=0.5"]))
-    list(walk(debugger, 20, SECOND // 4, 3))
+    list(proofs.walk(debugger, 20, SECOND // 4, 3))
     debugger.go_to(debugger.timeline.run.end_tick)
     assert debugger.timeline.run.world.digest == golden_digest("fig6 0.5 s seed 7")
 
@@ -205,7 +209,7 @@ def test_checkpoints_stay_within_their_budget_and_any_moment_can_be_gone_to(monk
     for tick in (20 * SECOND // 21, SECOND // 3, 0, SECOND // 2):
         timeline.go_to(tick)
         stops.append((timeline.tick, timeline.state()))
-    assert differences(stops, robot_run()) == []
+    assert proofs.differences(stops, robot_run()) == []
 
 
 def test_a_step_back_from_a_sleep_is_its_begin_and_a_step_leads_to_what_wakes():
@@ -235,4 +239,64 @@ def test_steps_leave_chips_and_encoders_where_a_straight_run_has_them():
     for _ in range(400):
         timeline.step()
         stops.append((timeline.tick, timeline.state()))
-    assert differences(stops, robot_run()) == []
+    assert proofs.differences(stops, robot_run()) == []
+
+
+CYCLES = 2000
+PLACES = st.sets(st.integers(0, 0x60), max_size=8)
+
+
+def machine():
+    return BareMachine(image(ASM), stop_on_fault=False)
+
+
+def executed():
+    """(cycle, address) of the instructions of a run, one by one."""
+    cpu, found = machine().cpu, []
+    while cpu.cycles < CYCLES:
+        cycle, pc, before = cpu.cycles, cpu.pc, cpu.instructions
+        cpu.step()
+        if cpu.instructions > before:  # else an interrupt came first
+            found.append((cycle, pc))
+    return found
+
+
+EXECUTED = executed()
+
+
+def asked(run, places, enough=CYCLES, others=None):
+    """What was asked in `run`, up to `enough` questions, and the run's state at its end."""
+    found = []
+
+    def ask():
+        found.append((run.cpu.cycles, run.cpu.pc))
+        return len(found) == enough
+
+    inspector = MarkInspector(run.cpu, places, ask, others)
+    for pause in range(100, CYCLES + 1, 100):
+        run.run(pause=pause)
+    inspector.detach()
+    return found, Flat(run.cpu).save()
+
+
+@settings(max_examples=40)
+@given(PLACES, st.integers(1, 20))
+def test_each_execution_is_asked_about_until_it_is_enough(places, enough):
+    plain = machine()
+    plain.run(pause=CYCLES)
+    found, state = asked(machine(), places, enough)
+    assert found == [one for one in EXECUTED if one[1] in places][:enough]
+    assert state == Flat(plain.cpu).save()
+
+
+def test_marks_of_the_owner_still_end_its_run():
+    run, until = machine(), EXECUTED[50][1]
+    found = []
+    inspector = MarkInspector(
+        run.cpu, {until, EXECUTED[3][1]}, lambda: bool(found.append(run.cpu.pc)), lambda: (until,)
+    )
+    run.run(until=until, pause=CYCLES)
+    inspector.detach()
+    assert run.cpu.pc == until
+    assert found[-1] == until
+    assert EXECUTED[3][1] in found
