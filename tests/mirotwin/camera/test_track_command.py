@@ -19,8 +19,8 @@ from mirotwin.recording import reader as recording_reader
 
 FRAMES = 6
 CAMERA = (
-    *("camera.kind=pixels", "camera.calibration=exact", "camera.delay_frames=0"),
-    "network.robot.1.start_error_y_cm=40",
+    *("--set", "camera.kind=pixels", "--set", "camera.calibration=exact", "--set", "camera.delay_frames=0"),
+    *("--set", "network.robot.1.start_error_y_cm=40"),
 )
 
 
@@ -28,16 +28,17 @@ CAMERA = (
 def seen(mirotwin, short, tmp_path_factory):
     """A run whose measurements arrive at once, its plain frames in a folder and in the recording; and the files."""
     folder = tmp_path_factory.mktemp("seen")
-    camera = [word for key in CAMERA for word in ("--set", key)]
     frames = ("--frames", folder / "frames", "--record-frames")
-    mirotwin.succeeds("run", short, "--out", folder / "run", "-q", "--no-figure", *camera, *frames)
+    mirotwin.succeeds("run", short, "--out", folder / "run", "-q", "--no-figure", *CAMERA, *frames)
     (folder / "camera.toml").write_text(calibration_kinds.exact(CameraParameters()).text())
     (folder / "colours.toml").write_text(colours_of(CameraParameters(), PictureSettings(), "diagonal").text())
     return folder
 
 
-def files(seen):
-    return "--calibration", seen / "camera.toml", "--colours", seen / "colours.toml"
+def of(seen, path="frames"):
+    """The words that track the robots in pictures of the run, or in others."""
+    files = ("--calibration", seen / "camera.toml", "--colours", seen / "colours.toml")
+    return "camera", "track", seen / path, *files
 
 
 def measured(seen):
@@ -52,7 +53,7 @@ def measured(seen):
 @pytest.mark.parametrize("path", ["frames", "run/run.mcap"])
 def test_frames_of_a_run_give_the_postures_that_its_recording_has(mirotwin, seen, path):
     """Rounding to red, green and blue moves a few pixels over the border of a class."""
-    out = mirotwin.succeeds("camera", "track", seen / path, *files(seen), "--numbers", "0,2", "--json")
+    out = mirotwin.succeeds(*of(seen, path), "--numbers", "0,2", "--json")
     lines = [json.loads(line) for line in out.splitlines()]
     expected = measured(seen)
     assert len(lines) == len(expected) == 2 * FRAMES
@@ -66,7 +67,7 @@ def test_frames_of_a_run_give_the_postures_that_its_recording_has(mirotwin, seen
 
 
 def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(mirotwin, seen):
-    out = mirotwin.succeeds("camera", "track", seen / "frames", *files(seen), "--numbers", "2,1")
+    out = mirotwin.succeeds(*of(seen), "--numbers", "2,1")
     head, *rows, last = [line.split() for line in out.splitlines()]
     assert head == ["frame", "robot", "x_cm", "y_cm", "heading_deg", "confidence", "picture"]
     assert [row[:2] for row in rows] == [[f"{n}", robot] for n in range(FRAMES) for robot in "21"]
@@ -77,9 +78,7 @@ def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(mirotwin, se
 
 
 def test_a_lost_robot_has_no_numbers_in_json(mirotwin, seen):
-    _, out, _ = mirotwin(
-        "camera", "track", seen / "frames", *files(seen), "--team", "blue", "--numbers", "0", "--json"
-    )
+    _, out, _ = mirotwin(*of(seen), "--team", "blue", "--numbers", "0", "--json")
     lost = {"lost": True, "x_m": None, "y_m": None, "theta_rad": None, "confidence": None}
     for frame, line in enumerate(out.splitlines()):
         picture = {"frame": frame, "picture": f"frame-{frame:06d}.png", "tick": 800_800 * frame, "robot": 0}
@@ -91,11 +90,10 @@ def test_ppm_files_say_the_same_and_other_files_are_passed_over(mirotwin, seen, 
         with Image.open(seen / "frames" / f"frame-{number:06d}.png") as image:
             image.save(tmp_path / f"{number}.PPM", "PPM")
     (tmp_path / "notes.txt").write_text("mine")
-    given = (*files(seen), "--numbers", "0,2", "--json", "--centroid", "weighted")
-    one = mirotwin("camera", "track", seen / "frames", *given)[1].splitlines()
-    other = mirotwin("camera", "track", tmp_path, *given)[1].splitlines()
-    without = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
-    assert [without(line) for line in one] == [without(line) for line in other] != []
+    given = ("--numbers", "0,2", "--json", "--centroid", "weighted")
+    one, other = (mirotwin.succeeds(*of(seen, path), *given).splitlines() for path in ("frames", tmp_path))
+    one, other = ([{**json.loads(line), "picture": ""} for line in lines] for lines in (one, other))
+    assert one == other != []
 
 
 def test_of_several_networks_one_is_taken(mirotwin, seen, tmp_path):
@@ -103,34 +101,28 @@ def test_of_several_networks_one_is_taken(mirotwin, seen, tmp_path):
         for network in (0, 3):
             name = f"net{network}-frame-{number:06d}.png"
             shutil.copy(seen / "frames" / f"frame-{number:06d}.png", tmp_path / name)
-    _, out, _ = mirotwin("camera", "track", tmp_path, *files(seen), "--network", 3, "--numbers", "0")
-    assert [line.split()[-1] for line in out.splitlines()[1:3]] == [
-        "net3-frame-000000.png",
-        "net3-frame-000001.png",
-    ]
-    err = mirotwin.refuses("camera", "track", tmp_path, *files(seen), "--network", 1)
+    _, out, _ = mirotwin(*of(seen, tmp_path), "--network", 3, "--numbers", "0")
+    pictures = [line.split()[-1] for line in out.splitlines()[1:3]]
+    assert pictures == ["net3-frame-000000.png", "net3-frame-000001.png"]
+    err = mirotwin.refuses(*of(seen, tmp_path), "--network", 1)
     assert f"{tmp_path}: --network 1: no picture of it" in err
 
 
 def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(mirotwin, short, seen, tmp_path):
-    camera = [word for key in CAMERA for word in ("--set", key)]
-    assert mirotwin("run", short, "--out", tmp_path / "plain", "-q", "--no-figure", *camera)[0] == 0
+    assert mirotwin("run", short, "--out", tmp_path / "plain", "-q", "--no-figure", *CAMERA)[0] == 0
     plain = recording_reader.read(tmp_path / "plain" / "run.mcap")
     assert recording_reader.read(seen / "run" / "run.mcap") == plain
     with (seen / "run" / "run.mcap").open("rb") as file:
         found = [*make_reader(file).iter_messages(["/net0/camera/image"])]
     assert len(found) == FRAMES
     for frame, (schema, channel, message) in enumerate(found):
-        assert (schema.name, schema.encoding, channel.message_encoding) == (
-            "foxglove.CompressedImage",
-            "jsonschema",
-            "json",
-        )
+        assert schema.name == "foxglove.CompressedImage"
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
         content = json.loads(message.data)
         assert sorted(content) == sorted(json.loads(schema.data)["properties"])
         stamp = content["timestamp"]
         assert stamp["sec"] * 10**9 + stamp["nsec"] == message.log_time == nanoseconds(800_800 * frame)
-    err = mirotwin.refuses("camera", "track", tmp_path / "plain" / "run.mcap", *files(seen))
+    err = mirotwin.refuses(*of(seen, tmp_path / "plain" / "run.mcap"))
     assert "no frames of the camera of network 0; record them: mirotwin run .. --record-frames" in err
 
 
@@ -138,7 +130,7 @@ def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(mirotwin, 
     part = tmp_path / "run.part.mcap"
     data = (seen / "run" / "run.mcap").read_bytes()
     part.write_bytes(data[: len(data) // 2])
-    code, out, err = mirotwin("camera", "track", part, *files(seen), "--numbers", "0")
+    code, out, err = mirotwin(*of(seen, part), "--numbers", "0")
     assert code in (0, 2)
     assert str(part) in err
     assert len(out.splitlines()) < FRAMES + 2
@@ -158,7 +150,7 @@ def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(mirotwin, 
 )
 def test_a_picture_that_is_none_is_named(mirotwin, seen, tmp_path, name, content, expected):
     (tmp_path / name).write_bytes(content)
-    err = mirotwin.refuses("camera", "track", tmp_path, *files(seen))
+    err = mirotwin.refuses(*of(seen, tmp_path))
     assert err.startswith(f"{tmp_path}{'' if expected[0] == ':' else '/'}{expected}")
 
 
@@ -168,13 +160,7 @@ def test_a_damaged_picture_is_named(mirotwin, seen, tmp_path):
         file = tmp_path / f"{number}" / "x.png"
         file.parent.mkdir()
         file.write_bytes(broken)
-        assert mirotwin.refuses("camera", "track", file.parent, *files(seen)).startswith(f"{file}: is ")
-
-
-def without_colour(name):
-    classes = colours_of(CameraParameters(), PictureSettings(), "diagonal")
-    text = classes.text()
-    return text.replace(f"[colours.{name}]", f"[colours.{name}_paint]")
+        assert mirotwin.refuses(*of(seen, file.parent)).startswith(f"{file}: is ")
 
 
 def same_colour(text):
@@ -216,13 +202,13 @@ def test_colours_that_cannot_be_used_are_named_with_file_and_key(mirotwin, seen,
     ],
 )  # fmt: skip
 def test_what_cannot_be_tracked_is_refused(mirotwin, seen, options, expected):
-    err = mirotwin.refuses("camera", "track", seen / "frames", *files(seen), *options)
+    err = mirotwin.refuses(*of(seen), *options)
     assert err.startswith(expected)
 
 
 @pytest.mark.parametrize("path", ["absent", "camera.toml"])
 def test_a_path_that_is_neither_folder_nor_recording_is_named(mirotwin, seen, path):
-    assert mirotwin.refuses("camera", "track", seen / path, *files(seen)).startswith(f"{seen / path}: ")
+    assert mirotwin.refuses(*of(seen, path)).startswith(f"{seen / path}: ")
 
 
 def test_every_colour_of_the_tracker_is_in_the_file_that_calibrate_writes(seen):

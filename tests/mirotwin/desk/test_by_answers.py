@@ -6,11 +6,9 @@ import pytest
 
 from mirotwin.desk.robot_port import RobotPort
 from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
-from mirotwin.verify.conform.rules import ALL, RULES
+from mirotwin.verify.conform.rules import RULES
 from tests.mirotwin.desk.rig import ROBOT
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
-from tests.mutants.planted import PLANTED
+from tests.mirotwin.verify.checks.rig import planted
 from tests.mutants.sdcc import needs_sdcc
 
 QUICK = "set=camera={kind=%22gaussian%22}"
@@ -26,10 +24,6 @@ def verdicts(mirotwin, robot, rules, *options):
     told = {one["verdict"] for one in found.values()}
     assert code == (1 if "failed" in told else 0 if "passed" in told else 5), err
     return found
-
-
-def test_what_is_not_observable_are_rules():
-    assert NOT_OBSERVABLE.keys() < {rule.id for rule in ALL}
 
 
 @pytest.mark.parametrize("rule", SEEN)
@@ -74,7 +68,7 @@ def test_of_several_robots_at_a_port_one_is_tried_and_named(mirotwin, two_robots
 
 @needs_sdcc
 def test_another_robot_at_the_port_hides_no_mistake(mirotwin, two_robots):
-    robots = f"{two_robots}?firmware={built('answers frames that ask nobody')}"
+    robots = f"{two_robots}?firmware={planted('answers frames that ask nobody').path}"
     assert verdicts(mirotwin, robots, ["P43"])["P43"]["verdict"] == "failed"
 
 
@@ -115,13 +109,8 @@ FOUND = {
 """Mistakes that answers show, and the rule that finds them."""
 
 
-def built(name):
-    planted = PLANTED[name]
-    return build({planted.file: planted.applied(source_files()[planted.file])}).image
-
-
 def robot_with(name):
-    return f"{ROBOT}&{QUICK}&firmware={built(name)}"
+    return f"{ROBOT}&{QUICK}&firmware={planted(name).path}"
 
 
 @pytest.mark.slow

@@ -174,6 +174,20 @@ def test_expectation(link):
 """
 
 
+SAID = """\
+mirotwin: robots at miro://*; what a port does not show is skipped
+*test_nobody_asks*
+*WaitFailed: no answer within 50 ms*
+*test_motion*
+*--allow-motion*
+"""
+SKIPPED = """\
+*not observable on a port: the inside of a robot*
+*command with name = "STT": not observable on a port*
+*`set_radio` of a robot's world: not observable on a port*
+"""
+
+
 @pytest.mark.slow
 def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     pytester.makepyfile(test_desk=TESTS)
@@ -181,22 +195,8 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
         (pytester.path / f"{name}.scenario.toml").write_text(HEAD + steps)
     found = pytester.runpytest_subprocess("-rs", "-p", "no:xdist", f"--mirotwin-port={ROBOT}")
     found.assert_outcomes(passed=4, skipped=4, failed=2)
-    found.stdout.fnmatch_lines(
-        [
-            "mirotwin: robots at miro://*; what a port does not show is skipped",
-            "*test_nobody_asks*",
-            "*WaitFailed: no answer within 50 ms*",
-            "*test_motion*",
-            "*--allow-motion*",
-        ]
-    )
-    found.stdout.fnmatch_lines_random(
-        [
-            "*not observable on a port: the inside of a robot*",
-            '*command with name = "STT": not observable on a port*',
-            "*`set_radio` of a robot's world: not observable on a port*",
-        ]
-    )
+    found.stdout.fnmatch_lines(SAID)
+    found.stdout.fnmatch_lines_random(SKIPPED)
 
 
 @pytest.mark.parametrize("command", ["replay", "test", "conform"])
@@ -218,12 +218,9 @@ def test_a_case_is_refused_before_anything_is_sent(mirotwin, at_port, tmp_path):
     at_port(POLL)
     body = stream_text(1).partition("\n")[2]
     (tmp_path / "old.stream").write_text(f"# mirotwin stream 2\n#: expect.no_fault = true\n{body}")
-    code, out, err = mirotwin("test", tmp_path, "--port", ROBOT)
-    assert (code, out) == (2, "")
-    assert err == (
-        f"mirotwin: error: {tmp_path}/old.stream: --port: a case is judged by what is inside the twin,"
-        " which no port shows; leave it out, or send it with `mirotwin replay`\n"
-    )
+    said = mirotwin.refuses("test", tmp_path, "--port", ROBOT)
+    why = "a case is judged by what is inside the twin, which no port shows"
+    assert said == f"{tmp_path}/old.stream: --port: {why}; leave it out, or send it with `mirotwin replay`"
     code, out, _ = mirotwin("test", tmp_path, "-k", "scenario", "--port", ROBOT)
     assert (code, out.splitlines()[-1]) == (0, "1 passed")
 

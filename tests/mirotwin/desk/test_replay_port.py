@@ -13,9 +13,9 @@ from mirotwin.recording import reader
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.port_page import _marks
 from tests.mirotwin.desk.rig import PERIOD, ROBOT, stream_text
+from tests.mirotwin.verify.checks.rig import planted
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
-from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
 
 TO_ROBOT = ("--port", ROBOT, "--allow-motion", "-q")
@@ -112,8 +112,6 @@ def test_a_case_of_a_bare_processor_is_refused(mirotwin, tmp_path):
     assert err == f"{case}: --port: is not for a case of a bare processor; leave it out"
 
 
-# Robots that are not what their twin is: the channel where it shows first
-
 MOVED = {"left moved", "right moved"}
 FIRMWARE = {
     "a small gain": ("filter.h", "FILTER_KP       400", "FILTER_KP       60", MOVED),
@@ -165,9 +163,7 @@ def test_other_constants_of_the_firmware_are_found(mirotwin, tmp_path, name):
 @needs_sdcc
 @pytest.mark.parametrize("name", MISTAKES)
 def test_mistakes_of_the_firmware_are_found(mirotwin, tmp_path, name):
-    planted = PLANTED[name]
-    made = build({planted.file: planted.applied(source_files()[planted.file])})
-    assert first(mirotwin, tmp_path, f"{ROBOT}&firmware={made.image}")["channel"] in MISTAKES[name]
+    assert first(mirotwin, tmp_path, f"{ROBOT}&firmware={planted(name).path}")["channel"] in MISTAKES[name]
 
 
 def test_an_answer_that_gets_lost_is_missing_where_it_was(mirotwin, tmp_path, monkeypatch):
@@ -199,9 +195,6 @@ def test_a_serial_port_of_another_rate_is_told_where_it_matters(mirotwin, drive,
     if code:
         assert "characters come that are no answer" in err
         assert "is its rate 9600 baud?" in err
-
-
-# The page of such a recording
 
 
 @pytest.fixture

@@ -62,7 +62,6 @@ def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path):
     words = ("fw", "vectors", "--out", tmp_path / "set", "--per-opcode", "100")
     done = program.run(*words, preexec_fn=limit)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[-1] == (
-        f"mirotwin: error: {tmp_path / 'set'}: File too large; make room, or choose another folder with --out"
-    )
+    remedy = "File too large; make room, or choose another folder with --out"
+    assert done.stderr.splitlines()[-1] == f"mirotwin: error: {tmp_path / 'set'}: {remedy}"
     assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 from selectors import DefaultSelector
-from types import SimpleNamespace
+from unittest.mock import Mock
 
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.firmware import image_path
@@ -116,12 +116,7 @@ class FakePace(Pace):
         return self.now
 
 
-NO_SELECTOR = SimpleNamespace(
-    select=lambda timeout=None: [],
-    register=lambda *_: None,
-    unregister=lambda *_: None,
-    modify=lambda *_: None,
-)
+NO_SELECTOR = Mock(**{"select.return_value": []})
 
 
 def soon(port, wanted):

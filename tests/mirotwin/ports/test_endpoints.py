@@ -174,9 +174,8 @@ def test_nonsense_is_ignored_and_what_follows_passes(rig, nonsense):
     port, _ = rig.connected(Rfc2217Endpoint)
     assert sent_to(port, nonsense + b"through").endswith(b"through")
     assert port.ignored >= 1
-    assert [line for line in rig.told if "nonsense" in line] == [
-        f"{port.name}: {port.client} negotiates nonsense, which is ignored"
-    ]
+    told = f"{port.name}: {port.client} negotiates nonsense, which is ignored"
+    assert [line for line in rig.told if "nonsense" in line] == [told]
 
 
 _pieces = st.one_of(

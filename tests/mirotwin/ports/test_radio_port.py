@@ -86,11 +86,6 @@ def test_a_scenario_with_steps_is_refused(tmp_path):
         live_scenario(str(path))
 
 
-def test_a_network_that_is_not_there_is_refused():
-    with pytest.raises(ValueError, match="there is no network 1; the last one is 0"):
-        RadioPort(live_world(), 1)
-
-
 def test_what_was_sent_in_an_hour_is_announced_within_seconds():
     sent = [Transmission(100_000 + index * 1_000_000, DOWN, b"x") for index in range(80_000)]
     begun_s = time.process_time()

@@ -39,9 +39,6 @@ def asked(port, seq=0):
     return port.read(ANSWER_BYTES)
 
 
-# ---- what passes time ------------------------------------------------------------------------------------
-
-
 def test_a_read_ends_at_the_tick_at_which_its_last_byte_is_known(miro):
     one, other = miro(timeout=1), miro(timeout=1)
     whole = asked(one)
@@ -121,9 +118,6 @@ def test_the_same_calls_give_the_same_digest(miro):
     assert digests[0] == digests[1] != ""
 
 
-# ---- what a program may rely on --------------------------------------------------------------------------
-
-
 def test_each_open_is_a_robot_that_has_just_been_switched_on(miro):
     port = miro(timeout=0.1)
     first = asked(port)
@@ -190,9 +184,6 @@ def test_lines_that_a_radio_does_not_have_are_there_and_do_nothing(miro):
     assert port.world.networks[0].frames_sent == 0
 
 
-# ---- what ends it ----------------------------------------------------------------------------------------
-
-
 def test_a_limit_ends_a_read_that_would_wait_for_ever(miro):
     port = miro(URL + "&limit_s=0.5", timeout=None)
     reached = r"the limit of 0.5 s of virtual time is reached \(limit_s\)"
@@ -246,9 +237,6 @@ def test_a_port_that_is_not_open_says_so(miro):
     port.close()
 
 
-# ---- what it leaves --------------------------------------------------------------------------------------
-
-
 def test_a_recording_of_the_port_replays_to_the_same_digests(miro, tmp_path):
     port = miro(f"miro://fig6?seed=5&out={tmp_path / 'out'}", timeout=0.05)
     for seq in range(5):
@@ -282,9 +270,6 @@ def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_pat
     assert done.stdout == f"{said}\n"
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.part.mcap"]
     assert replays(tmp_path / "out" / "run.part.mcap") > 3
-
-
-# ---- what stands in a URL ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

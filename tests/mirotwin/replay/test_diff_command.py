@@ -1,14 +1,20 @@
-"""`mirotwin diff`: what two recordings were made from, and where they differ first."""
+"""`mirotwin diff`: what two recordings were made from, and where they differ first; and the page of replay and diff."""
 
 import json
 import math
+import re
+from pathlib import Path
 
+import click
 import pytest
+from click.testing import CliRunner
 from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import load
+from mirotwin.commands import main
+from mirotwin.recording.compare import KINDS, WITHIN_COUNTS, WITHIN_COUNTS_PER_SAMPLE, WITHIN_TICKS
 from mirotwin.recording.recorder import Recorder, source_of
 from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.replay.rig import STOP_AT, Planted
@@ -61,10 +67,8 @@ def test_what_they_were_made_from_is_told_first_key_by_key(mirotwin, finished, r
     assert lines[1].split() == ["network.0.robot.0.controller.gamma1_per_s", "1.7", "0.5"]
     assert lines[2] == ""
     assert "the recordings differ in control period 1, tick 800800 (0.033367 s), /net0/robot0/control" in err
-    assert (
-        "their states differ from tick 800801 (0.033367 s), control period 1: networks[0].robots[0].pilot"
-        in err
-    )
+    where = "tick 800801 (0.033367 s), control period 1: networks[0].robots[0].pilot"
+    assert f"their states differ from {where}" in err
 
 
 def test_another_seed_is_named_and_so_is_the_field_that_shows_it_first(mirotwin, finished, runs):
@@ -131,9 +135,8 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
         while not world.finished:
             recorder.write(world.step())
     err = mirotwin.ends(4, "diff", finished / "run.mcap", path, "-q")
-    assert "the recordings differ in control period 3, tick 3203200 (0.133467 s), /period digest" in err or (
-        what == "float" and "the recordings differ in control period 3, tick" in err
-    )
+    where = "" if what == "float" else " 3203200 (0.133467 s), /period digest"
+    assert f"the recordings differ in control period 3, tick{where}" in err
     assert "run again, their states do not differ up to the end of control period" in err
 
 
@@ -221,3 +224,51 @@ def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_pa
 
 def test_a_folder_without_a_recording_is_refused(mirotwin, finished, tmp_path):
     assert mirotwin.refuses("diff", finished, tmp_path) == f"{tmp_path}: is a folder; name a file in it"
+
+
+PAGE = (Path(__file__).parents[3] / "mirotwin/replay/README.md").read_text(encoding="utf-8")
+
+
+def test_the_example_in_python_prints_what_the_page_says(capsys):
+    code = PAGE.split("```python\n")[1].split("```")[0]
+    exec(code, {})
+    assert capsys.readouterr().out == code.rpartition("# ")[2]
+
+
+def test_every_rule_and_tolerance_is_there_with_its_default():
+    assert tuple(re.findall(r"^\| `(\w+)`(?: \(default\))? \|.*\|.*\|$", PAGE, re.M))[:5] == KINDS
+    for option, default in (
+        ("--within-ms", WITHIN_TICKS / 24_000),
+        ("--within-counts", WITHIN_COUNTS),
+        ("--within-counts-per-sample", WITHIN_COUNTS_PER_SAMPLE),
+    ):
+        found = re.search(rf"`{option}` ([\d.]+)", PAGE)
+        assert float(found[1]) == default
+
+
+@pytest.mark.parametrize("name", ["replay", "diff"])
+def test_every_option_on_the_page_is_one_of_the_commands(name):
+    context = click.Context(main)
+    options = {
+        command: {option for parameter in main.get_command(context, command).params for option in parameter.opts}
+        for command in ("replay", "diff", "run")
+    }  # fmt: skip
+    assert set(re.findall(r"--[a-z][a-z-]+", PAGE)) <= set().union(*options.values())
+    own = options[name]
+    assert {"--compare", "--json", "--from", "--to", "--all", "--lines-from", "--sources"} <= own
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, list(map(str, arguments))).stdout
+
+
+def test_every_key_of_the_json_is_on_the_page(tmp_path):
+    for seed in (1, 2):
+        out = ("--out", tmp_path / f"{seed}", "-q", "--no-figure")
+        run("run", "fig6", "--set", "duration_s=0.1", "--seed", seed, *out)
+    first, second = (tmp_path / f"{seed}" / "run.mcap" for seed in (1, 2))
+    said = set(re.findall(r"`(\w+)`", PAGE.partition("## The JSON document")[2]))
+    for arguments in (("replay", first, "--seed", 2), ("diff", first, second)):
+        document = json.loads(run(*arguments, "--json", "--all"))
+        assert set(document) <= said
+        assert set(document["first"]) <= said

@@ -153,9 +153,6 @@ def test_a_recording_whose_characters_no_host_can_have_sent_is_refused(
     assert what in err
 
 
-# How strictly it is compared, and what is told of it
-
-
 @pytest.fixture(scope="module")
 def silent(mirotwin, tmp_path_factory):
     """A recording of a link that loses most frames: the failsafe stops the robot now and then."""
@@ -189,9 +186,8 @@ def test_a_build_that_is_only_slower_has_no_difference_under_commands(mirotwin, 
 def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(mirotwin, silent, images):
     late = images["late"].path
     sources = late.parent.parent / "firmware"
-    code, out, err = mirotwin(
-        *("replay", silent, "--firmware", late, "--sources", sources, "--compare", "commands")
-    )
+    other = ("--firmware", late, "--sources", sources)
+    code, out, err = mirotwin("replay", silent, *other, "--compare", "commands")
     assert code == 4
     assert "lm629 left command: recorded LTRJ 1Fh 0400 at tick " in err
     changed = next(line for line in err.splitlines() if "the first changed instruction" in line)

@@ -30,9 +30,8 @@ def with_commands(ticks, data="0400"):
     def change(robot, period):
         before = period.tick - CONTROL_PERIOD_TICKS
         mine = tuple((tick, 0x1F, data) for tick in ticks if before < tick <= period.tick and robot.slot == 0)
-        return replace(
-            robot, left=replace(robot.left, commands=mine), right=replace(robot.right, commands=())
-        )
+        right = replace(robot.right, commands=())
+        return replace(robot, left=replace(robot.left, commands=mine), right=right)
 
     return changed(change)
 
@@ -69,9 +68,8 @@ def test_commands_may_come_at_another_time_within_the_tolerance():
 
 
 def test_another_value_at_the_same_time_is_a_difference_under_commands():
-    (found,) = differences(
-        with_commands([100_000]), with_commands([100_000], "0401"), CompareRule(kind="commands")
-    )
+    one, other = with_commands([100_000]), with_commands([100_000], "0401")
+    (found,) = differences(one, other, CompareRule(kind="commands"))
     assert found.channel == "lm629 left command"
     assert (found.network, found.slot, found.tick) == (0, 0, 100_000)
 
@@ -107,9 +105,8 @@ def test_desired_velocities_may_differ_by_the_tolerance():
 
 def test_bytes_are_compared_one_by_one_however_they_are_parted():
     one = with_answers(Transmission(300_000, "<", b"\x55\x2d\xd4"))
-    parted = with_answers(
-        Transmission(300_100, "<", b"\x55"), Transmission(300_000 + 2 * 24_960, "<", b"\xd4")
-    )
+    last = Transmission(300_000 + 2 * 24_960, "<", b"\xd4")
+    parted = with_answers(Transmission(300_100, "<", b"\x55"), last)
     (found,) = differences(one, parted, CompareRule(kind="bytes"))
     assert found.recorded == "2d at tick 324960"
     assert found.replayed is None
@@ -117,11 +114,8 @@ def test_bytes_are_compared_one_by_one_however_they_are_parted():
 
 
 def test_a_bad_stop_bit_is_part_of_a_byte():
-    (found,) = differences(
-        with_answers(Transmission(300_000, "<", b"\x55\x2d")),
-        with_answers(Transmission(300_000, "<", b"\x55\x2d", 0, (1,))),
-        CompareRule(kind="bytes"),
-    )
+    good, bad = (with_answers(Transmission(300_000, "<", b"\x55\x2d", 0, stop)) for stop in ((), (1,)))
+    (found,) = differences(good, bad, CompareRule(kind="bytes"))
     assert found.replayed == "2d with a bad stop bit at tick 324960"
 
 
@@ -150,9 +144,8 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
     found = differences(RUN, other, CompareRule(host=True))
     named = {one.channel for one in found}
     assert {"control v_m_s", "control inner.u1", "actions"} <= named
-    assert [one.replayed for one in found if one.channel == "actions"] == [
-        *("robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7")
-    ]
+    told = ["robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7"]
+    assert [one.replayed for one in found if one.channel == "actions"] == told
     assert found[0].channel == "actions"
 
 
@@ -214,12 +207,11 @@ def test_a_difference_has_a_line_for_people_and_json_for_programs():
 
 
 def test_what_a_chip_answers_is_no_part_of_a_command():
+    def left(robot, period, data):
+        return replace(robot.left, commands=((period.tick, 0x0A, data),))
+
     def reading(data):
-        return changed(
-            lambda robot, period: replace(
-                robot, left=replace(robot.left, commands=((period.tick, 0x0A, data),))
-            )
-        )
+        return changed(lambda robot, period: replace(robot, left=left(robot, period, data)))
 
     one, other = reading("00000a3d"), reading("00000a46")
     assert differences(one, other, CompareRule(kind="commands")) == []

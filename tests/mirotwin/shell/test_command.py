@@ -1,6 +1,7 @@
-"""A record of options is the parser, the defaults and the line that gives the command again."""
+"""A record of options is the parser, the defaults and the line that gives the command again; times have their unit."""
 
 import shlex
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Whole
-from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.times import UNITS_S, Time, TimeType, wall_time
 
 
 class WindowOptions(Options, frozen=True, kw_only=True):
@@ -46,22 +47,6 @@ def look(options):
 def run(*words):
     taken.clear()
     return CliRunner().invoke(look, words, catch_exceptions=False)
-
-
-def test_a_command_gets_its_options_as_one_record():
-    assert run("a.mcap", "--number", "7", "--set", "a=1", "--set", "b=2", "-q").exit_code == 0
-    assert taken == [LookOptions(file="a.mcap", number=7, settings=("a=1", "b=2"), quiet=True)]
-
-
-def test_what_is_not_given_has_the_default_of_the_record():
-    run("a.mcap")
-    assert taken == [LookOptions(file="a.mcap")]
-
-
-def test_a_record_within_stands_for_its_options():
-    run("a.mcap", "--to", "20ms", "--wide")
-    assert taken[0].window.to.ticks() == 480_000
-    assert taken[0].window.wide
 
 
 def test_an_option_may_be_given_without_its_value():
@@ -144,3 +129,55 @@ def _values(options):
 def test_a_command_is_called_as_its_function():
     assert isinstance(look, click.Command)
     assert look.name == "look"
+
+
+@pytest.mark.parametrize(
+    ("text", "ticks"),
+    [
+        ("2s", 48_000_000),
+        ("20ms", 480_000),
+        ("341us", 8184),
+        ("5min", 7_200_000_000),
+        ("1h", 86_400_000_000),
+        ("48000t", 48_000),
+        (".5s", 12_000_000),
+        ("1.5 s", 36_000_000),
+        ("0t", 0),
+    ],
+)
+def test_a_time_is_a_number_with_its_unit(text, ticks):
+    assert TimeType().convert(text, None, None).ticks() == ticks
+
+
+def test_ticks_are_those_of_the_crystal_that_drives_the_program():
+    assert TimeType().convert("1s", None, None).ticks(11_059_200) == 11_059_200
+    assert TimeType().convert("11059200t", None, None).seconds(11_059_200) == 1.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1", "0", "1.2", "1.t", "1.5t", "-1s", "1e3s", "nans", "2 sec", "", "s", "\u0661s", "9" * 5000 + "s"],
+)
+def test_anything_else_is_refused_with_both_spellings(text):
+    with pytest.raises(click.BadParameter) as refused:
+        TimeType().convert(text, None, None)
+    assert "ticks" in refused.value.message
+    assert len(refused.value.message) < 700
+
+
+@given(st.integers(0, 10**9), st.sampled_from(sorted(UNITS_S)))
+def test_whatever_was_read_is_exact(number, unit):
+    wanted = number * UNITS_S[unit]
+    if wanted > 10**9:
+        with pytest.raises(click.BadParameter, match="too long"):
+            TimeType().convert(f"{number}{unit}", None, None)
+    else:
+        assert TimeType().convert(f"{number}{unit}", None, None).value == Fraction(wanted)
+
+
+def test_the_wall_clock_has_no_ticks():
+    assert wall_time(100.0).convert("1min", None, None) == 60.0
+    for text in ("5t", "5", "101s", "0s"):
+        with pytest.raises(click.BadParameter) as refused:
+            wall_time(100.0).convert(text, None, None)
+        assert "ticks" not in refused.value.message
