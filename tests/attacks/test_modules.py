@@ -12,17 +12,8 @@ from tests import children
 from tests.mirotwin.verify.bare.firmwares import POLLS
 from tests.robot.mcs51.asm import assemble
 
-OTHERS = (
-    "msgspec",
-    "numpy",
-    "click",
-    "mirotwin",
-    "miro_exact",
-    "miro_sim",
-    "hypothesis",
-    "pyarrow",
-    "conftest",
-)
+OTHERS = ("msgspec", "numpy", "click", "hypothesis", "pyarrow", "conftest")
+OURS = ("mirotwin", "miro_exact", "miro_sim")
 SHORT = 'scenario = "fig6"\nseeds = "0-3"\nset = { duration_s = 0.1 }\n'
 
 
@@ -32,7 +23,7 @@ def folder(tmp_path):
     trap = f"open({str(tmp_path / 'was_run')!r}, 'a').write(__name__ + '\\n')\n"
     here = tmp_path / "here"
     here.mkdir()
-    for name in (*sys.stdlib_module_names, *OTHERS):
+    for name in (*sys.stdlib_module_names, *OTHERS, *OURS):
         (here / f"{name}.py").write_text(trap)
     (here / "short.toml").write_text(SHORT)
     program = IntelHex()

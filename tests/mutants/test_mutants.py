@@ -23,20 +23,8 @@ from tests.mutants.sdcc import needs_sdcc
 SOURCES = source_files()
 MUTANTS = mutants_of(SOURCES)
 
-PIECES = (
-    "#define A(b) 1",
-    "#include <x.h>",
-    "/* a",
-    "*/",
-    "// b",
-    "\n",
-    "\\\n",
-    '"',
-    "'",
-    "__asm",
-    "__endasm",
-    "x",
-)
+PIECES = ["#define A(b) 1", "#include <x.h>", "/* a", "*/", "// b", "\n", "\\\n", '"', "'", "x"]
+PIECES += ["__asm", "__endasm"]
 C_TEXT = st.lists(st.sampled_from(PIECES) | st.text(max_size=4), max_size=30).map("".join)
 
 
