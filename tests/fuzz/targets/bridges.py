@@ -4,7 +4,6 @@ import contextlib
 import os
 import socket
 from selectors import DefaultSelector
-from typing import Any
 
 from mirotwin.ports.endpoint import PortContext
 from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
@@ -164,7 +163,6 @@ def _sockets(kind):
     def run(data):
         radio, told = _Radio(), []
         context = _context(radio, told)
-        port: Any
         if kind == "pty":
             port = PtyEndpoint(context, None)
             connect = lambda: _TerminalClient(port.path)  # noqa: E731
