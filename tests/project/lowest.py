@@ -63,10 +63,15 @@ def constraints(lowest):
     return "".join(f"{name}=={version}\n" for name, version in sorted(lowest.items()))
 
 
+def tracked():
+    """The files of this tree that git tracks."""
+    done = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
+    return [Path(name) for name in done.stdout.split("\0") if name and (ROOT / name).exists()]
+
+
 def copy_tree(target, patterns):
     """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
-    tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
-    names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
+    names = tracked()
     for package in (*PACKAGE_FOLDERS, "mirotwin"):
         names += [path.relative_to(ROOT) for pattern in patterns for path in (ROOT / package).rglob(pattern)]
     for name in names:
@@ -75,34 +80,15 @@ def copy_tree(target, patterns):
 
 
 def install(tree, python, smoke):
-    """Installs the tree at `tree`, editable, at its lower bounds."""
+    """Installs the tree at `tree`, editable, at its lower bounds; compiles nothing for the short form."""
     held = tree / "lowest.txt"
     lowest = bounds((tree / "pyproject.toml").read_text(encoding="utf-8"))
     held.write_text(constraints(lowest), encoding="utf-8")
     # pip before 25.3 applies the first to what a build needs, later ones the second
     environment = {**os.environ, "PIP_CONSTRAINT": str(held), "PIP_BUILD_CONSTRAINT": str(held)}
-    pip = [str(python), "-m", "pip", "install", "-q"]
-    if not smoke:
-        children.run([*pip, "-e", ".[develop]"], cwd=tree, env=environment, check=True)
-        return
-    # What an editable install consists of, without its build: metadata, the way to the packages, the program.
-    children.run(
-        [*pip, *(f"{name}=={version}" for name, version in lowest.items())], env=environment, check=True
-    )
-    site = Path(
-        children.run(
-            [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
-            capture_output=True,
-            check=True,
-            text=True,
-        ).stdout.strip()
-    )
-    children.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
-    roots = (str(tree), *(str(tree / package) for package in PACKAGE_FOLDERS))
-    (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
-    program = python.with_name("mirotwin")
-    program.write_text(f"#!{python}\nfrom mirotwin.entry import main\n\nmain()\n", encoding="utf-8")
-    program.chmod(0o755)
+    environment |= {"MIROTWIN_PURE": "1"} if smoke else {}
+    command = [str(python), "-m", "pip", "install", "-q", "-e", ".[develop]"]
+    children.run(command, cwd=tree, env=environment, check=True)
 
 
 def main(arguments):

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from tests import children
 from tests.project.clean import Clean, pure_wheel, source_archive, unpacked
-from tests.project.lowest import ROOT
+from tests.project.lowest import tracked
 
 LOWEST = 11
 """The lowest 3.x that `requires-python` allows."""
@@ -45,10 +45,7 @@ def left_out(archive):
     """What git tracks and a source archive does not have."""
     with tarfile.open(archive) as tar:
         there = {name.partition("/")[2] for name in tar.getnames()}
-    tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
-    return [
-        name for name in tracked.stdout.split("\0") if name and (ROOT / name).exists() and name not in there
-    ]
+    return [name for name in tracked() if name.as_posix() not in there]
 
 
 def problems(clean, tree, engine):

@@ -4,12 +4,13 @@ from array import array
 
 from miro_exact.state import snapshot
 from miro_host.telemetry_receiver import TelemetryReceiver
+from miro_protocol import scan
 from miro_protocol.decoder import WindowDecoder
 from miro_protocol.frames import ContentError, describe, encode, format_of, seal
 from miro_protocol.scan import Scanner
 from miro_protocol.table import TELEMETRY, downlink
+from tests.exact.uncompiled import uncompiled
 from tests.fuzz.target import Draws, Target, always, pieces, refused
-from tests.uncompiled import uncompiled
 
 _LIMITS = (1, 7, 64, 4096)
 _SEEN = "python"  # the decoder is a hot module: coverage sees the source
@@ -76,7 +77,7 @@ def _feed():
 
 def _columns():
     forms = (downlink(3), downlink(5), TELEMETRY)
-    Twin = uncompiled("miro_protocol.scan").Scanner
+    Twin = uncompiled(scan).Scanner
 
     def rows(draw, form):
         found, tick = [], 0

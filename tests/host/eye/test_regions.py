@@ -1,29 +1,18 @@
 """Regions: the hot module, its source and a flood fill agree on any window; and their centroids, weighted by chroma."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_host.eye import lens
+from miro_host.eye import regions as hot
 from miro_host.eye.regions import TABLE_SIZE, Regions
 from miro_host.eye.weighing import Weighing
+from tests.exact.uncompiled import uncompiled
 from tests.example_count import examples
 from tests.naive import regions as naive
 
-
-def uncompiled():
-    source = Path(lens.__file__).with_name("regions.py")
-    spec = importlib.util.spec_from_file_location("regions_from_source", source)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Regions
-
-
 TABLE = bytes(cell >> 12 & 3 for cell in range(TABLE_SIZE))  # the class is two bits of Y
-HOT, SOURCE = Regions(TABLE), uncompiled()(TABLE)
+HOT, SOURCE = Regions(TABLE), uncompiled(hot).Regions(TABLE)
 KINDS = {".": 0, "a": 1, "b": 2, "c": 3}
 
 
