@@ -7,14 +7,12 @@ import time
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from mirotwin import campaign
 from mirotwin.campaign.journal import journal_path
-from mirotwin.commands import main
 from tests import children
-from tests.mirotwin import program
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
+from tests.mirotwin.program import COMMAND, mirotwin
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
@@ -26,10 +24,6 @@ set = { duration_s = 0.2 }
 near = []
 far = ["network.robot.start_error_x_cm=40.0"]
 """
-
-
-def called(*arguments):
-    return CliRunner().invoke(main, ["campaign", *map(str, arguments)])
 
 
 def made(path, text, **changes):
@@ -62,12 +56,11 @@ def here(tmp_path, monkeypatch):
 
 
 def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
-    result = called("short.toml", "--jobs", 1, "--seeds", "3-4")
-    assert result.exit_code == 0, result.output
-    assert result.output.startswith("4 runs (4 of them now, in ")
+    out = mirotwin.succeeds("campaign", "short.toml", "--jobs", 1, "--seeds", "3-4")
+    assert out.startswith("4 runs (4 of them now, in ")
     assert len(rows(here / "runs/short.parquet")) == 4
-    again = called("run", "short.toml", "--seeds", "3-4")
-    assert (again.exit_code, again.output) == (0, "runs/short.parquet has all 4 runs already\n")
+    again = mirotwin.succeeds("campaign", "run", "short.toml", "--seeds", "3-4")
+    assert again == "runs/short.parquet has all 4 runs already\n"
 
 
 @pytest.mark.parametrize(
@@ -95,7 +88,7 @@ def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
         (("[grid]", "[grid"), "line 6, column 6: not TOML"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(mirotwin, here, change, place):
+def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(here, change, place):
     (here / "short.toml").write_text(SHORT.replace(*change))
     assert mirotwin.refuses("campaign", "short.toml").startswith(f"short.toml: {place}")
     assert [path.name for path in here.iterdir()] == ["short.toml"]
@@ -105,38 +98,31 @@ REFUSED = {
     ("short.toml", "--seeds", "0-9999999"): "has 20000000 runs, more than 100000",
     ("nothing.toml",): "nothing.toml: there is no such file",
     ("short.toml", "--out", "short.csv"): "results are a .parquet file",
-    (
-        "short.toml",
-        "--out",
-        "short.toml/a.parquet",
-    ): "short.toml: File exists; choose another folder with --out",
+    ("short.toml", "--out", "short.toml/a.parquet"): "File exists; choose another folder with --out",
     ("show", "nothing.parquet"): "nothing.parquet: there is no such file",
     ("show", "short.toml"): "short.toml: is no Parquet file",
 }
 
 
 @pytest.mark.parametrize("arguments", REFUSED, ids=" ".join)
-def test_what_cannot_be_meant_is_refused_in_a_line(mirotwin, here, arguments):
+def test_what_cannot_be_meant_is_refused_in_a_line(here, arguments):
     assert REFUSED[arguments] in mirotwin.refuses("campaign", *arguments)
 
 
 def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
     text = FACTORS.replace("0-19", "0-1") + "[expect]\ntracks_within_cm = 50.0\n"
     (here / "c.toml").write_text(text)
-    result = called("c.toml", "--jobs", 1)
-    assert result.exit_code == 1
-    assert "failed: runs 0, 1: tracks_within_cm" in result.output
+    assert "failed: runs 0, 1: tracks_within_cm" in mirotwin.ends(1, "campaign", "c.toml", "--jobs", 1)
     (here / "c.toml").write_text(f"allowed_failed_share = 1.0\n{text}")
-    assert called("c.toml", "--jobs", 1, "--force").exit_code == 0
+    mirotwin.ends(0, "campaign", "c.toml", "--jobs", 1, "--force")
 
 
 def test_of_many_failures_the_first_are_listed_and_the_others_counted(here):
     text = FACTORS.replace("0-19", "0-3").replace("far", "also").replace("40.0", "41.0")
     (here / "c.toml").write_text(f"allowed_failed_share = 1.0\n{text}[expect]\ntracks_within_cm = 0.001\n")
-    result = called("c.toml", "--jobs", 1)
-    assert result.exit_code == 0
-    assert "mirotwin: failed: runs 0, 1, 2, 3" in result.output
-    assert "mirotwin: failed: 3 more of 8\n" in result.output
+    err = mirotwin.ends(0, "campaign", "c.toml", "--jobs", 1)
+    assert "mirotwin: failed: runs 0, 1, 2, 3" in err
+    assert "mirotwin: failed: 3 more of 8\n" in err
 
 
 def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
@@ -144,9 +130,7 @@ def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
         'scenario = "fig7"\nset = { duration_s = 0.1 }\n'
         "[grid]\nnetwork.robots = [3, 5]\nnetwork.radio.keyup_s = [0.001, 0.005]\n"
     )
-    result = called("c.toml", "--jobs", 1)
-    assert result.exit_code == 2
-    assert "1 of 4 runs have an error" in result.output
+    assert "1 of 4 runs have an error" in mirotwin.ends(2, "campaign", "c.toml", "--jobs", 1)
     assert len(rows(here / "runs/c.parquet")) == 4
 
 
@@ -171,7 +155,7 @@ def started(here, seeds, *options):
     """The campaign in a process of its own, once three runs are in its journal; and the journal."""
     (here / "short.toml").write_text(SHORT.replace("3-5", seeds))
     words = ["campaign", "short.toml", "--jobs", "1", *options]
-    process = children.start([*program.COMMAND, *words], stderr=-1, text=True)
+    process = children.start([*COMMAND, *words], stderr=-1, text=True)
     part = journal_path(here / "runs/short.parquet")
     until(lambda: part.exists() and part.read_bytes().count(b"\n") >= 4)
     return process, part
@@ -193,9 +177,8 @@ def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
     until(lambda: not any(map(runs, workers)))  # they have nobody left to work for
     left = part.read_bytes().count(b"\n") - 1
     assert 3 <= left < 40
-    result = called("short.toml", "--jobs", 1)
-    assert result.exit_code == 0, result.output
-    assert result.output.startswith(f"40 runs ({40 - left} of them now")
+    out = mirotwin.succeeds("campaign", "short.toml", "--jobs", 1)
+    assert out.startswith(f"40 runs ({40 - left} of them now")
     whole = here / "whole.parquet"
     campaign.run(campaign.load("short.toml"), whole, InThisProcess())
     assert (here / "runs/short.parquet").read_bytes() == whole.read_bytes()
@@ -212,13 +195,12 @@ def test_ctrl_c_says_how_much_is_there_and_that_the_same_command_goes_on(here):
 
 
 def test_statistics_are_shown_for_each_combination_of_factors(results):
-    result = called("show", results)
-    assert result.exit_code == 0, result.output
-    lines = result.output.splitlines()
+    out = mirotwin.succeeds("campaign", "show", results)
+    lines = out.splitlines()
     assert lines[0] == f"{results}: 40 runs of short"
     assert lines[1].split()[:3] == ["start", "runs", "failed"]
     assert [line.split()[0] for line in lines[2::3]] == ["near", "far"]
-    document = json.loads(called("show", results, "--json", "--metric", "rms_x_cm").output)
+    document = json.loads(mirotwin.succeeds("campaign", "show", results, "--json", "--metric", "rms_x_cm"))
     assert [group["factors"] for group in document["groups"]] == [{"start": "near"}, {"start": "far"}]
     near = sorted(row["rms_x_cm"] for row in rows(results) if row["start"] == "near")
     assert document["groups"][0]["metrics"]["rms_x_cm"]["median"] == near[9] + (near[10] - near[9]) * 0.5
@@ -229,61 +211,55 @@ def test_statistics_are_shown_for_each_combination_of_factors(results):
     [("unsettled", "unsettled (1: yes)"), ("check.no_fault", "check.no_fault (1: failed)")],
 )
 def test_a_metric_of_0_and_1_says_what_1_is(results, metric, label):
-    result = called("show", results, "--metric", metric)
-    assert result.exit_code == 0, result.output
-    assert label in result.output
+    assert label in mirotwin.succeeds("campaign", "show", results, "--metric", metric)
 
 
 def test_two_levels_are_compared_on_the_same_seeds(results):
-    document = json.loads(called("show", results, "--between", "start=near,far", "--json").output)
+    between = ("campaign", "show", results, "--between")
+    document = json.loads(mirotwin.succeeds(*between, "start=near,far", "--json"))
     (found,) = [one for one in document["differences"] if one["metric"] == "rms_position_cm"]
     values = {(row["start"], row["seed"]): row["rms_position_cm"] for row in rows(results)}
     apart = sorted(values["far", seed] - values["near", seed] for seed in range(20))
     assert (found["pairs"], found["seeds"], found["without"]) == (20, 20, 0)
     assert found["median"] == apart[9] + (apart[10] - apart[9]) * 0.5
     assert found["interval"]["low"] <= found["difference"] <= found["interval"]["high"]
-    assert called("show", results, "--between", "start").exit_code == 0
+    mirotwin.succeeds(*between, "start")
     for wrong in ("start=near", "start=near,nowhere", "begin=near,far"):
-        assert called("show", results, "--between", wrong).exit_code == 2
+        mirotwin.ends(2, *between, wrong)
 
 
 def test_nothing_is_worse_than_the_same_results(results):
-    result = called("show", results, "--against", results)
-    assert result.exit_code == 0, result.output
-    assert "40 pairs of runs, 40 with the same digest" in result.output
+    out = mirotwin.succeeds("campaign", "show", results, "--against", results)
+    assert "40 pairs of runs, 40 with the same digest" in out
 
 
 def test_what_got_worse_is_one_line_and_exit_code_1(results, tmp_path):
     worse = made(tmp_path / "worse.parquet", FACTORS, rms_position_cm=lambda value: value * 1.1)
-    result = called("show", worse, "--against", results)
-    assert result.exit_code == 1
-    (line,) = [line for line in result.output.splitlines() if line.startswith("mirotwin: worse")]
+    err = mirotwin.ends(1, "campaign", "show", worse, "--against", results)
+    (line,) = [line for line in err.splitlines() if line.startswith("mirotwin: worse")]
     assert f"worse than {results}: rms_position_cm by +" in line
     assert " (95 % interval " in line
     assert " in the mean of 40 pairs of 20 seeds, from " in line
-    assert called("show", worse, "--against", results, "--tolerance", 15).exit_code == 0
-    assert called("show", results, "--against", worse).exit_code == 0
+    mirotwin.succeeds("campaign", "show", worse, "--against", results, "--tolerance", 15)
+    mirotwin.succeeds("campaign", "show", results, "--against", worse)
 
 
 def test_one_fault_more_is_worse(results, tmp_path):
     verdicts = iter(["fault", *["passed"] * 39])
     worse = made(tmp_path / "worse.parquet", FACTORS, verdict=lambda _: next(verdicts))
-    result = called("show", worse, "--against", results)
-    assert result.exit_code == 1
-    assert "fault by +0.025" in result.output
+    assert "fault by +0.025" in mirotwin.ends(1, "campaign", "show", worse, "--against", results)
 
 
 def test_a_gate_needs_twenty_seeds(results, tmp_path):
     few = made(tmp_path / "few.parquet", FACTORS.replace("0-19", "0-9"))
-    result = called("show", few, "--against", results)
-    assert result.exit_code == 2
-    assert f"{results}: has only 10 seeds in common with {few}; a gate needs 20; " in result.output
+    said = mirotwin.refuses("campaign", "show", few, "--against", results)
+    assert said.startswith(f"{results}: has only 10 seeds in common with {few}; a gate needs 20; ")
 
 
 def test_pairs_of_which_one_run_lacks_the_figure_are_counted(results, tmp_path):
     found = iter([None, *[1.0] * 39])
     lacking = made(tmp_path / "lacking.parquet", FACTORS, rms_theta_deg=lambda _: next(found))
-    document = json.loads(called("show", lacking, "--against", results, "--json").output)
+    document = json.loads(mirotwin.succeeds("campaign", "show", lacking, "--against", results, "--json"))
     without = {one["metric"]: one["without"] for one in document["differences"]}
     assert without["rms_position_cm"] == 0
     assert without["rms_theta_deg"] == 1
@@ -291,10 +267,7 @@ def test_pairs_of_which_one_run_lacks_the_figure_are_counted(results, tmp_path):
 
 def test_results_without_a_run_in_common_are_refused(results, tmp_path):
     other = made(tmp_path / "other.parquet", FACTORS.replace("0-19", "20-39"))
-    result = called("show", results, "--against", other)
-    assert result.exit_code == 2
-    assert "has no run in common" in result.output
+    assert "has no run in common" in mirotwin.ends(2, "campaign", "show", results, "--against", other)
     other = made(tmp_path / "short.parquet", SHORT)
-    assert (
-        "varies network.radio.bit_error_rate, not start" in called("show", results, "--against", other).output
-    )
+    err = mirotwin.ends(2, "campaign", "show", results, "--against", other)
+    assert "varies network.radio.bit_error_rate, not start" in err

@@ -8,10 +8,9 @@ import sys
 from typing import NamedTuple
 
 import pytest
-from click.testing import CliRunner
 
-from mirotwin.commands import main
 from tests import children
+from tests.mirotwin.program import mirotwin
 
 HEAD = """
 import pytest
@@ -68,7 +67,4 @@ def run(folder, line):
         return _in_this_process(folder, words)
     assert program == "mirotwin"
     with contextlib.chdir(folder):
-        result = CliRunner().invoke(main, words)
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return Done(result.exit_code, result.stdout, result.stderr)
+        return Done(*mirotwin(*words))

@@ -139,8 +139,8 @@ def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin,
         ("b", "happens: net0/robot0: tick 600000 "),
         ("d", "failsafe_stop_ms: net0/robot0: "),
     ):
-        code, _, err = mirotwin("replay", f"left/hil-sub-{name}/case.stream", "-q")
-        assert (code, err.startswith(f"mirotwin: fails as recorded: {check}")) == (1, True)
+        err = mirotwin.ends(1, "replay", f"left/hil-sub-{name}/case.stream", "-q")
+        assert err.startswith(f"mirotwin: fails as recorded: {check}")
     assert not (folder / "left/hil-sub-e/case.stream").exists()  # no check knows an answer's fields
     report = (folder / "left/hil-sub-e/report.txt").read_text().splitlines()
     err = mirotwin.ends(1, "run", "left/hil-sub-e/scenario.toml", "--out", "again", "-q", "--no-figure")

@@ -1,11 +1,8 @@
-"""Small firmwares for a bare processor, in assembler: they need no compiler."""
+"""Small firmwares for a bare processor, in assembler: they need no compiler. `image` makes an image of them."""
 
-import hashlib
-from pathlib import Path
+from tests.robot.mcs51.asm import image_of
 
-from miro_robot.image import Image, Symbols
-from tests.robot.mcs51.asm import assemble
-
+image = image_of
 SERIAL = """
 MOV TMOD,#20h
 MOV TH1,#0FDh
@@ -63,15 +60,3 @@ SJMP sleep
 
 DEAF = "loop:\nSJMP loop"
 FAULTY = "LJMP 4000h"
-
-
-def image(text, name="test.ihx"):
-    code = assemble(text)
-    return Image(
-        path=Path(name),
-        code=code + b"\xff" * (0x10000 - len(code)),
-        used=((0, len(code)),),
-        size=len(code),
-        sha256=hashlib.sha256(code).hexdigest(),
-        symbols=Symbols({}),
-    )

@@ -2,14 +2,11 @@
 
 import re
 
-import msgspec
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import load, parse
-from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, expectations_of, says_anything
+from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_of, says_anything
 
 TWO = """
 name = "two"
@@ -113,28 +110,3 @@ def test_a_setting_is_named_as_it_was_given():
         ScenarioError, match=r"fig6: --set network.robot.expect.inside_pitch=3: expected true or"
     ):
         load("fig6", ["network.robot.expect.inside_pitch=3"], expectations_of)
-
-
-KEYS = st.sampled_from(
-    ["limit_cm", "from_s", "within_ms", "after_ms", "tolerance_ms", "frames", "check", "x"]
-)
-SCALARS = st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.dates())
-VALUES = st.recursive(
-    SCALARS,
-    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(KEYS, inner, max_size=2),
-    max_leaves=4,
-)
-
-
-@pytest.mark.slow
-@settings(max_examples=150)
-@given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
-def test_any_table_is_checks_or_a_scenario_error(table):
-    scenario = msgspec.structs.replace(load("fig6").scenario, expect=table)
-    said = ""
-    try:
-        found = expectations_of(scenario, "x")
-    except ScenarioError as error:
-        said = str(error)
-    assert said.startswith("x: expect.") if said else len(found[0, 0]) >= len(ALWAYS_ON)
-    assert "\n" not in said

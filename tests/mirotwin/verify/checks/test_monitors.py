@@ -98,31 +98,34 @@ def test_periods_that_are_told_together_are_judged_as_one_by_one(image, profile)
     assert found(asking=False) == found(asking=True)
 
 
-class Counting(Check, frozen=True, kw_only=True, tag="counting"):
+class Listing(Check, frozen=True, kw_only=True, tag="listing"):
+    """Its monitor keeps the events of these kinds."""
+
     KIND = "safety"
 
+    kinds: tuple[str, ...]
+    later: bool = False
+
     def monitor(self, subject):
-        return CountingMonitor(self, subject)
+        monitor = ListingMonitor(self, subject)
+        monitor.EVENTS, monitor.LATER, monitor.heard = self.kinds, self.later, []
+        return monitor
 
 
-class CountingMonitor(Monitor[Counting]):
-    EVENTS = ("command",)
-    LATER = True
-    commands = 0
-
+class ListingMonitor(Monitor[Listing]):
     def event(self, event):
-        self.commands += 1
+        self.heard.append(event)
 
 
 def test_who_may_be_told_later_hears_all_of_a_board_that_fills_its_log():
     often = "MOV P2,#0E6h\nMOV P0,#01h\nagain:\nCPL P2.2\nMOV R7,#50\nDJNZ R7,$\nSJMP again\n"
     world = World(parse(LATER.format(profile="weaker"), "later"), 2, assembled(START + RESET + often))
-    checks = Checks(world, {(0, 0): [Counting()]})
+    checks = Checks(world, {(0, 0): [Listing(kinds=("command",), later=True)]})
     for _ in range(12):
         world.step()
     log = world.networks[0].robots[0].log
     assert log.first > 0
-    assert [monitor.commands for monitor in checks.monitors] == [log.end]  # all are commands
+    assert [len(monitor.heard) for monitor in checks.monitors] == [log.end]  # all are commands
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -182,32 +185,15 @@ def test_events_that_the_log_no_longer_holds_leave_nothing_judged():
     assert (found["acts_within_ms"], found["inside_pitch"]) == ("not judged", "passed")
 
 
-class Listing(Check, frozen=True, kw_only=True, tag="listing"):
-    KIND = "safety"
-
-    def monitor(self, subject):
-        return ListingMonitor(self, subject)
-
-
-class ListingMonitor(Monitor[Listing]):
-    EVENTS = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
-
-    def __init__(self, check, subject):
-        super().__init__(check, subject)
-        self.heard = []
-
-    def event(self, event):
-        self.heard.append(event)
-
-
 def test_a_judge_hears_every_event_once_in_the_order_of_ticks():
     world, _ = silent_world("")
-    checks = Checks(world, {(0, 1): [Listing()]})
+    kinds = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
+    checks = Checks(world, {(0, 1): [Listing(kinds=kinds)]})
     send(world, [team(seq, 100, -100, ask=True) for seq in range(1, 8)] + [team(7, 1, 1)])
     finish(world, checks)
     (monitor,) = checks.monitors
     ticks = [event.tick for event in monitor.heard]
-    counts = {what: len([event for event in monitor.heard if event.what == what]) for what in monitor.EVENTS}
+    counts = {what: len([event for event in monitor.heard if event.what == what]) for what in kinds}
     assert ticks == sorted(ticks)
     assert (counts["sent"], counts["frame"], counts["received"]) == (8, 8, 8 * 23)
     assert (counts["answer"], counts["transmitted"]) == (3, 3 * 19)

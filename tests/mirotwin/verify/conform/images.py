@@ -1,9 +1,6 @@
 """Programs that are no firmware for the robot: each is some bytes of 8051 code, from address 0 on."""
 
-from pathlib import Path
-
-from miro_robot.image import parse_hex
-from tests.mirotwin.conftest import hex_text
+from tests.robot.mcs51.asm import image_of as image_of
 
 HANGS = bytes.fromhex("80 fe")  # SJMP $
 FAULTS = bytes.fromhex("a5 80 fd")  # the undefined opcode, again and again
@@ -14,7 +11,3 @@ BABBLES = bytes.fromhex(
 PUSHES = bytes.fromhex("c0 e0 80 fc")  # PUSH ACC without end
 POKES = bytes.fromhex("75 a0 e6 75 80 01 b2 a2 80 fc")  # writes to both LM629 without end
 READS_BOTH = bytes.fromhex("75 a0 e4 b2 a1 80 fc")
-
-
-def image_of(code):
-    return parse_hex(hex_text(code).encode(), Path("program.ihx"))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.world.conditions import CONDITIONS, Command, WheelSpeeds
+from mirotwin.verify.checks.expect import CHECKS, struct_of
 from mirotwin.verify.steps.keys import (
     PLAIN,
     SENDS,
@@ -21,7 +22,7 @@ from mirotwin.verify.steps.keys import (
     acceleration_units,
 )
 from mirotwin.verify.steps.player import check_symbols
-from mirotwin.verify.steps.reading import steps_of
+from mirotwin.verify.steps.reading import everything, steps_of
 from tests.mirotwin.verify.steps.rig import ORIGIN, own_image, read, scenario_of
 
 WRONG = {
@@ -165,48 +166,38 @@ def test_the_default_acceleration_is_that_of_the_contract():
 
 # Whatever stands in a table
 
-KEYS = sorted(
-    {
-        *VERBS,
-        *(
-            key
-            for struct in (*CONDITIONS.values(), *SENDS.values())
-            for key in struct.__struct_encode_fields__
-        ),
-        *(key for struct in PLAIN.values() for key in struct.__struct_encode_fields__),
-        *("within_ms", "for_ms", "from_now", "note", "within_s", "x"),
-    }
+STRUCTS = (*CONDITIONS.values(), *SENDS.values(), *PLAIN.values(), *map(struct_of, CHECKS.own))
+FIELDS = (key for struct in STRUCTS for key in struct.__struct_encode_fields__)
+KEYS = st.sampled_from(
+    sorted({*VERBS, *FIELDS, "within_ms", "for_ms", "from_now", "note", "within_s", "check", "x"})
 )
-WORDS = st.sampled_from(
-    [*CONDITIONS, *SENDS, "on", "off", "up", "left", "STT", "txd", "a.world", "55 55!", ""]
+WORDS = [*CONDITIONS, *SENDS, "on", "off", "up", "left", "STT", "txd", "a.world", "55 55!", ""]
+SCALARS = st.one_of(
+    *(st.sampled_from(WORDS), st.text(max_size=8), st.booleans(), st.integers(-3, 300), st.just(1 << 70)),
+    *(st.floats(-3.0, 300.0), st.floats(), st.dates()),
 )
-PLAIN_VALUES = st.one_of(
-    WORDS, st.text(max_size=8), st.booleans(), st.integers(-3, 300), st.floats(-3.0, 300.0), st.just(1 << 70)
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=2),
+    max_leaves=4,
 )
-VALUES = st.one_of(
-    PLAIN_VALUES,
-    st.lists(PLAIN_VALUES, max_size=4),
-    st.dictionaries(st.sampled_from(["failsafe_stop_ms", "no_fault", "x"]), PLAIN_VALUES, max_size=2),
-)
-TABLES = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
+STEPS = st.lists(st.dictionaries(KEYS, VALUES, max_size=5), max_size=3)
+EXPECT = st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3)
 
 
 @pytest.mark.slow
 @settings(max_examples=300)
-@given(st.lists(TABLES, max_size=3))
-def test_any_table_is_read_or_refused_with_its_place(tables):
-    scenario = msgspec.structs.replace(scenario_of(""), step=tuple(tables))
-    refusal, steps = None, []
-    try:
-        steps = steps_of(scenario, ORIGIN)
-    except ScenarioError as error:
-        refusal = error
-    if refusal is not None:
-        assert f"{refusal}".startswith(f"{ORIGIN}: step ")
-        assert refusal.what
-        assert "\n" not in f"{refusal}"
-    else:
-        assert [step.number for step in steps] == list(range(1, len(tables) + 1))
+@given(STEPS, EXPECT)
+def test_any_table_of_steps_and_of_checks_is_read_or_refused_with_its_place(tables, expect):
+    scenario = scenario_of("")
+    for key, value, begin in (("step", tuple(tables), "step "), ("expect", expect, "expect.")):
+        said = ""
+        try:
+            everything(msgspec.structs.replace(scenario, **{key: value}), ORIGIN)
+        except ScenarioError as error:
+            said = str(error)
+        assert not said or said.startswith(f"{ORIGIN}: {begin}")
+        assert "\n" not in said
 
 
 SMALL = st.floats(0.001, 9.0).map(lambda value: round(value, 3))
