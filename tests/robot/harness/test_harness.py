@@ -17,6 +17,8 @@ from miro_robot.wiring import load_wiring
 from tests.robot.mcs51.asm import image_of
 
 BIT_TICKS = 2500
+FRAME = b"\x00\x10\x00\x20\x00"
+"""Of a session: a team frame with two velocities."""
 MS = 24_000
 
 
@@ -38,21 +40,24 @@ def program(data, how=SESSION):
     return read
 
 
+def edges_of(harness, data, size=8192, ended=DONE):
+    """The map of edges after a run."""
+    edges = bytearray(size)
+    harness.cpu.watch_edges(memoryview(edges))
+    assert harness.play(program(data)) == ended
+    return edges
+
+
 @pytest.fixture(scope="module")
 def harness():
     return harness_for(board_with(load_hex(image_path())))
 
 
 def test_the_same_input_passes_the_same_edges_whatever_came_between(harness):
-    first, second = bytearray(8192), bytearray(8192)
-    harness.cpu.watch_edges(memoryview(first))
-    assert harness.play(program(b"\x00\x10\x00\x20\x00")) == DONE
+    first = edges_of(harness, FRAME)
     after = (harness.cpu.cycles, harness.cpu.pc, harness.now_tick)
-    harness.cpu.watch_edges(memoryview(bytearray(8192)))
-    harness.play(program(b"\x0b\xc0" * 3))
-    harness.cpu.watch_edges(memoryview(second))
-    harness.play(program(b"\x00\x10\x00\x20\x00"))
-    assert first == second
+    edges_of(harness, b"\x0b\xc0" * 3)
+    assert edges_of(harness, FRAME) == first
     assert any(first)
     assert (harness.cpu.cycles, harness.cpu.pc, harness.now_tick) == after
 
@@ -140,18 +145,13 @@ def test_an_oracle_looks_at_the_same_ticks_however_an_input_begins(data):
 
 def test_other_maps_get_the_edges_of_the_opening_too(harness, step_by_step):
     for size in (64, 1, 8192, 256):
-        maps = []
-        for one in (harness, step_by_step):
-            maps.append(bytearray(size))
-            one.cpu.watch_edges(memoryview(maps[-1]))
-            one.play(program(b"\x00\x10\x00\x20\x00"))
-        assert maps[0] == maps[1]
+        assert edges_of(harness, FRAME, size) == edges_of(step_by_step, FRAME, size)
 
 
 def test_runs_leave_nothing_behind_that_grows(harness):
     sizes = set()
     for _ in range(5):
-        harness.play(program(b"\x00\x10\x00\x20\x00" * 3))
+        harness.play(program(FRAME * 3))
         chips = harness.board.left, harness.board.right
         sizes.add(
             (*(len(chip.commands) for chip in chips), len(harness.board.faults), len(harness.cpu.txd.ticks))
@@ -160,13 +160,8 @@ def test_runs_leave_nothing_behind_that_grows(harness):
 
 
 def test_other_inputs_pass_other_edges(harness):
-    maps = []
-    for data in (b"", b"\x09\x00\x55", b"\x00\x10\x00\x20\x00", b"\x00\x10\x00\x20\x80", b"\x0b\xa0"):
-        edges = bytearray(8192)
-        harness.cpu.watch_edges(memoryview(edges))
-        harness.play(program(data))
-        maps.append(bytes(edges))
-    assert len(set(maps)) == len(maps)
+    inputs = (b"", b"\x09\x00\x55", FRAME, b"\x00\x10\x00\x20\x80", b"\x0b\xa0")
+    assert len({bytes(edges_of(harness, data)) for data in inputs}) == len(inputs)
 
 
 def test_a_run_ends_soon_after_the_firmware_has_nothing_to_do(harness):
@@ -178,21 +173,16 @@ def test_a_run_ends_soon_after_the_firmware_has_nothing_to_do(harness):
 def test_how_high_the_stack_grew_is_told(harness):
     harness.play(program(b""))
     quiet = harness.cpu.highest_sp
-    harness.play(program(b"\x00\x10\x00\x20\x00"))
+    harness.play(program(FRAME))
     assert quiet < harness.cpu.highest_sp < 0xFF
 
 
 def test_counting_edges_changes_no_bit(harness):
-    harness.cpu.watch_edges(memoryview(bytearray(1)))
-    harness.play(program(b"\x03\x10\x00\x20\x00\x0a\x80\x05\x00\x01"))
-    without = harness.cpu.cycles, harness.cpu.instructions, bytes(map(harness.cpu.peek_iram, range(256)))
-    harness.cpu.watch_edges(memoryview(bytearray(64)))
-    harness.play(program(b"\x03\x10\x00\x20\x00\x0a\x80\x05\x00\x01"))
-    assert (
-        harness.cpu.cycles,
-        harness.cpu.instructions,
-        bytes(map(harness.cpu.peek_iram, range(256))),
-    ) == without
+    states = []
+    for size in (1, 64):
+        edges_of(harness, b"\x03\x10\x00\x20\x00\x0a\x80\x05\x00\x01", size)
+        states.append((harness.cpu.instructions, snapshot(harness.cpu)))
+    assert states[0] == states[1]
 
 
 @pytest.mark.parametrize("size", [0, 3, 100, 1 << 17])
@@ -201,11 +191,13 @@ def test_a_map_of_another_size_than_a_power_of_two_is_refused(harness, size):
         harness.cpu.watch_edges(memoryview(bytearray(size)))
 
 
-def code(*words):
-    """An image without symbols: serial receiver on by timer 2 as the firmware has it, then `words`."""
-    start = bytes.fromhex("75CBFF 75CAB2 75CDFF 75CCB2 75C834 759850".replace(" ", ""))
-    data = start + bytes.fromhex("".join(words))
-    return image_of(data.ljust(64, b"\x00"))
+def code(*words, routine=""):
+    """An image: serial receiver on by timer 2 as the firmware has it, then `words`, and `routine` at 0023h.
+
+    The words of the tests below are IDL in a loop with the serial interrupt on.
+    """
+    start = bytes.fromhex("75CBFF 75CAB2 75CDFF 75CCB2 75C834 759850" + "".join(words))
+    return image_of((start.ljust(0x23, b"\0") + bytes.fromhex(routine)).ljust(64, b"\0"))
 
 
 def test_firmware_that_never_sleeps_is_run_for_10_ms():
@@ -216,21 +208,14 @@ def test_firmware_that_never_sleeps_is_run_for_10_ms():
 
 
 def test_firmware_that_does_not_go_to_sleep_again_is_told():
-    # IDL in a loop with the serial interrupt on; the routine at 0023h, which is inside the image, spins for ever
-    image = code("75A890", "438701", "80FB")
-    spins = bytearray(image.code[:64])
-    spins[0x23:0x25] = b"\x80\xfe"
-    harness = harness_for(board_with(image_of(bytes(spins))))
+    harness = harness_for(board_with(code("75A890", "438701", "80FB", routine="80FE")))  # spins for ever
     harness.board.cpu.main_loop_limit = 0
     assert harness.sleeps
     assert harness.play(program(b"\x55", BYTES)) == AWAKE
 
 
 def test_a_fault_ends_the_run():
-    image = code("75A890", "438701", "80FB")
-    broken = bytearray(image.code[:64])
-    broken[0x23] = 0xA5
-    harness = harness_for(board_with(image_of(bytes(broken))))
+    harness = harness_for(board_with(code("75A890", "438701", "80FB", routine="A5")))
     for _ in range(2):
         assert harness.play(program(bytes(5), FRAMES)) == STOPPED
         assert [fault.pc for fault in harness.board.faults] == [0x23]

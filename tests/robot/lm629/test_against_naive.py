@@ -130,41 +130,36 @@ class Pair:
     def compare(self, tick):
         chip, naive = self.chip, self.naive
         loaded, gains = chip.trajectory_buffer, chip.filter_buffer
-        ours = {
-            "status": chip.status_at(tick),
-            "signals": chip.signals.word,
-            "hi": chip.hi,
-            "pwm": chip.pwm,
-            "sign": chip.sign,
-            "magnitude": chip.pwm_magnitude,
-            "data": chip.data_out(tick),
-            "lost": chip.writes_while_busy,
-            "real": (chip.real_position, chip.real_velocity, chip.index_position),
-            "desired": (chip.trajectory.position, chip.desired_velocity),
-            "integral": chip.pid.integral,
-            "target": chip.trajectory.target,
-            "settings": (chip.threshold, chip.signals.mask),
-            "trajectory": (loaded.acceleration, loaded.velocity, loaded.position, loaded.relative),
-            "filter": (gains.kp, gains.ki, gains.kd, gains.il, gains.ds),
+        pairs = {
+            "status": (chip.status_at(tick), naive.status_at(tick)),
+            "signals": (chip.signals.word, naive.signals_word()),
+            "hi": (chip.hi, naive.signals_word() >> 15),
+            "output": (
+                (chip.pwm, chip.sign, chip.pwm_magnitude),
+                (naive.pwm_at(tick), naive.sign, naive.magnitude),
+            ),
+            "data": (chip.data_out(tick), naive.data_out(tick)),
+            "lost": (chip.writes_while_busy, naive.lost),
+            "position": (chip.real_position, naive.real),
+            "velocity": (chip.real_velocity, naive.velocity_counts),
+            "index": (chip.index_position, naive.index_position),
+            "desired position": (chip.trajectory.position, naive.desired * 65536),
+            "desired velocity": (chip.desired_velocity, naive.speed),
+            "integral": (chip.pid.integral, naive.pid.integral),
+            "target": (chip.trajectory.target, naive.target),
+            "threshold": (chip.threshold, naive.threshold),
+            "mask": (chip.signals.mask, sum(1 << bit for bit in naive.mask)),
+            "trajectory": (
+                (loaded.acceleration, loaded.velocity, loaded.position, loaded.relative),
+                (naive.buffer["a"], naive.buffer["v"], naive.buffer["p"], naive.relative),
+            ),
+            "filter": (
+                (gains.kp, gains.ki, gains.kd, gains.il, gains.ds),
+                tuple(naive.filter[name] for name in ("kp", "ki", "kd", "il", "ds")),
+            ),
         }
-        theirs = {
-            "status": naive.status_at(tick),
-            "signals": naive.signals_word(),
-            "hi": naive.signals_word() >> 15,
-            "pwm": naive.pwm_at(tick),
-            "sign": naive.sign,
-            "magnitude": naive.magnitude,
-            "data": naive.data_out(tick),
-            "lost": naive.lost,
-            "real": (naive.real, naive.velocity_counts, naive.index_position),
-            "desired": (naive.desired * 65536, naive.speed),
-            "integral": naive.pid.integral,
-            "target": naive.target,
-            "settings": (naive.threshold, sum(1 << bit for bit in naive.mask)),
-            "trajectory": (naive.buffer["a"], naive.buffer["v"], naive.buffer["p"], naive.relative),
-            "filter": tuple(naive.filter[name] for name in ("kp", "ki", "kd", "il", "ds")),
-        }
-        assert ours == theirs, f"at tick {tick}"
+        differing = {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
+        assert not differing, f"ours and the twin's at tick {tick}"
 
     def advance(self, tick):
         self.chip.advance(tick)

@@ -196,14 +196,6 @@ def test_the_port_commands_of_the_lm628_move_bit_8_and_no_pin():
         assert (bench.chip.sign, bench.chip.pwm_magnitude) == driven
 
 
-def test_a_reset_selects_the_8_bit_output_again():
-    bench = Bench.running()
-    bench.command("PORT12")
-    bench.command("RESET")
-    bench.wait(30000)
-    assert bench.signals() & 0x0100
-
-
 # ------------------------------------------------------------------------------- flags and interrupts
 
 
@@ -258,9 +250,16 @@ def test_each_of_the_six_conditions_interrupts_by_its_own_bit_of_the_mask(bit, p
         provoke(bench)
         assert bench.chip.status & 0x7E == 1 << bit
         assert bench.chip.hi == hi == bench.signals() >> 15
-        bench.command("RSTI", 0x7E & ~(1 << bit))
+
+
+@pytest.mark.parametrize(("bit", "provoke"), list(enumerate(CONDITIONS, start=1)))
+def test_a_flag_is_reset_by_its_own_bit_of_rsti_and_the_interrupt_by_any(bit, provoke):
+    bench = Bench.running()
+    provoke(bench)
+    for word, left in ((0x7E, 1 << bit), (0x7E & ~(1 << bit), 0)):
+        bench.command("RSTI", word)
         bench.ready()
-        assert bench.chip.hi == 0
+        assert (bench.chip.status & 0x7E, bench.chip.hi) == (left, 0)
 
 
 def test_a_relative_breakpoint_counts_from_the_target():
@@ -283,59 +282,6 @@ def test_excessive_error_flags_or_stops():
         assert bench.chip.status == status
         assert (bench.chip.pwm_magnitude == 0) == (name == "LPES")
         assert bench.signals() & 0x0200 == (0x0200 if name == "LPES" else 0)
-
-
-def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
-    bench = Bench.running()
-    bench.start(0x1828, 0x100000, 0x100000, samples=2)
-    bench.chip.trajectory.position = (2**30 - 20) * 65536
-    bench.sample()
-    assert bench.status() & WRAP == 0
-    bench.sample()
-    assert bench.status() & WRAP
-    assert bench.ask("RDDP") == -(2**30) + 12
-    bench.command("RSTI", 0x006E)
-    bench.chip.real_position = -(2**30)
-    bench.turn(-1)
-    bench.sample()
-    assert bench.status() & WRAP
-    assert bench.ask("RDRP") == 2**30 - 1
-
-
-def test_rsti_resets_the_flags_whose_bits_are_0_and_leaves_the_others():
-    bench = moving(position=2)
-    bench.command("LPEI", 0)
-    bench.sample(10)
-    bench.ready()
-    bench.write(0, 0x77)  # a command error
-    assert bench.chip.status == EXCESS | COMPLETE | ERROR
-    bench.command("LPEI", 0x7FFF)
-    bench.command("RSTI", ~COMPLETE & 0xFF)
-    bench.ready()
-    assert bench.chip.status == EXCESS | ERROR
-    bench.command("RSTI", ~(EXCESS | ERROR) & 0xFF)
-    bench.ready()
-    assert bench.chip.status == 0
-
-
-def test_hi_follows_unmasked_events_only_and_falls_with_any_rsti():
-    bench = moving(position=20)
-    bench.command("MSKI", 0)
-    bench.sample(20)
-    assert bench.status() & COMPLETE
-    assert bench.chip.hi == 0
-    bench.command("MSKI", COMPLETE)  # unmasking later raises nothing
-    bench.sample()
-    assert bench.chip.hi == 0
-    bench.command("RSTI", 0)
-    bench.command("STT")
-    bench.sample(3)
-    assert bench.chip.hi == 1
-    assert bench.signals() & 0x8000
-    bench.command("RSTI", 0x007E)
-    bench.ready()
-    assert bench.chip.hi == 0
-    assert bench.status() & COMPLETE
 
 
 def test_out_of_range_parameters_are_taken_modulo_their_width():
