@@ -14,7 +14,7 @@ from miro_exact.state import restore, snapshot, values
 from miro_robot.board import Board
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.plant import Plant
-from miro_robot.wiring import load_wiring
+from miro_robot.wiring import Latch, load_wiring
 from tests import children
 from tests.robot.board.rig import CYCLE, MS, RESET, START, board_with, raw_movx_wiring
 
@@ -269,19 +269,13 @@ def test_a_movx_by_dptr_disturbs_an_lm629_whose_strobes_are_on_p2():
 
 def latched_wiring():
     """All control lines on one output latch, data on another port: what MOVX is good for here."""
-    nets = {net: source.replace("P2.", "CTRL.") for net, source in load_wiring().nets.items()}
-    text = msgspec.json.encode(
-        {
-            "name": "latched",
-            "crystal_hz": 24_000_000,
-            "data": "P1",
-            "nets": nets,
-            "latch": [{"name": "CTRL", "address": 0}],
-        }
+    miro = load_wiring()
+    nets = {
+        net: source.replace("P2.", "CTRL.") for net, source in miro.nets.items() if not net.startswith("P1")
+    }
+    return msgspec.structs.replace(
+        miro, name="latched", data="P1", nets=nets, latch=(Latch("CTRL", address=0),)
     )
-    wiring = msgspec.json.decode(text, type=type(load_wiring()))
-    keep = {net: source for net, source in wiring.nets.items() if not net.startswith("P1")}
-    return msgspec.structs.replace(wiring, nets=keep)
 
 
 def test_strobes_on_an_output_latch_meet_every_limit():

@@ -1,5 +1,6 @@
 """A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
 
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
@@ -133,7 +134,12 @@ class Rig:
 
     def sent(self):
         """Characters on TXD so far, sampled in the middle of 2500-tick bits from each start edge."""
-        level_at = _levels(self.edges)
+        ticks = [tick for tick, _ in self.edges]
+
+        def level_at(tick):
+            before = bisect_right(ticks, tick)
+            return self.edges[before - 1][1] if before else 1
+
         symbols, free = [], 0
         for tick, level in self.edges:
             if level or tick < free:
@@ -165,15 +171,3 @@ class Rig:
     def counters(self):
         """(accepted, rejected, stale)"""
         return self.u16("_frames_accepted"), self.u16("_frames_rejected"), self.u16("_frames_stale")
-
-
-def _levels(edges):
-    def level_at(tick):
-        level = 1
-        for at, after in edges:
-            if at > tick:
-                break
-            level = after
-        return level
-
-    return level_at

@@ -6,6 +6,7 @@ Only what several tests need; the sequences under test stand in the tests.
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.options import Lm629Options
+from tests.naive.lm629_encoder import FORWARD
 
 CYCLE = 12
 """One machine cycle of the host's CPU, the shortest time between two changes of a pin."""
@@ -19,6 +20,7 @@ class Bench:
         self.tick = tick
         self.edges = []
         self.pins = (1, 1, 1, 1, 0xFF)
+        self.place = 0  # of the wheel
 
     @classmethod
     def running(cls, **options):
@@ -131,10 +133,9 @@ class Bench:
         for _ in range(count):
             self.wait(self.chip.sample_tick - self.tick)
 
-    def turn(self, counts):
-        """Turn the encoder, as fast as the chip can follow, from a place that is a multiple of 4 counts."""
-        states = ((0, 0), (1, 0), (1, 1), (0, 1))
-        for n in range(1, abs(counts) + 1):
-            a, b = states[(n if counts > 0 else -n) % 4]
-            self.chip.set_encoder(self.tick, a, b)
-            self.wait(32)
+    def turn(self, counts, pause=32):
+        """Turn the encoder, as fast as the chip can follow."""
+        for _ in range(abs(counts)):
+            self.place += 1 if counts > 0 else -1
+            self.chip.set_encoder(self.tick, *FORWARD[self.place % 4])
+            self.wait(pause)

@@ -186,19 +186,11 @@ class Pair:
 
 
 class Session(Bench):
-    """A bench for two that remembers where the wheel stands."""
+    """A bench for two."""
 
     def __init__(self, pair, tick):
         super().__init__(pair, tick)
         self.pair = pair
-        self.place = 0
-
-    def turn(self, counts):
-        for _ in range(abs(counts)):
-            self.place += 1 if counts > 0 else -1
-            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.place % 4]
-            self.chip.set_encoder(self.tick, a, b)
-            self.wait(30)
 
     def index(self, level):
         self.chip.set_index(self.tick, level)

@@ -107,22 +107,6 @@ def test_bus_access_while_busy_is_dropped_without_a_command_error():
     assert bench.chip.writes_while_busy == 2
 
 
-def test_reading_when_a_write_is_due_and_writing_when_a_read_is_due_raise_the_command_error():
-    bench = Bench.running()
-    bench.command("LPEI")
-    bench.ready()
-    bench.read(1)
-    assert bench.status() == 0x82
-    bench.word(0x0777)
-    assert bench.chip.threshold == 0x0777
-    bench.command("RSTI", 0)
-    bench.command("RDSIGS")
-    bench.ready()
-    bench.write(1, 0x12)
-    assert bench.status() == 0x82
-    assert (bench.read(1), bench.read(1)) == (0x01, 0x80)
-
-
 def test_a_command_byte_before_the_last_word_abandons_the_earlier_command():
     bench = Bench.running()
     bench.command("LTRJ", 0x002A, 0x0001, 0x0002, 0x0003)

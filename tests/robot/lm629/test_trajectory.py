@@ -99,17 +99,6 @@ def test_velocity_mode_and_its_reversal():
     assert positions == [0, 0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 13, 14, 14, 15, 15, 14, 14, 13, 12, 11, 9, 8, 6]
 
 
-def test_a_smooth_stop_ends_on_a_whole_count():
-    trajectory = generator(0x3000, 0x20000, 0, velocity_mode=1, forward=0)
-    for _ in range(20):
-        trajectory.step()
-    trajectory.stop_smoothly()
-    _, positions = run(trajectory)
-    assert trajectory.position == trajectory.target * 65536
-    assert trajectory.target == positions[-1] < 0
-    assert trajectory.velocity == 0
-
-
 def test_without_acceleration_nothing_ever_moves_or_ends():
     trajectory = generator(0, 0x10000, 20)
     assert [trajectory.step() for _ in range(50)] == [0] * 50

@@ -16,23 +16,8 @@ from tests.robot.mcs51.asm import assemble, image_of
 
 SERIAL = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV T2CON,#34h\nMOV SCON,#50h\n"
 ECHO = SERIAL + "loop:\nJNB RI,$\nMOV A,SBUF\nCLR RI\nMOV SBUF,A\nJNB TI,$\nCLR TI\nSJMP loop"
-AUTOBAUD = """
-MOV R2,#00h
-MOV R3,#00h
-CLR A
-JB RXD,$
-measure:
-INC A
-NOP
-NOP
-NOP
-NOP
-NOP
-NOP
-JNB RXD,measure
-MOV 30h,A
-SJMP $
-"""
+AUTOBAUD = "MOV R2,#0\nMOV R3,#0\nCLR A\nJB RXD,$\n"
+AUTOBAUD += "measure:\nINC A\n" + "NOP\n" * 6 + "JNB RXD,measure\nMOV 30h,A\nSJMP $"
 
 
 def test_stdin_is_echoed_byte_by_byte():
@@ -185,17 +170,6 @@ def test_progress_is_told_and_the_dump_has_the_registers():
     )
 
 
-def test_a_saved_machine_goes_on_with_the_same_bits():
-    machine = BareMachine(image_of(ECHO), stdin=b"some words to echo")
-    machine.run(max_cycles=11_111)
-    other = BareMachine(image_of(ECHO))
-    restore(other, snapshot(machine))
-    assert snapshot(other) == snapshot(machine)
-    machine.run(max_cycles=60_000)
-    other.run(max_cycles=60_000)
-    assert snapshot(other) == snapshot(machine)
-
-
 @pytest.mark.parametrize(
     ("baud", "crystal_hz", "said"), [(5, 24_000_000, "750000"), (400_000, 11_059_200, "345600")]
 )
@@ -295,22 +269,8 @@ def test_code_that_data_has_overwritten_is_known():
 
 # ------------------------------------------------------------------------------- serial input
 
-PROMPT = (
-    SERIAL
-    + """
-prompt:
-MOV SBUF,#3Eh
-JNB TI,$
-CLR TI
-JNB RI,$
-MOV A,SBUF
-CLR RI
-MOV @R0,A
-INC R0
-CJNE A,#0Dh,prompt
-MOV PCON,#02h
-"""
-)
+PROMPT = SERIAL + "prompt:\nMOV SBUF,#3Eh\nJNB TI,$\nCLR TI\nJNB RI,$\nMOV A,SBUF\nCLR RI\n"
+PROMPT += "MOV @R0,A\nINC R0\nCJNE A,#0Dh,prompt\nMOV PCON,#02h"
 SLOW_POLLS = "MOV R7,#200\nw:\nDJNZ R7,w\nJB RXD,slow\nMOV PCON,#02h"  # five polls in 2000 cycles
 
 

@@ -7,30 +7,9 @@ import pytest
 
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
 
-VECTORS = {"INT0": 0x03, "T0": 0x0B, "INT1": 0x13, "T1": 0x1B, "SERIAL": 0x23, "T2": 0x2B}
-ISRS = """
-LJMP main
-ORG 0003h
-CLR P1.0
-RETI
-ORG 000Bh
-CLR P1.1
-RETI
-ORG 0013h
-CLR P1.2
-RETI
-ORG 001Bh
-CLR P1.3
-RETI
-ORG 0023h
-CLR P1.4
-RETI
-ORG 002Bh
-CLR P1.5
-RETI
-ORG 0040h
-main:
-"""
+VECTORS = (0x03, 0x0B, 0x13, 0x1B, 0x23, 0x2B)
+ROUTINES = "".join(f"ORG {vector:04X}h\nCLR P1.{number}\nRETI\n" for number, vector in enumerate(VECTORS))
+ISRS = f"LJMP main\n{ROUTINES}ORG 0040h\nmain:\n"
 INT0_LOW, INT1_LOW, BOTH_LOW = 0xFB, 0xF7, 0xF3
 
 
@@ -172,31 +151,31 @@ def test_a_flag_that_software_clears_counts_in_the_poll_of_its_last_cycle():
 
 
 SOURCES = [  # vector, IE, what sets the flag, its register, what the routine finds there
-    ("INT0", 0x81, "SETB IT0\nSETB IE0", "TCON", 0x01),
-    ("T0", 0x82, "SETB TF0", "TCON", 0x00),
-    ("INT1", 0x84, "SETB IT1\nSETB IE1", "TCON", 0x04),
-    ("T1", 0x88, "SETB TF1", "TCON", 0x00),
-    ("SERIAL", 0x90, "SETB RI", "SCON", 0x01),
-    ("SERIAL", 0x90, "SETB TI", "SCON", 0x02),
-    ("T2", 0xA0, "SETB TF2", "T2CON", 0x80),
-    ("T2", 0xA0, "SETB EXF2", "T2CON", 0x40),
+    (0x03, 0x81, "SETB IT0\nSETB IE0", "TCON", 0x01),
+    (0x0B, 0x82, "SETB TF0", "TCON", 0x00),
+    (0x13, 0x84, "SETB IT1\nSETB IE1", "TCON", 0x04),
+    (0x1B, 0x88, "SETB TF1", "TCON", 0x00),
+    (0x23, 0x90, "SETB RI", "SCON", 0x01),
+    (0x23, 0x90, "SETB TI", "SCON", 0x02),
+    (0x2B, 0xA0, "SETB TF2", "T2CON", 0x80),
+    (0x2B, 0xA0, "SETB EXF2", "T2CON", 0x40),
 ]
 
 
-@pytest.mark.parametrize(("name", "ie", "flag", "register", "left"), SOURCES)
+@pytest.mark.parametrize(("vector", "ie", "flag", "register", "left"), SOURCES)
 def test_every_source_has_its_vector_and_only_flags_of_timers_0_and_1_and_of_edges_are_cleared(
-    name, ie, flag, register, left
+    vector, ie, flag, register, left
 ):
     """4316E section 2.16."""
     cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
-    assert cpu.run_until_pc(VECTORS[name], 60) == 2
+    assert cpu.run_until_pc(vector, 60) == 2
     assert (cpu.sp, sfr(cpu, register)) == (9, left)
 
 
 def test_exf2_does_not_interrupt_while_timer_2_counts_up_and_down():
     """4316E section 2.16."""
     cpu = cpu_with(ISRS + "MOV T2MOD,#01h\nMOV IE,#0A0h\nSETB EXF2\n" + "NOP\n" * 20)
-    assert cpu.run_until_pc(VECTORS["T2"], 40) == 0
+    assert cpu.run_until_pc(VECTORS[5], 40) == 0
 
 
 def test_without_ea_nothing_happens():

@@ -54,25 +54,6 @@ def test_a_stack_that_goes_below_its_start_is_a_fault(text):
     assert kinds(text) == [UNDER]
 
 
-@pytest.mark.parametrize("last", [0xFF, 0xF0])
-def test_a_frame_that_goes_round_the_top_of_ram_is_an_overflow(last):
-    """SDCC makes room for local variables by MOV A,SP; ADD A,#n; MOV SP,A."""
-    assert kinds("MOV SP,#0E0h\nMOV A,SP\nADD A,#28h\nMOV SP,A", last=last) == [OVER]
-    assert kinds("MOV SP,#0E0h\nMOV A,SP\nADD A,#60h\nMOV SP,A", last=last) == [OVER]
-    assert (
-        kinds("MOV SP,#0E0h\nMOV A,SP\nADD A,#08h\nMOV SP,A\nMOV A,SP\nADD A,#0F8h\nMOV SP,A", last=last)
-        == []
-    )
-
-
-def test_without_a_map_the_ends_of_ram_are_the_limits():
-    assert kinds("INC SP", first=0x100, last=0xFF) in ([], [OVER])
-    cpu = cpu_with("MOV SP,#0FFh\nINC SP\nMOV SP,#80h\nMOV SP,#07h")
-    for _ in range(4):
-        cpu.step()
-    assert [kind for kind, _, _ in cpu.bus.faults] == [OVER]
-
-
 def test_leaving_the_stack_is_told_once_and_setting_it_up_is_no_fault():
     assert kinds("MOV SP,#0C0h\nINC SP\nINC SP\nMOV SP,#30h\nMOV SP,#0C0h") == [OVER, OVER]
     cpu = cpu_with("MOV SP,#2Fh\nPUSH ACC\nPOP ACC")
