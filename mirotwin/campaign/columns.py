@@ -23,7 +23,8 @@ from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, DisturbanceFigures, Theory
 
-OWN = ("run", "draw", "seed", "verdict", "error", "failure", "digest")
+TEXTS = ("verdict", "error", "failure", "digest")
+OWN = ("run", "draw", "seed", *TEXTS)
 """Names that no factor can have."""
 CHECK = "check."
 SEEN = ("seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm")

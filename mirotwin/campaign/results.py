@@ -18,7 +18,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.inputs import check_regular
-from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.columns import CHECK, FIGURES, OWN, TEXTS
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.journal import Head, in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Plan
@@ -32,7 +32,7 @@ GIVE = "give the .parquet file of a campaign"
 MOST_ROWS, MOST_COLUMNS, MOST_BYTES, META_BYTES = 5_000_000, 2000, 2 << 30, 64 << 20
 EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
 """Columns that no row may lack, with their types."""
-OWN_COLUMNS = frozenset(("run", "seed", "draw", "verdict", "error", "failure", "digest", *FIGURES))
+OWN_COLUMNS = frozenset((*OWN, *FIGURES))
 ROWS = 10_000
 """Rows of a group: what is in memory while a file is written."""
 META = b"mirotwin_campaign"
@@ -220,7 +220,7 @@ def _schema(plan: Plan) -> pa.Schema:
     if plan.design.draws:
         columns.append(("draw", pa.int64()))
     columns.append(("seed", pa.int64()))
-    columns += [(name, pa.string()) for name in ("verdict", "error", "failure", "digest")]
+    columns += [(name, pa.string()) for name in TEXTS]
     columns += [(name, types[kind]) for name, kind in FIGURES.items()]
     columns += [(CHECK + name, pa.string()) for name in plan.checks]
     return pa.schema(columns)
@@ -238,12 +238,7 @@ def _row(plan: Plan, outcome: RunOutcome) -> dict[str, Any]:
     for draw in plan.design.draws:
         if _kind(draw.ends()) is str:
             row[draw.name] = f"{row[draw.name]}"
-    row |= {
-        "verdict": outcome.verdict,
-        "error": outcome.error,
-        "failure": outcome.failure,
-        "digest": outcome.digest,
-    }
+    row |= {name: getattr(outcome, name) for name in TEXTS}
     row |= {name: outcome.figures.get(name) for name in FIGURES}
     return row | {CHECK + name: outcome.checks.get(name) for name in plan.checks}
 

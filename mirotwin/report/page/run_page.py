@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import sys
 from array import array
 from collections import Counter
@@ -15,6 +16,7 @@ from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
+from miro_sim.pitch import ground
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
 from mirotwin.recording.track import Column, Postures
@@ -22,7 +24,6 @@ from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import SHOWN, coverage_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
-from mirotwin.report.page.pitch import pitch_of
 from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
@@ -30,6 +31,9 @@ from mirotwin.report.summary import StepResults, rms_name, settling_text, tracki
 FIRST = 200
 """Failures of checks, and differences, that are listed."""
 SILENT = "silent"
+MARGIN_CM = 3.0
+MOST_POINTS = 4000
+"""Of a path; a longer one is drawn with every second point, or every third, and so on."""
 
 
 class PageHeader(msgspec.Struct, frozen=True):
@@ -111,6 +115,49 @@ def run_page(material: Material) -> bytes:
         "frames": material.extras.frames,
     }
     return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
+
+
+class Pitch(msgspec.Struct, frozen=True):
+    """The pitch as SVG: field, paths, and robots that the page's JavaScript moves.
+
+    `view_box` takes in the whole pitch and all paths. `paths`: number of the robot, truth or reference, and points as
+    an SVG polyline has them; `dots`: of each robot the measured places, as one SVG path.
+    """
+
+    view_box: str
+    paths: list[tuple[int, str, str]]
+    dots: list[str]
+    left: float = 100.0 * ground.LEFT_M
+    bottom: float = 100.0 * ground.BOTTOM_M
+    length: float = 100.0 * ground.LENGTH_M
+    width: float = 100.0 * ground.WIDTH_M
+    half: float = 100.0 * ground.ROBOT_HALF_M
+
+
+def pitch_of(tracks: PageTracks) -> Pitch:
+    paths, dots = [], []
+    corners = [
+        (100.0 * ground.LEFT_M, 100.0 * ground.BOTTOM_M),
+        (100.0 * ground.RIGHT_M, 100.0 * ground.TOP_M),
+    ]
+    for number, robot in enumerate(tracks.robots):
+        kinds = [("truth", robot.truth), *([("reference", robot.reference)] if robot.steered else [])]
+        for kind, postures in kinds:
+            places = _places(postures)
+            corners += [(x, y) for x, y in places if math.isfinite(x + y)]
+            paths.append((number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
+        seen = [place for place in _places(robot.measured) if not math.isnan(place[0])]
+        dots.append("".join(f"M{x:.2f} {y:.2f}h0" for x, y in seen))
+    left, right = min(x for x, _ in corners) - MARGIN_CM, max(x for x, _ in corners) + MARGIN_CM
+    bottom, top = min(y for _, y in corners) - MARGIN_CM, max(y for _, y in corners) + MARGIN_CM
+    return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, dots)
+
+
+def _places(postures: Postures) -> list[tuple[float, float]]:
+    step = -(-len(postures.x_m) // MOST_POINTS) or 1
+    places = [(100.0 * x, 100.0 * y) for x, y in zip(postures.x_m, postures.y_m, strict=True)]
+    last = places[-1:] if (len(places) - 1) % step else []
+    return [*places[::step], *last]
 
 
 def _verdict(material: Material) -> tuple[str, str]:

@@ -18,7 +18,6 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, Flags
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import PC, Event
-from miro_sim.world.pins import PINS
 
 if TYPE_CHECKING:
     from miro_sim.world.robot import Robot
@@ -30,6 +29,12 @@ Byte = Annotated[int, Meta(ge=0, le=0xFF)]
 Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
 SpeedMS = Annotated[float, Meta(ge=-2.876, le=2.876)]
 """What a 16-bit word carries."""
+_CHIP_PINS = ("cs", "rd", "wr", "ps", "rst", "hi", "pwm", "sign")
+_WIRES = ("rxd", "txd", *(f"{side}.{pin}" for side in ("left", "right") for pin in _CHIP_PINS))
+PORT_PINS = {f"P{port}.{bit}": (port, bit) for port in range(4) for bit in range(8)}
+PINS = (*_WIRES, *PORT_PINS)
+"""Those of a board that one can wait for. Encoder channels and busy bits are not among them: the board learns of their
+edges late."""
 C = TypeVar("C", bound="Condition")
 
 
@@ -164,18 +169,11 @@ class Received(AtRobot, frozen=True, kw_only=True, tag="received"):
     byte: Byte | None = None
 
     def met_by(self, event: Event) -> bool:
-        return event.what == "received" and self.byte in (None, event.value)
+        return event.what == self.what and self.byte in (None, event.value)
 
 
-class Transmitted(AtRobot, frozen=True, kw_only=True, tag="transmitted"):
+class Transmitted(Received, frozen=True, kw_only=True, tag="transmitted"):
     """A robot's serial port has sent a character (`byte`: this one)."""
-
-    DETAILS = ("byte",)
-
-    byte: Byte | None = None
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == "transmitted" and self.byte in (None, event.value)
 
 
 class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
@@ -241,7 +239,7 @@ def speeds_of(robot: Robot) -> tuple[float, float]:
 
 
 class Edge(AtRobot, frozen=True, kw_only=True, tag="edge"):
-    """A `pin` of the robot's board changes (to `level`): `rxd`, `txd`, `P1.0`, `left.hi`, .. (`pins.PINS`)."""
+    """A `pin` of the robot's board changes (to `level`): `rxd`, `txd`, `P1.0`, `left.hi`, .. (`PINS`)."""
 
     DETAILS = ("level",)
 

@@ -9,15 +9,18 @@ import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_protocol.toml_text import struct_of
-from miro_sim.world.conditions import CONDITIONS, Condition, Edge, Reached, WheelSpeeds, When
+from miro_robot.board import Board
+from miro_robot.inspect.tap import PLACES, CpuTap, port_pins
+from miro_robot.inspect.watcher import attach, detach
+from miro_sim.world.conditions import CONDITIONS, PORT_PINS, Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
-from miro_sim.world.pins import PinWatch
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
 
 _EDGES, _TRUE = 1 << 40, 1 << 41
 """Serial numbers of events that are in no log begin here."""
+_PLACE = {name: place for place, name in enumerate(PLACES)}
 
 
 class Watch:
@@ -130,3 +133,44 @@ class Watch:
             what = "is no symbol of" if symbol is None else "is not in code memory:"
             raise ValueError(f"{condition.symbol!r} {what} {self.world.image.path}")
         return msgspec.structs.replace(condition, symbol=None, address=symbol.address)
+
+
+class PinWatch:
+    """Edges of some `pins` of a board with exact ticks, from now until `close`. It costs the CPU its fast loop."""
+
+    def __init__(self, board: Board, pins: frozenset[str]) -> None:
+        self.board = board
+        self.pins = sorted(pins)
+        self.tap = CpuTap(board, lambda: None)
+        attach(board.cpu, self.tap)
+        self._levels = list(self.tap.start)
+        self._shown = {pin: self._level(pin) for pin in self.pins}
+
+    def close(self) -> None:
+        detach(self.board.cpu, self.tap)
+        self.tap.detach()
+
+    def take(self, known_tick: int) -> list[tuple[int, str, int]]:
+        """(tick, pin, level) of the edges up to `known_tick` that were not taken yet, in order."""
+        found = []
+        events = self.tap.events
+        events.sort(key=lambda event: event[0])
+        done = 0
+        while done < len(events) and events[done][0] <= known_tick:
+            tick = events[done][0]
+            while done < len(events) and events[done][0] == tick:
+                _, place, level = events[done]
+                self._levels[place] = level
+                done += 1
+            for pin in self.pins:
+                if self._level(pin) != self._shown[pin]:
+                    self._shown[pin] = self._level(pin)
+                    found.append((tick, pin, self._shown[pin]))
+        del events[:done]
+        return found
+
+    def _level(self, pin: str) -> int:
+        if pin not in PORT_PINS:
+            return self._levels[_PLACE[pin]]
+        port, bit = PORT_PINS[pin]
+        return port_pins(self._levels, port) >> bit & 1

@@ -12,7 +12,7 @@ from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.reader import read
 from mirotwin.recording.track import error_of
 from mirotwin.report.page.link import LinkLog, lanes_of
-from mirotwin.report.page.pitch import MOST_POINTS, pitch_of
+from mirotwin.report.page.run_page import MOST_POINTS, pitch_of
 from mirotwin.report.page.tracks import M_S_PER_COUNT, add_samples, tracks_of
 from tests.mirotwin import synthetic
 
