@@ -68,10 +68,10 @@ class Tasks:
         self.warm: Any = self.new_world()
         for _ in range(WARM_PERIODS):
             self.warm.step()
-        target_for = self.parts["fuzz"].target_for
+        RobotTarget = self.parts["fuzz"].RobotTarget
         draws = import_module("miro_exact.rng").Stream(1997, "benchmarks.fuzz")
         self.random = [bytes(draws.u32(8 * one + place) & 0xFF for place in range(8)) for one in range(64)]
-        self.bytes, self.frames = target_for(self.image, "bytes"), target_for(self.image, "frames")
+        self.bytes, self.frames = RobotTarget(self.image, "bytes"), RobotTarget(self.image, "frames")
 
     def new_world(self, text: Any = None) -> Any:
         return self.parts["world"].World((text or self.gaussian).scenario, 0, self.image)

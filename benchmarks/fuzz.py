@@ -19,7 +19,7 @@ from miro_exact import engine
 from miro_exact.rng import Stream
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from mirotwin.fuzz.target import RobotTarget, target_for
+from mirotwin.fuzz.target import RobotTarget
 from tests.robot.ucsim import s51
 
 CALLS = 400
@@ -33,9 +33,9 @@ def classes(image: Image) -> dict[str, tuple[RobotTarget, list[bytes]]]:
     draws = Stream(1997, "benchmarks.fuzz")
     random = [bytes(draws.u32(8 * one + place) & 0xFF for place in range(8)) for one in range(RANDOM)]
     return {
-        "8 random bytes": (target_for(image, "bytes"), random),
-        "one accepted frame": (target_for(image, "frames"), [FRAME]),
-        "session of 10 frames": (target_for(image, "session"), [SESSION]),
+        "8 random bytes": (RobotTarget(image, "bytes"), random),
+        "one accepted frame": (RobotTarget(image, "frames"), [FRAME]),
+        "session of 10 frames": (RobotTarget(image, "session"), [SESSION]),
     }
 
 

@@ -25,7 +25,7 @@ from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
 from mirotwin.fuzz.inputs import SILENCE, input_of, seeds
 from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
-from mirotwin.fuzz.target import RobotTarget, target_for
+from mirotwin.fuzz.target import RobotTarget
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.expect import CHECKS
 from mirotwin.verify.rig_options import silent_scenario
@@ -98,7 +98,7 @@ def _drawn(drawn: random.Random) -> bytes:
 
 @cache
 def shipped() -> RobotTarget:
-    return target_for(load_hex(image_path()), "session", ROBOTS, SLOT)
+    return RobotTarget(load_hex(image_path()), "session", ROBOTS, SLOT)
 
 
 def failed(image: Image, target: RobotTarget, data: bytes) -> tuple[str, ...]:
@@ -122,7 +122,7 @@ def failed(image: Image, target: RobotTarget, data: bytes) -> tuple[str, ...]:
 def judged(mistake: str, image: Image, given: Sequence[bytes]) -> Row:
     """All sessions of one firmware."""
     try:
-        target = target_for(image, "session", ROBOTS, SLOT)
+        target = RobotTarget(image, "session", ROBOTS, SLOT)
     except BadInput as error:
         return Row(mistake, refused=error.what)
     counts: Counter[tuple[bool, bool]] = Counter()

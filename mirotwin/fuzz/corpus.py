@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
-
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
@@ -36,15 +34,11 @@ MOST = 2000
 """Inputs that are taken from a folder."""
 
 
-class Corpus(msgspec.Struct, frozen=True):
-    """`inputs`, no two the same, and `notes`: what a user should hear about files that are not inputs."""
+def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list[str]]:
+    """The inputs of that kind in a folder, no two the same, and what a user should hear about files that are none.
 
-    inputs: tuple[bytes, ...]
-    notes: tuple[str, ...] = ()
-
-
-def read_corpus(folder: Path, kind: str, robots: int) -> Corpus:
-    """The inputs of that kind in a folder. Raises BadInput where there are none."""
+    Raises BadInput where there are none.
+    """
     if not folder.is_dir():
         what = "is no folder" if folder.exists() else "there is no such folder"
         raise BadInput(folder, OPTION, what, "name a folder of .stream, .mcap or input files")
@@ -75,7 +69,7 @@ def read_corpus(folder: Path, kind: str, robots: int) -> Corpus:
         notes.append(f"{OPTION} {folder}: passed over {files_text}: {names}")
     if len(found) > MOST:
         notes.append(f"{OPTION} {folder}: {len(found)} inputs, of which the first {MOST} are taken")
-    return Corpus(tuple(found)[:MOST], tuple(notes))
+    return list(found)[:MOST], notes
 
 
 def _files(folder: Path) -> Iterator[Path]:

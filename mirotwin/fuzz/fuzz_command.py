@@ -21,7 +21,7 @@ from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.fuzz_output import CampaignEnd, FuzzProgress, report
+from mirotwin.fuzz.fuzz_output import FuzzProgress, report
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.spec import TargetSpec
@@ -218,9 +218,9 @@ def _campaign(
     oracle = oracle_of(target, check)
     inputs = target.seeds()
     if options.corpus is not None:
-        corpus = read_corpus(options.corpus, spec.input, spec.robots)
-        inputs = list(dict.fromkeys((*inputs, *corpus.inputs)))
-        for note in corpus.notes:
+        found, notes = read_corpus(options.corpus, spec.input, spec.robots)
+        inputs = list(dict.fromkeys((*inputs, *found)))
+        for note in notes:
             complain(note)
     _check_at_rest(target, image)
     reached = InputCoverage(image, spec.make)
@@ -286,8 +286,7 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | No
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
-    ended = CampaignEnd(left=left, complete=stopped is None, check=check_in_file)
-    code = report(campaign, ended, quiet)
+    code = report(campaign, left, stopped is None, check_in_file, quiet)
     if stopped is not None:
         raise stopped
     return code

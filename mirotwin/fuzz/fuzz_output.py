@@ -83,23 +83,16 @@ COVERAGE = "coverage.info"
 SUMMARY = "summary.json"
 
 
-class CampaignEnd(msgspec.Struct, frozen=True):
-    """`left`: inputs that were not looked at; `complete`: whether it came to the end of its time.
+def report(campaign: Campaign, left: int, complete: bool, check: str | None, quiet: bool) -> int:
+    """Writes the files of the campaign and shows the results; the exit code.
 
-    `check`: FILE.py:FUNCTION of --check.
+    `left`: inputs that were not looked at; `complete`: whether it came to the end of its time. `check`:
+    FILE.py:FUNCTION of --check.
     """
-
-    left: int
-    complete: bool
-    check: str | None = None
-
-
-def report(campaign: Campaign, ended: CampaignEnd, quiet: bool) -> int:
-    """Writes the files of the campaign and shows the results; the exit code."""
     triage, out = campaign.triage, campaign.folder.path
     tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
     never = never_reached(tracefile)
-    _write_summary(campaign, tracefile, never, ended)
+    _write_summary(campaign, tracefile, never, left, complete)
     status = campaign.status()
     if not quiet:
         edges = "" if status.edges is None else f", {amount(status.edges, 'edge')}"
@@ -110,14 +103,14 @@ def report(campaign: Campaign, ended: CampaignEnd, quiet: bool) -> int:
         show(table(tracefile))
         if never:
             show_line(f"never reached: {', '.join(never)}")
-    if ended.left:
-        left = amount(ended.left, "input of the engine was", "inputs of the engine were")
-        complain(f"{left} not looked at; a longer --time does")
+    if left:
+        inputs = amount(left, "input of the engine was", "inputs of the engine were")
+        complain(f"{inputs} not looked at; a longer --time does")
     if campaign.expected and not quiet:
         show_line(f"{', '.join(campaign.expected)}: judged {amount(campaign.judged or 'no', 'input')}")
     if triage.unrepeated:
         complain(f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
-    _print_crashes(campaign, ended.check)
+    _print_crashes(campaign, check)
     if not quiet:
         show_line(f"written to {out}")
     missed = campaign.covering is not None and _print_covering(campaign, campaign.covering.name)
@@ -168,17 +161,19 @@ def _print_covering(campaign: Campaign, symbol: str) -> bool:
     return False
 
 
-def _write_summary(campaign: Campaign, tracefile: Tracefile, never: list[str], ended: CampaignEnd) -> None:
+def _write_summary(
+    campaign: Campaign, tracefile: Tracefile, never: list[str], left: int, complete: bool
+) -> None:
     status = campaign.status()
     lines, branches = line_share(tracefile), branch_share(tracefile)
     document = {
         "firmware_sha256": campaign.triage.target.image.sha256,
-        "complete": ended.complete,
+        "complete": complete,
         "run_s": status.run_s,
         "executions": status.executions,
         "edges": status.edges,
         "inputs": campaign.inputs,
-        "inputs_left": ended.left,
+        "inputs_left": left,
         "inputs_judged": campaign.judged,
         "unrepeated": campaign.triage.unrepeated,
         "lines": msgspec.to_builtins(lines),

@@ -68,10 +68,10 @@ def spec_of(text: str) -> TargetSpec:
 
 def miro_target(spec: TargetSpec) -> Target:
     """The MIRO's board with the firmware of the specification."""
-    from mirotwin.fuzz.target import target_for
+    from mirotwin.fuzz.target import RobotTarget
     from mirotwin.shell.firmware_image import load_firmware
 
-    return target_for(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
+    return RobotTarget(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
 
 
 def _function(place: str) -> Any:

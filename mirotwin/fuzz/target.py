@@ -141,7 +141,8 @@ def described(one: ScriptItem) -> str:
 
 
 class RobotTarget(Target):
-    """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence.
+    """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence. Raises BadInput
+    where the firmware does not come up.
 
     A kind of failure is the place of its name in `fast_oracle.NAMES`. `accepted`: fresh frames of the last run;
     `highest_sp`: how high its stack grew.
@@ -186,11 +187,6 @@ class RobotTarget(Target):
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"
-
-
-def target_for(image: Image, input: str = "session", robots: int = 3, slot: int = 0) -> RobotTarget:
-    """The MIRO's board as a target. Raises BadInput where the firmware does not come up."""
-    return RobotTarget(image, input, robots, slot)
 
 
 def _booted(image: Image, slot: int, robots: int) -> Board:

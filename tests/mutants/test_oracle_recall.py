@@ -5,6 +5,7 @@ import pytest
 from benchmarks import oracle_recall
 from benchmarks.oracle_recall import BEGIN, END, PAGE, Row, judged, render, replaced, sessions, shipped
 from miro_robot.image import load_hex
+from mirotwin.fuzz.target import RobotTarget
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.for_fuzzing import FOR_FUZZING
@@ -40,7 +41,7 @@ def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(monkey
         finding = None
 
         def __init__(self, *arguments):
-            self.seeing = oracle_recall.RobotTarget(*arguments)
+            self.seeing = RobotTarget(*arguments)
 
         def run(self, data):
             self.seeing.run(data)
@@ -52,7 +53,7 @@ def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(monkey
     one = PLANTED["never answers"]
     image = load_hex(build({one.file: one.applied(source_files()[one.file])}).image)
     shipped()
-    monkeypatch.setattr(oracle_recall, "target_for", Blind)
+    monkeypatch.setattr(oracle_recall, "RobotTarget", Blind)
     row = judged("never answers", image, sessions()[:4])
     assert row.missed == row.checks["answers_within_ms"] > 0
     assert (row.found, row.extra) == (0, 0)

@@ -17,7 +17,7 @@ from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.hypothesis_process import Explorer, explore
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.target import TargetFailure, target_for
+from mirotwin.fuzz.target import RobotTarget, TargetFailure
 
 
 class Toy:
@@ -104,7 +104,7 @@ def test_inputs_of_all_kinds_are_drawn(kind, foreign):
 
 
 def test_a_session_is_made_of_whole_operations():
-    target = target_for(load_hex(image_path()))
+    target = RobotTarget(load_hex(image_path()))
 
     @settings(max_examples=30)
     @given(inputs("session"))
@@ -118,7 +118,7 @@ def test_a_session_is_made_of_whole_operations():
 
 def test_the_shipped_firmware_is_fed_and_its_edges_are_found():
     kept = []
-    target = target_for(load_hex(image_path()))
+    target = RobotTarget(load_hex(image_path()))
     explorer = Explorer(target, lambda kind, data: kept.append(kind))
     explore(explorer, TargetSpec(), (), 3, lambda: target.executions < 60)
     assert explorer.edges > 100

@@ -129,34 +129,32 @@ def test_streams_become_inputs_and_files_of_a_fuzzer_are_taken_as_they_are(tmp_p
     (tmp_path / "queue").mkdir()
     (tmp_path / "queue" / "id:2").write_bytes(b"raw")
     (tmp_path / ".hidden").write_bytes(b"no")
-    corpus = read_corpus(tmp_path, "session", 3)
-    assert heard(SESSION, corpus.inputs[0])[0] == FRAME
-    assert corpus.inputs[1:] == (b"\x06\x01", b"raw")
-    assert corpus.notes == ()
+    inputs, notes = read_corpus(tmp_path, "session", 3)
+    assert heard(SESSION, inputs[0])[0] == FRAME
+    assert inputs[1:] == [b"\x06\x01", b"raw"]
+    assert notes == []
 
 
 def test_a_recording_becomes_inputs(tmp_path, finished):
     (tmp_path / "run.mcap").write_bytes((finished / "run.mcap").read_bytes())
-    corpus = read_corpus(tmp_path, "session", 3)
-    assert len(corpus.inputs) == 1
-    assert heard(SESSION, corpus.inputs[0])[0].count(FRAME[:8]) >= 5
+    inputs, _ = read_corpus(tmp_path, "session", 3)
+    assert len(inputs) == 1
+    assert heard(SESSION, inputs[0])[0].count(FRAME[:8]) >= 5
 
 
 def test_foreign_files_are_passed_over_in_one_line(tmp_path):
     (tmp_path / "good").write_bytes(b"x")
     for name in ("a.png", "b.c", "c.json", "d.txt"):
         (tmp_path / name).write_bytes(b"something")
-    corpus = read_corpus(tmp_path, "session", 3)
-    assert corpus.inputs == (b"x",)
-    assert corpus.notes == (
-        f"--corpus {tmp_path}: passed over 4 files that are no inputs: a.png, b.c, c.json, ..",
-    )
+    inputs, notes = read_corpus(tmp_path, "session", 3)
+    assert inputs == [b"x"]
+    assert notes == [f"--corpus {tmp_path}: passed over 4 files that are no inputs: a.png, b.c, c.json, .."]
 
 
 def test_a_damaged_stream_is_named_with_its_line(tmp_path):
     (tmp_path / "good").write_bytes(b"x")
     (tmp_path / "bad.stream").write_text("# mirotwin stream 1\n12 > zz\n")
-    (note,) = read_corpus(tmp_path, "session", 3).notes
+    _, (note,) = read_corpus(tmp_path, "session", 3)
     assert note.startswith(f"--corpus: passed over: {tmp_path}/bad.stream:2:")
 
 

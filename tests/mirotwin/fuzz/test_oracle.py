@@ -14,21 +14,21 @@ from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.inputs import input_of, seeds, sent, talks
 from mirotwin.fuzz.minimise import Budget, minimise
 from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
-from mirotwin.fuzz.target import TargetFailure, target_for
+from mirotwin.fuzz.target import RobotTarget, TargetFailure
 from mirotwin.fuzz.triage import Triage
 from mirotwin.verify.checks.expect import CHECKS
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 
 def oracle(image):
-    return RobotOracle(target_for(image))
+    return RobotOracle(RobotTarget(image))
 
 
 def triage_of(image, tmp_path, kind="session"):
-    reached = InputCoverage(image, lambda: target_for(image, kind))
+    reached = InputCoverage(image, lambda: RobotTarget(image, kind))
     folder = CampaignFolder(tmp_path / "out")
     folder.make()
-    return Triage(reached, RobotOracle(target_for(image, kind)), folder, Sources([image.path.parent]))
+    return Triage(reached, RobotOracle(RobotTarget(image, kind)), folder, Sources([image.path.parent]))
 
 
 def test_each_name_of_the_quick_judgement_is_a_check():
@@ -126,7 +126,7 @@ def test_a_find_of_a_check_in_python_is_made_small_in_worlds(tmp_path):
 @pytest.mark.parametrize("kind", ["bytes", "frames", "session"])
 def test_seeds_do_no_harm_in_target_and_world(kind):
     image = own_image()
-    target = target_for(image, kind)
+    target = RobotTarget(image, kind)
     for data in seeds(kind, 3, 0):
         assert (target.run(data), target.failure) == (0, None)
         expected = {name: True for name in NAMES if name}
@@ -138,7 +138,7 @@ def test_seeds_do_no_harm_in_target_and_world(kind):
 
 def coverage():
     image = own_image()
-    return InputCoverage(image, lambda: target_for(image))
+    return InputCoverage(image, lambda: RobotTarget(image))
 
 
 def of_talk(number):
@@ -165,7 +165,7 @@ def test_the_counts_of_an_input_do_not_depend_on_the_inputs_before():
 
 def test_the_counters_see_what_the_fast_run_does():
     reached = coverage()
-    fast = target_for(own_image())
+    fast = RobotTarget(own_image())
     for data in seeds("session", 3, 0):
         reached.run(data)
         fast.run(data)

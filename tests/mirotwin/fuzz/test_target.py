@@ -16,7 +16,7 @@ from miro_robot.image import load_hex
 from miro_sim.world.world import World
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.oracle import expected_of
-from mirotwin.fuzz.target import target_for
+from mirotwin.fuzz.target import RobotTarget
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.rig_options import silent_scenario
 from tests import children
@@ -29,7 +29,7 @@ JUDGED = [name for name in NAMES if name and name not in ALWAYS]
 
 @pytest.fixture(scope="module")
 def shipped():
-    return target_for(load_hex(image_path()))
+    return RobotTarget(load_hex(image_path()))
 
 
 def world_of(target, data, names=()):
@@ -67,12 +67,12 @@ from miro_protocol.miro_wire import Miro
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from mirotwin.fuzz.bare import BareTarget
-from mirotwin.fuzz.target import target_for
+from mirotwin.fuzz.target import RobotTarget
 from tests.mirotwin.verify.bare.firmwares import SLEEPS, image
 
 draw = random.Random(3)
 for kind in ("bytes", "frames", "session"):
-    for target in (target_for(load_hex(image_path()), kind), BareTarget(image(SLEEPS), kind, Miro())):
+    for target in (RobotTarget(load_hex(image_path()), kind), BareTarget(image(SLEEPS), kind, Miro())):
         edges = bytearray(target.map_size)
         target.use_map(edges)
         said = (b"", b"ab!", b"a?" if kind == "bytes" else b"b", draw.randbytes(12), draw.randbytes(30))
@@ -128,7 +128,7 @@ PLANTED = {
 @pytest.mark.parametrize("name", PLANTED)
 def test_the_fast_oracle_finds_what_the_check_of_that_name_finds(name):
     data, check = PLANTED[name]
-    target = target_for(planted(name))
+    target = RobotTarget(planted(name))
     assert target.run(data)
     assert target.failure.check == check
     _, checks = world_of(target, data, JUDGED)
@@ -141,12 +141,12 @@ def test_an_input_as_lines_says_what_the_robot_hears(shipped):
 
 def test_an_input_of_another_kind_is_refused():
     with pytest.raises(BadInput, match="use bytes, frames, session"):
-        target_for(load_hex(image_path()), "frame")
+        RobotTarget(load_hex(image_path()), "frame")
 
 
 def test_firmware_that_does_not_listen_is_refused(tmp_path):
     with pytest.raises(BadInput, match="has not turned its serial receiver on"):
-        target_for(load_hex(hex_file(tmp_path / "deaf.ihx", b"\x80\xfe")))
+        RobotTarget(load_hex(hex_file(tmp_path / "deaf.ihx", b"\x80\xfe")))
 
 
 ACCELERATION = b"\x05\x00\x02\x10" + bytes(9)
@@ -171,14 +171,14 @@ repeated until its test falls into the end of the 110 ms.
 @pytest.mark.parametrize("case", RIGHT)
 def test_what_is_right_passes_the_fast_oracle_and_the_checks(case):
     data, robots, slot = RIGHT[case]
-    target = target_for(load_hex(image_path()), robots=robots, slot=slot)
+    target = RobotTarget(load_hex(image_path()), robots=robots, slot=slot)
     assert target.run(data) == 0, target.failure
     _, checks = world_of(target, data, JUDGED)
     assert not checks.failures
 
 
 def test_a_frame_right_at_150_ms_is_not_judged():
-    target = target_for(load_hex(image_path()), "bytes")
+    target = RobotTarget(load_hex(image_path()), "bytes")
     first = bytes.fromhex("2dd43ccd1cb6eca93208eb56d3157184bc")
     second = bytes.fromhex("2dd4fde6a29d52828c23557d6d3ecf5f53")
     assert [target.run(first + bytes(between) + second) for between in (126, 127, 128)] == [0, 0, 0]
@@ -204,7 +204,7 @@ def stop_after_ms(target, waited):
 
 
 def test_a_robot_that_tests_a_frame_stops_when_the_test_is_over():
-    target = target_for(load_hex(image_path()), robots=5)
+    target = RobotTarget(load_hex(image_path()), robots=5)
     after_ms = [stop_after_ms(target, waited) for waited in range(30)]
     assert max(after_ms) < 112.0
     assert [late for late in after_ms if late > 110.6]

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from mirotwin.fuzz.oracle import RobotOracle
-from mirotwin.fuzz.target import target_for
+from mirotwin.fuzz.target import RobotTarget
 from mirotwin.verify.steps.running import collect
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
@@ -220,7 +220,7 @@ DAMAGED = bytes([12, 9, 1, 0, 16, 0, 32, 0])
 def mistaken(tmp_path_factory):
     """A firmware with a mistake, and the folder of a case of it beside a stream that expects nothing."""
     image = planted("takes frames with a bad CRC")
-    target = target_for(image)
+    target = RobotTarget(image)
     assert target.run(DAMAGED)
     folder = tmp_path_factory.mktemp("cases")
     verdict = RobotOracle(target).confirm(DAMAGED, target.failure)
