@@ -11,9 +11,7 @@ import msgspec
 import pytest
 
 from miro_exact.state import restore, snapshot, values
-from miro_robot.board import Board
 from miro_robot.faults import FaultKind, FirmwareFault
-from miro_robot.plant import Plant
 from miro_robot.wiring import Latch, load_wiring
 from tests import children
 from tests.robot.board.rig import CYCLE, MS, RESET, START, board_with, raw_movx_wiring
@@ -90,13 +88,6 @@ def test_a_fault_reads_as_a_sentence():
     assert str(board.faults[0]) == (
         "firmware violated an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed) at 0x0032 in guilty, tick 48"
     )
-
-
-def test_without_symbols_a_fault_has_its_address():
-    board = Board(load_wiring(), Plant())
-    board.cpu.load(bytes([0xA5]))
-    board.run(MS)
-    assert str(board.faults[0]) == "firmware executed the undefined opcode A5 at 0x0000, tick 12"
 
 
 def test_the_run_ends_after_the_guilty_instruction():
@@ -247,13 +238,6 @@ def test_the_strobes_of_a_movx_reach_the_chip_that_is_addressed():
     board = board_with(READ, raw_movx_wiring(), stop_on_fault=False)
     board.run(3 * MS)
     assert board.cpu.peek_iram(0x40) == 0x84
-
-
-def test_r0_and_r1_address_with_the_latch_of_p2():
-    text = START + RESET + "MOV P2,#0F6h\nMOV R1,#00h\nMOV A,#02h\nMOVX @R1,A\nSJMP $"
-    board = board_with(text, raw_movx_wiring(), stop_on_fault=False)
-    board.run(3 * MS)
-    assert [command[1:] for command in board.left.commands] == [(0x02, b"")]
 
 
 def test_a_movx_by_dptr_disturbs_an_lm629_whose_strobes_are_on_p2():

@@ -26,15 +26,6 @@ def expected(velocity):
     return [(LTRJ, bytes.fromhex(f"{control}{abs(cut_off(velocity)) << 8:08x}")), (STT, b"")]
 
 
-def test_a_team_frame_sets_velocity_mode_in_both_chips(rig):
-    rig.team(7, 4000, -2500)
-    left, right = rig.told(rig.board.left), rig.told(rig.board.right)
-    assert [(command.opcode, command.data) for command in left] == expected(4000)
-    assert [(command.opcode, command.data) for command in right] == expected(-2500)
-    assert rig.counters == (1, 0, 0)
-    assert (rig.u8("_last_hdr"), rig.i16("_last_left"), rig.i16("_last_right")) == (7, 4000, -2500)
-
-
 def test_both_wheels_start_in_the_same_sample(rig):
     last = rig.team(1, 1000, 1000)
     left, right = rig.told(rig.board.left)[-1], rig.told(rig.board.right)[-1]

@@ -269,21 +269,6 @@ def test_a_relative_breakpoint_counts_from_the_target():
     assert bench.chip.breakpoint == 30
 
 
-def test_excessive_error_flags_or_stops():
-    for name, status in (("LPEI", EXCESS), ("LPES", MOTOR_OFF | EXCESS | COMPLETE)):
-        bench = moving()
-        bench.filter(kp=100)
-        bench.command(name, 30)
-        while abs(bench.chip.desired_position - bench.chip.real_position) <= 30:
-            assert bench.chip.status == 0
-            bench.sample()
-            if bench.chip.status:
-                break
-        assert bench.chip.status == status
-        assert (bench.chip.pwm_magnitude == 0) == (name == "LPES")
-        assert bench.signals() & 0x0200 == (0x0200 if name == "LPES" else 0)
-
-
 def test_out_of_range_parameters_are_taken_modulo_their_width():
     bench = Bench.running()
     bench.load(0x002A, 0xC0000001, 0x80000002, 0x7FFFFFFF)

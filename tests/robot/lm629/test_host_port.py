@@ -50,43 +50,6 @@ def test_busy_lasts_120_clocks_after_a_command_byte_and_after_the_second_byte_of
     assert busy_span() == BUSY
 
 
-def test_a_write_ends_with_cs_as_well_as_with_wr():
-    for last in ("cs", "wr"):
-        bench = Bench.running()
-        bench.ready()
-        bench.drive(ps=0, cs=0, data=0x02)
-        bench.drive(wr=0)
-        assert not bench.chip.status_at(bench.tick) & 1
-        bench.drive(**{last: 1})
-        assert bench.chip.status_at(bench.tick) & 1
-        assert bench.chip.commands[-1][1:] == (0x02, b"")
-
-
-def test_the_byte_that_counts_is_the_one_before_the_strobe_ends():
-    bench = Bench.running()
-    bench.ready()
-    bench.drive(ps=0, cs=0, data=0x55)
-    bench.drive(wr=0)
-    bench.drive(data=0x02)
-    bench.drive(wr=1, data=0x77, ps=1)
-    assert bench.chip.commands[-1][1:] == (0x02, b"")
-
-
-def test_read_data_is_fixed_when_the_strobe_begins_and_gone_when_it_ends():
-    bench = Bench.running()
-    bench.command("DFH")
-    assert bench.chip.data_out(bench.tick) == -1
-    bench.drive(ps=0, cs=0)
-    bench.drive(rd=0)
-    assert bench.chip.data_out(bench.tick) == 0x81
-    bench.wait(2 * BUSY)
-    assert bench.chip.data_out(bench.tick) == 0x81
-    bench.drive(cs=1)
-    assert bench.chip.data_out(bench.tick) == -1
-    bench.drive(rd=1)
-    assert bench.status() == 0x80
-
-
 def test_bus_access_while_busy_is_dropped_without_a_command_error():
     bench = Bench.running()
     bench.command("LPEI", 0x1234)

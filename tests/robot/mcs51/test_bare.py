@@ -150,11 +150,6 @@ def test_a_program_may_send_as_much_as_it_likes(mode, lasts):
     assert len(out) > 1_000
 
 
-def test_a_program_may_wave_with_p3_1_as_long_as_it_likes():
-    machine = BareMachine(image_of("loop:\nCPL TXD\nSJMP loop"))
-    assert machine.run(max_cycles=300_000) == Ended.CYCLES
-
-
 def test_progress_is_told_and_the_dump_has_the_registers():
     told = []
     machine = BareMachine(image_of("SETB EA\nMOV B,#12h\nloop:\nNOP\nSJMP loop"))
