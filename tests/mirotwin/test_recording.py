@@ -507,11 +507,15 @@ def put(writer, step):
         writer.flush()
 
 
+def put_all(writer, steps):
+    for step in steps:
+        put(writer, step)
+
+
 def written(steps):
     stream = io.BytesIO()
     writer = begun(stream)
-    for step in steps:
-        put(writer, step)
+    put_all(writer, steps)
     writer.finish()
     return stream.getvalue()
 
@@ -592,16 +596,10 @@ def test_after_a_full_disk_nothing_more_is_written():
 
     full = Full()
     writer = begun(full)
-    added = 0
-
-    def fill():
-        nonlocal added
-        for step in ROWS:
-            put(writer, step)
-            added += step[0] == "message"
-
+    steps = iter(ROWS)
     with pytest.raises(OSError, match="No space left"):
-        fill()
+        put_all(writer, steps)
+    added = sum(step[0] == "message" for step in ROWS) - sum(step[0] == "message" for step in steps)
     before = full.getvalue()
     full.room = 1 << 20
     writer.flush()

@@ -210,22 +210,6 @@ def test_two_processes_do_not_write_to_one_campaign(tmp_path):
         campaign.run(plan_of(), path, InThisProcess(), on_outcome=again)
 
 
-def test_a_run_that_cannot_be_made_is_a_row_with_its_error_and_costs_no_other(tmp_path):
-    text = """
-scenario = "fig7"
-set = { duration_s = 0.1 }
-[grid]
-network.robots = [3, 5]
-network.radio.keyup_s = [0.001, 0.005]
-"""
-    path = tmp_path / "short.parquet"
-    campaign.run(plan_of(text), path, InThisProcess())
-    found = rows(path)
-    assert [row["verdict"] for row in found] == ["passed", "passed", "passed", "error"]
-    assert "do not fit the camera period" in found[3]["error"]
-    assert (found[3]["digest"], found[3]["rms_x_cm"], found[3]["check.no_fault"]) == ("", None, None)
-
-
 def test_ten_million_runs_have_to_be_asked_for(tmp_path):
     plan = plan_of(SHORT.replace("3-5", "0-4999999"))
     assert plan.runs == 10_000_000

@@ -125,13 +125,14 @@ def test_of_many_failures_the_first_are_listed_and_the_others_counted(here):
     assert "mirotwin: failed: 3 more of 8\n" in err
 
 
-def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
-    (here / "c.toml").write_text(
-        'scenario = "fig7"\nset = { duration_s = 0.1 }\n'
-        "[grid]\nnetwork.robots = [3, 5]\nnetwork.radio.keyup_s = [0.001, 0.005]\n"
-    )
+def test_a_run_with_an_error_is_exit_code_2_and_a_row_and_costs_no_other(here):
+    grid = "network.robots = [3, 5]\nnetwork.radio.keyup_s = [0.001, 0.005]\n"
+    (here / "c.toml").write_text(f'scenario = "fig7"\nset = {{ duration_s = 0.1 }}\n[grid]\n{grid}')
     assert "1 of 4 runs have an error" in mirotwin.ends(2, "campaign", "c.toml", "--jobs", 1)
-    assert len(rows(here / "runs/c.parquet")) == 4
+    found = rows(here / "runs/c.parquet")
+    assert [row["verdict"] for row in found] == ["passed", "passed", "passed", "error"]
+    assert "do not fit the camera period" in found[3]["error"]
+    assert (found[3]["digest"], found[3]["rms_x_cm"], found[3]["check.no_fault"]) == ("", None, None)
 
 
 def children_of(parent):

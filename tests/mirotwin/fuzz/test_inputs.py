@@ -9,7 +9,7 @@ from miro_protocol import stream
 from miro_protocol.actions import Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.transmission import DOWN, UP, Transmission
-from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
+from miro_robot.harness.program import FRAMES, INPUTS, SESSION, Program
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of, seeds, sent, talks
 
@@ -53,9 +53,11 @@ def test_characters_that_are_no_frame_are_said_as_they_are(data):
     assert heard(SESSION, input_of("session", [Transmission(0, DOWN, data)], 3))[0] == data
 
 
-def test_characters_before_and_behind_a_frame_stay_where_they_were():
+@pytest.mark.parametrize("kind", ["bytes", "session"])
+def test_characters_before_and_behind_a_frame_stay_where_they_were(kind):
     data = b"\x01\x02" + encode(TeamFrame(0, 5, ((1, 2), (3, 4), (5, 6))), 3) + b"\x03"
-    assert heard(SESSION, input_of("session", [Transmission(0, DOWN, data)], 3))[0] == data
+    said = [Transmission(0, DOWN, data), Transmission(10**6, DOWN, b"c")]
+    assert heard(INPUTS.index(kind), input_of(kind, said, 3))[0] == data + b"c"
 
 
 def test_a_long_silence_is_as_long():
@@ -76,13 +78,6 @@ def test_frames_keep_their_payloads_and_types(said):
         (b.seq - a.seq) % 64 in range(1, 9) for a, b in zip([TeamFrame(0, 0, ()), *said], said, strict=False)
     ):
         assert characters == b"".join(one.data for one in wire)
-
-
-def test_bytes_are_the_characters():
-    assert (
-        heard(BYTES, input_of("bytes", [Transmission(0, DOWN, b"ab"), Transmission(99, DOWN, b"c")], 3))[0]
-        == b"abc"
-    )
 
 
 def test_a_reset_is_said_in_a_session():
@@ -159,20 +154,26 @@ def test_a_damaged_stream_is_named_with_its_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("files", "said"),
     [
-        (lambda folder: None, "there is no such folder"),
-        (lambda folder: folder.write_text("x"), "is no folder"),
-        (lambda folder: folder.mkdir(), "holds no file"),
-        (
-            lambda folder: (folder.mkdir(), (folder / "a.png").write_bytes(b"x")),
-            "no input among 1 file",
-        ),
-        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(b"")), "no input among 1 file"),
-        (lambda folder: (folder.mkdir(), (folder / "a").write_bytes(bytes(9000))), "no input among 1 file"),
+        (None, "there is no such folder"),
+        ({}, "holds no file"),
+        ({"a.png": b"x"}, "no input among 1 file"),
+        ({"a": b""}, "no input among 1 file"),
+        ({"a": bytes(9000)}, "no input among 1 file"),
     ],
 )
-def test_a_folder_without_inputs_is_refused(tmp_path, make, said):
-    make(tmp_path / "corpus")
+def test_a_folder_without_inputs_is_refused(tmp_path, files, said):
+    folder = tmp_path / "corpus"
+    if files is not None:
+        folder.mkdir()
+    for name, data in (files or {}).items():
+        (folder / name).write_bytes(data)
     with pytest.raises(BadInput, match=said):
+        read_corpus(folder, "session", 3)
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "corpus").write_text("x")
+    with pytest.raises(BadInput, match="is no folder"):
         read_corpus(tmp_path / "corpus", "session", 3)

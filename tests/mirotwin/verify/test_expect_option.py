@@ -42,11 +42,6 @@ def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(mir
     assert told == {"name": "tracks_within_cm", "kind": "safety", "verdict": "failed", "failures": 1}
 
 
-def test_one_robot_may_expect_something_by_set(mirotwin, short, tmp_path):
-    key = "network.robot.1.expect.tracks_within_cm={limit_cm=1.9, from_s=0.0}"
-    mirotwin.succeeds("run", short, "-q", "--no-figure", "--out", tmp_path / "run", "--set", key)
-
-
 def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(mirotwin, short, tmp_path):
     mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", *MISSED)
     code, out, err = mirotwin("replay", "-q", tmp_path / "run" / "run.mcap")

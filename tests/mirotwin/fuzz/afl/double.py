@@ -4,18 +4,12 @@ import time
 from pathlib import Path
 
 from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import TargetFailure
 
 ROOT = Path(__file__).parents[4]
 MAP_SIZE = 8192
 MAKER = "tests.mirotwin.fuzz.afl.double:double_of"
 WORD = b"DUCK"
-
-
-class Found:
-    """A failure of the double."""
-
-    def __init__(self, check, pc):
-        self.check, self.tick, self.pc, self.what = check, 24, pc, f"found at {pc}"
 
 
 class Double:
@@ -46,19 +40,13 @@ class Double:
                 raise RuntimeError("the double raises")
             if self.sleeps:
                 time.sleep(3600)
-        self.failure = None
-        right = 0
-        self._count(1)
-        while right < len(WORD) and right < len(data) and data[right] == WORD[right]:
-            right += 1
-            self._count(1 + right)
-        if right == len(WORD) or self.always:
-            self.failure = Found("word", right)
-            return self.kind
-        return 0
-
-    def _count(self, edge):
-        self.edges[edge] = (self.edges[edge] + 1) & 0xFF
+        head = bytes(data[: len(WORD)])
+        right = max(size for size in range(len(WORD) + 1) if head.startswith(WORD[:size]))
+        for edge in range(1, 2 + right):
+            self.edges[edge] = (self.edges[edge] + 1) & 0xFF
+        failed = right == len(WORD) or self.always
+        self.failure = TargetFailure("word", 24, right, f"found at {right}") if failed else None
+        return self.kind if failed else 0
 
     def script(self, data):
         return []

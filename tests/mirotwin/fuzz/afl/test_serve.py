@@ -35,9 +35,13 @@ class Segment:
 
 
 class FakeAfl:
-    """Starts the server of `spec` and speaks to it. `without`: a variable that it does not get."""
+    """Starts the server of `spec` and speaks to it. `without`: a variable that it does not get.
 
-    def __init__(self, spec, beside="", without=""):
+    `answers`: whether it answers the server's first word.
+    """
+
+    def __init__(self, spec, beside="", without="", answers=True):
+        self.answers = answers
         self.edges, self.cases = Segment(65536), Segment(CASES_BYTES)
         to_server, self.control = os.pipe()
         self.status, from_server = os.pipe()
@@ -91,6 +95,8 @@ class FakeAfl:
         return code
 
     def __enter__(self):
+        if self.answers:
+            self.hello()
         return self
 
     def __exit__(self, *_):
@@ -116,7 +122,6 @@ def by_hand(specification, data):
 def afl():
     """It has said hello to the server of a double."""
     with FakeAfl(spec()) as found:
-        found.hello()
         yield found
 
 
@@ -143,7 +148,6 @@ def test_executions_are_kept_and_counted_on(tmp_path):
     beside = str(tmp_path / "main")
     for times in (1, 2):
         with FakeAfl(spec(), beside) as afl:
-            afl.hello()
             for _ in range(serve.RUNS_A_COUNT):
                 afl.run(b"hello")
             afl.end()
@@ -167,13 +171,12 @@ def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer(afl):
 
 
 def test_the_server_ends_when_afl_does_not_answer_its_first_word():
-    with FakeAfl(spec()) as afl:
+    with FakeAfl(spec(), answers=False) as afl:
         assert afl.end() == 0
 
 
 def test_a_target_that_raises_is_told_in_a_file(tmp_path):
     with FakeAfl(spec(raises=True), str(tmp_path / "main")) as afl:
-        afl.hello()
         afl.run(b"!")
         assert afl.end() == 70
     assert (tmp_path / "main.target").read_text().splitlines()[-1] == "RuntimeError: the double raises"
@@ -184,7 +187,6 @@ def test_a_target_that_raises_is_told_in_a_file(tmp_path):
 )
 def test_an_afl_without_shared_memory_is_refused(variable, remedy):
     with FakeAfl(spec(), without=variable) as afl:
-        afl.hello()
         assert afl.end() == 2
         said = afl.server.stderr.read()
         assert variable in said

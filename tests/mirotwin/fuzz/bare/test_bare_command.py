@@ -83,10 +83,6 @@ def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes,
         assert out.splitlines() == [debug]
     code, out, _ = mirotwin("test", case, "--firmware", hexes["polls"], "--check", check)
     assert (code, "FAILED" in out) == (1, True)
-    err = mirotwin.ends(1, "replay", str(case), "--firmware", hexes["polls"], "--check", check)
-    assert err.startswith("mirotwin: fails as recorded: never_q")
-    err = mirotwin.ends(2, "replay", str(case), "--firmware", hexes["polls"])
-    assert "names the check 'never_q', which is not installed; give it: --check FILE.py:never_q" in err
 
 
 def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines, hexes, check, tmp_path):
