@@ -46,3 +46,10 @@ mirotwin = Program()
 def run(*words, **more):
     """Runs the program as a process of its own and gives what became of it, with what it said as text."""
     return children.run([*COMMAND, *map(str, words)], **{"capture_output": True, "text": True, **more})
+
+
+def full_disk(size):
+    """For `preexec_fn`: a limit on the length of files stands in for a disk that takes so much."""
+    import resource  # only where there is a fork, too
+
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))

@@ -17,6 +17,7 @@ from mirotwin.debug.console import Console
 from mirotwin.debug.timeline import Timeline, Trap
 from mirotwin.shell.progress import ProgressBar
 from tests.mirotwin.debug import proofs
+from tests.mirotwin.debug.proofs import LIBRARY, MIX
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
 from tests.mirotwin.shell.test_screen import Screen
 from tests.mirotwin.verify.bare.firmwares import image
@@ -162,12 +163,7 @@ def test_the_last_writer_is_that_of_brute_force():
     assert asked > 10
 
 
-PROGRAMS = {
-    "the robot": (),
-    "mix": (proofs.MIX,),
-    "library": (proofs.LIBRARY,),
-    "stack-auto": (proofs.LIBRARY, "--stack-auto"),
-}
+PROGRAMS = {"the robot": (), "mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
 
 
 @needs_sdcc

@@ -1,6 +1,5 @@
 """`mirotwin fw header`, and `fw vectors` that does not get to its end. (What is in the files: tests/vectors.)"""
 
-import resource
 import signal
 import subprocess
 import time
@@ -54,13 +53,8 @@ def test_an_interrupted_set_leaves_nothing(tmp_path, number):
 
 
 def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path):
-    """A limit on the length of files stands in for the disk."""
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
-
     words = ("fw", "vectors", "--out", tmp_path / "set", "--per-opcode", "100")
-    done = program.run(*words, preexec_fn=limit)
+    done = program.run(*words, preexec_fn=program.full_disk(16384))
     assert (done.returncode, done.stdout) == (2, "")
     remedy = "File too large; make room, or choose another folder with --out"
     assert done.stderr.splitlines()[-1] == f"mirotwin: error: {tmp_path / 'set'}: {remedy}"

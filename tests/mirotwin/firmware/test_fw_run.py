@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import resource
 
 import pytest
 from click.testing import CliRunner
@@ -127,14 +126,9 @@ def test_the_dump_holds_registers_and_memories(mirotwin, tmp_path):
 
 
 def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path):
-    """A limit on the length of files stands in for the disk."""
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
-
     image, dump = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "dump.json"
     dump.write_text("old")
-    done = program.run("fw", "run", image, "--dump", dump, preexec_fn=limit)
+    done = program.run("fw", "run", image, "--dump", dump, preexec_fn=program.full_disk(100))
     assert done.returncode == 2
     said = f"mirotwin: error: {dump}: File too large; make room, or choose another file with --dump\n"
     assert done.stderr.endswith(said)

@@ -25,6 +25,13 @@ COM_PORT = b"\x2c"
 # TCP
 
 
+@pytest.fixture
+def rig():
+    found = Rig()
+    yield found
+    found.close()
+
+
 def test_bytes_pass_as_they_are_both_ways(rig):
     port, client = rig.connected(TcpEndpoint)
     everything = bytes(range(256))

@@ -15,6 +15,7 @@ from miro_exact.clock import HOST_CHARACTER_TICKS, ticks
 from mirotwin.ports.url import UrlOptions, parse_url
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.ports.rig import ANSWER_BYTES, python, question, replays, sent_bytes
+from tests.mirotwin.program import full_disk
 
 URL = "miro://fig6?set=network.radio.bit_error_rate=0"
 
@@ -252,10 +253,8 @@ def test_a_recording_of_the_port_replays_to_the_same_digests(miro, tmp_path):
 
 def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_path):
     code = (
-        "import resource, sys, serial\n"
-        "sys.dont_write_bytecode = True\n"
+        "import sys, serial\n"
         "serial.protocol_handler_packages.append('mirotwin.ports')\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "port = serial.serial_for_url(sys.argv[1], timeout=30)\n"
         "try:\n"
         "    port.read(1)\n"
@@ -264,7 +263,7 @@ def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_pat
         "    print(error)\n"
         "port.close()\n"
     )
-    done = python(code, f"miro://fig6?out={tmp_path / 'out'}")
+    done = python(code, f"miro://fig6?out={tmp_path / 'out'}", preexec_fn=full_disk(100_000))
     assert (done.returncode, done.stderr) == (0, "")
     said = f"{tmp_path / 'out'}: File too large; make room, or choose another folder with --out"
     assert done.stdout == f"{said}\n"

@@ -1,7 +1,6 @@
 """`mirotwin serve` as a process: everything that ends or hurts a session, and what is left of it."""
 
 import json
-import resource
 import signal
 import socket
 import time
@@ -71,11 +70,8 @@ def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path):
 
 
 def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path):
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-
     command = ("fig6", "--tcp", 0, *CLEAN, "--pace", 5, "--out", tmp_path / "out")
-    with served(*command, preexec_fn=limited) as session:
+    with served(*command, preexec_fn=program.full_disk(100_000)) as session:
         client = talk(session)
         session.wait()
         client.close()

@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import re
-import resource
 import signal
 import sys
 
@@ -123,13 +122,6 @@ def parts(mirotwin, short, tmp_path, monkeypatch):
     return tmp_path / "out"
 
 
-def cut(path, size):
-    """A copy of a recording as a killed process leaves it: without the end, perhaps cut in a record."""
-    target = path.with_name("cut.mcap")
-    target.write_bytes(path.read_bytes()[:size])
-    return target
-
-
 def test_the_next_run_names_the_parts_and_replaces_them_by_force(mirotwin, parts, short, finished):
     err = mirotwin.refuses("run", short, "--seed", 5, "--out", parts)
     assert f"{parts}: the folder holds parts of an interrupted command ({', '.join(PARTS)}); " in err
@@ -162,7 +154,8 @@ def killed(parts, more):
     """What is left of the run of `parts` if it is killed `more` bytes into the message after its second period."""
     data = (parts / "run.part.mcap").read_bytes()
     chunk = data.index(b"mirotwin.Posture") - 200
-    return cut(parts / "run.part.mcap", max(chunk, data.rindex(b'"index":1,') + 10 + 64 + 14 + more))
+    (parts / "cut.mcap").write_bytes(data[: max(chunk, data.rindex(b'"index":1,') + 10 + 64 + 14 + more)])
+    return parts / "cut.mcap"
 
 
 def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(mirotwin, parts):
@@ -205,10 +198,7 @@ def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finish
         (tmp_path / path.name).write_bytes(path.read_bytes())
     size = (finished / "run.mcap").stat().st_size * 3 // 4
 
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    done = program.run("run", short, "--out", tmp_path, "--force", "-q", preexec_fn=limited)
+    done = program.run("run", short, "--out", tmp_path, "--force", "-q", preexec_fn=program.full_disk(size))
     assert done.returncode == 2
     assert f"error: {tmp_path}: File too large; {ROOM}" in done.stderr
     for path in finished.iterdir():

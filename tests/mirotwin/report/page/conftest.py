@@ -3,19 +3,6 @@
 import pytest
 
 FIG6 = ("fig6", "--seed", 3, "--set", "duration_s=1.5", "--expect", "settles_within_s=0.4")
-TWO = """
-name = "two"
-duration_s = 0.5
-[[network]]
-[network.radio]
-bit_error_rate = 1e-3
-[[network.robot]]
-slot = 0
-reference.kind = "line"
-[[network.robot]]
-slot = 2
-reference.kind = "arc"
-"""
 
 
 @pytest.fixture(scope="session")
@@ -38,10 +25,8 @@ def fig6_page(mirotwin, folder, fig6):
 
 
 @pytest.fixture(scope="session")
-def two(mirotwin, folder):
+def two(mirotwin, folder, short):
     """The folder of a run of two robots, with the camera's frames."""
-    scenario = folder / "two.toml"
-    scenario.write_text(TWO)
-    out = folder / "two"
-    mirotwin.succeeds("run", scenario, "--out", out, "--record-frames", "--no-figure", "-q")
-    return out
+    longer = ("--set", "duration_s=0.5", "--record-frames")
+    mirotwin.succeeds("run", short, *longer, "--out", folder / "two", "--no-figure", "-q")
+    return folder / "two"

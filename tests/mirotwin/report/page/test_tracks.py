@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 
 import pytest
+from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_protocol.frames import TeamFrame
@@ -71,14 +72,11 @@ def test_the_speed_of_a_wheel_is_its_counts_over_the_samples_between_two_exposur
 
 
 def test_a_position_that_overflows_its_register_is_no_jump():
-    low, high = (synthetic.robot(index) for index in (1, 2))
-    from msgspec.structs import replace
-
-    low = replace(low, left=replace(low.left, real_position=(1 << 31) - 10, commands=()))
-    high = replace(high, left=replace(high.left, real_position=-(1 << 31) + 10, commands=()))
-    periods = [
-        replace(one, robots=(robot,)) for one, robot in zip(synthetic.periods(2), (low, high), strict=True)
-    ]
+    periods = []
+    for period, position in zip(synthetic.periods(2), ((1 << 31) - 10, -(1 << 31) + 10), strict=True):
+        robot = synthetic.robot(1)
+        left = replace(robot.left, real_position=position, commands=())
+        periods.append(replace(period, robots=(replace(robot, left=left),)))
     speeds = tracks_of(periods, [True], 0).robots[0].wheels["left"].actual
     assert speeds[1] == 20 / (CONTROL_PERIOD_TICKS / 8192) * M_S_PER_COUNT
 
