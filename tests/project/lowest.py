@@ -28,7 +28,7 @@ SMOKE = (
     "tests/protocol/test_pcapng.py",
     "tests/sim/test_scenario.py",
     "tests/mirotwin/test_recording.py",
-    "tests/mirotwin/test_pytest_plugin.py",
+    "tests/mirotwin/testing/test_plugin.py",
     "tests/mirotwin/run/test_scenarios_command.py",
 )
 
