@@ -84,6 +84,8 @@ class Odd(EstimatorParameters, frozen=True, tag="odd"):
 
 
 class Answering(Estimator[Odd]):
+    INNER = ("a",)
+
     def step(self, given):
         return self.parameters.answer
 
@@ -108,28 +110,10 @@ def test_an_estimator_that_fails_is_named(answer, reason):
         one.update(HERE, 0.0)
 
 
-class KnowingParameters(EstimatorParameters, frozen=True, kw_only=True, tag="knowing"):
-    left: float = 1.25
-    right: float = 0.8
-    named: str = "a"
-
-    def estimator(self):
-        return Knowing(self)
-
-
-class Knowing(Estimator[KnowingParameters]):
-    INNER = ("a",)
-
-    def step(self, given):
-        p = self.parameters
-        return Estimate(given.t_s, HERE, p.left, p.right, {p.named: 0.5})
-
-
-def steered(**parameters):
+def steered(left=1.25, right=0.8, named="a"):
     """A pilot whose estimator knows the wheels, after one period, and its command."""
-    one = Pilot(
-        StraightLine(), KanayamaParameters().law(), estimator=KnowingParameters(**parameters).estimator()
-    )
+    knowing = Odd(Estimate(1.0, HERE, left, right, {named: 0.5})).estimator()
+    one = Pilot(StraightLine(), KanayamaParameters().law(), estimator=knowing)
     return one, one.update(HERE, 1.0)
 
 
@@ -153,5 +137,5 @@ def test_values_that_an_estimator_names_go_with_the_command_and_are_saved():
 
 @pytest.mark.parametrize("wrong", [{"left": 0.0}, {"right": 2.5}, {"left": math.nan}, {"named": "b"}])
 def test_an_estimator_with_odd_wheels_or_other_names_is_named(wrong):
-    with pytest.raises(PluginError, match="estimator 'knowing' failed: "):
+    with pytest.raises(PluginError, match="estimator 'odd' failed: "):
         steered(**wrong)

@@ -52,15 +52,13 @@ def test_three_sigma_is_the_bound_and_one_sigma_a_third_of_it():
 def test_a_frame_arrives_so_many_frames_later(delay):
     vision = Vision(NO_ERRORS, delay)
     seen = [vision.frame(Posture(float(k), 0.0, 0.0), ZERO) for k in range(6)]
-    assert [None if p is None else p.x_m for p in seen] == [None] * delay + [
-        float(k) for k in range(6 - delay)
-    ]
+    assert [p and p.x_m for p in seen] == [None] * delay + [float(k) for k in range(6 - delay)]
 
 
 def test_a_frame_without_robot_arrives_as_none():
     vision = Vision(NO_ERRORS, 1)
     seen = [vision.frame(p, ZERO) for p in (Posture(1.0, 0.0, 0.0), None, Posture(2.0, 0.0, 0.0), None)]
-    assert [None if p is None else p.x_m for p in seen] == [None, 1.0, None, 2.0]
+    assert [p and p.x_m for p in seen] == [None, 1.0, None, 2.0]
 
 
 @pytest.mark.parametrize("name", ["position_m", "heading_rad", "pixel_m"])

@@ -86,31 +86,27 @@ def with_values_changed(world, saved, draw):
         spans = _spans(world, state)
         if not spans:
             break
-        begin, end, form = draw.choice(spans)
-        state = state[:begin] + _other(state[begin:end], form, draw) + state[end:]
+        begin, end, field = draw.choice(spans)
+        state = state[:begin] + _other(state[begin:end], field.kind.form, draw) + state[end:]
     return sealed(world.identity(), state)
 
 
 def with_field(world, saved, path, data):
     """A saved world in which the bytes of one field are others, and the checksum is right."""
-    state, at = opened(saved, world.identity()), 0
-    for field in world.state.fields:
-        _, end = field.kind.decode(state, at)
-        if field.path == path:
-            return sealed(world.identity(), state[:at] + data + state[end:])
-        at = end
-    raise KeyError(path)
+    state = opened(saved, world.identity())
+    ((begin, end),) = [(begin, end) for begin, end, field in _spans(world, state) if field.path == path]
+    return sealed(world.identity(), state[:begin] + data + state[end:])
 
 
 def _spans(world, state):
-    """Begin, end and form of every field, as far as the bytes can be read."""
+    """Begin and end of every field, as far as the bytes can be read."""
     spans, at = [], 0
     for field in world.state.fields:
         try:
             _, end = field.kind.decode(state, at)
         except ValueError:
             return spans
-        spans.append((at, end, field.kind.form))
+        spans.append((at, end, field))
         at = end
     return spans
 

@@ -58,21 +58,14 @@ def world(program, latency_s=0.003, seed=5):
     return World(scenario_file.parse(SCENARIO.format(latency_s=latency_s), "fast"), seed, image)
 
 
-def state(world):
-    return snapshot(world)
-
-
-def edges_kept(world):
-    return max(len(robot.board.cpu.txd.edges()) for robot in world.networks[0].robots)
-
-
 def test_a_firmware_that_toggles_txd_in_every_cycle_runs_on():
     fast = world(EVERY_CYCLE)
     for _ in range(3):
         fast.step()
     assert fast.tick == 3 * CONTROL_PERIOD_TICKS
     assert fast.counters()["firmware"]["faults"] == 0
-    assert edges_kept(fast) < 0.003 * 24e6 / 12 + 2500 / 12 + 2100
+    kept = max(len(robot.board.cpu.txd.edges()) for robot in fast.networks[0].robots)
+    assert kept < 0.003 * 24e6 / 12 + 2500 / 12 + 2100
 
 
 class Unheard(Network):
@@ -104,7 +97,7 @@ def test_any_cutting_gives_the_same_state(cut_ticks):
     whole.run_to(end)
     for tick in itertools.chain(range(cut_ticks, end, cut_ticks), [end]):
         cut.run_to(tick)
-    assert state(cut) == state(whole)
+    assert snapshot(cut) == snapshot(whole)
     assert whole.networks[0].uplink.now > CONTROL_PERIOD_TICKS  # it has heard something early
 
 
@@ -126,5 +119,5 @@ def test_any_rate_saved_and_cut_anywhere_goes_on_with_the_same_bits(slow, wait, 
         other = world(program, latency_s)
         other.load(cut.save())
         cut = other
-    assert state(cut) == state(whole)
+    assert snapshot(cut) == snapshot(whole)
     assert cut.step().digest == whole.step().digest

@@ -3,6 +3,7 @@
 `python -m benchmarks.figures fig6 fig7 fig8 fig9 fig10 --seeds 0-49` measures what a few seeds hold here.
 """
 
+import json
 from functools import cache
 
 import msgspec
@@ -36,10 +37,7 @@ def as_they_are(name):
 
 def set_to(gains):
     """The setting that gives a scenario these gains."""
-    table = ", ".join(
-        f"{key} = {f'{value!r}' if not isinstance(value, str) else chr(34) + value + chr(34)}"
-        for key, value in msgspec.to_builtins(gains).items()
-    )
+    table = ", ".join(f"{key} = {json.dumps(value)}" for key, value in msgspec.to_builtins(gains).items())
     return [f"network.robot.controller={{{table}}}"]
 
 
@@ -55,14 +53,8 @@ def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_pape
 @pytest.mark.parametrize("name", CAPTIONS)
 def test_the_figures_differ_in_start_path_and_law_alone(name):
     six, scenario, kept = load("fig6").scenario, load(name).scenario, only_robot("fig6")
-    robot = msgspec.structs.replace(
-        only_robot(name),
-        start_error_x_cm=kept.start_error_x_cm,
-        start_error_y_cm=kept.start_error_y_cm,
-        start_error_theta_rad=kept.start_error_theta_rad,
-        reference=kept.reference,
-        controller=kept.controller,
-    )
+    changed = "start_error_x_cm", "start_error_y_cm", "start_error_theta_rad", "reference", "controller"
+    robot = msgspec.structs.replace(only_robot(name), **{key: getattr(kept, key) for key in changed})
     network = msgspec.structs.replace(scenario.networks[0], robot=(robot,))
     assert msgspec.structs.replace(scenario, name=six.name, title=six.title, networks=(network,)) == six
 

@@ -209,33 +209,21 @@ def test_keys_are_in_centimetres_and_degrees():
 
 
 @pytest.mark.parametrize(
-    ("points", "keys", "expected"),
+    ("points", "closed", "expected"),
     [
-        ([(0.0, 0.0)], {}, "points: there are 1; give 2 to 200"),
-        ([(float(8 * k), 0.0) for k in range(201)], {}, "points: there are 201; give 2 to 200"),
-        ([(0.0, 0.0), (7.4, 0.0)], {}, r"points\[1\]: less than 7.5 cm from points\[0\]"),
-        (
-            [(0.0, 0.0), (50.0, 0.0), (5.0, 3.0)],
-            {"closed": True},
-            r"points\[0\]: less than 7.5 cm from points\[2\]",
-        ),
-        ([(0.0, math.nan), (50.0, 0.0)], {}, r"points\[0\].y_cm: nan is not a number that can be used"),
-        ([(0.0, 0.0), (50.0, 0.0, math.inf)], {}, r"points\[1\].heading_deg: inf is not a number"),
-        (
-            [(0.0, 0.0), (40.0, 0.0), (0.0, 0.0)],
-            {},
-            r"points\[1\]: the path turns back on itself here; give heading",
-        ),
-        (
-            [(0.0, 0.0), (40.0, 0.0), (8.0, 0.0)],
-            {},
-            r"points\[\d\]: behind this point, at .* bends to less than 1 cm",
-        ),
+        ([(0, 0)], False, "points: there are 1; give 2 to 200"),
+        ([(8 * k, 0) for k in range(201)], False, "points: there are 201; give 2 to 200"),
+        ([(0, 0), (7.4, 0)], False, r"points\[1\]: less than 7.5 cm from points\[0\]"),
+        ([(0, 0), (50, 0), (5, 3)], True, r"points\[0\]: less than 7.5 cm from points\[2\]"),
+        ([(0, math.nan), (50, 0)], False, r"points\[0\].y_cm: nan is not a number that can be used"),
+        ([(0, 0), (50, 0, math.inf)], False, r"points\[1\].heading_deg: inf is not a number"),
+        ([(0, 0), (40, 0), (0, 0)], False, r"points\[1\]: the path turns back on itself here; give heading"),
+        ([(0, 0), (40, 0), (8, 0)], False, r"points\[\d\]: behind this point, at .* bends to less than 1 cm"),
     ],
 )
-def test_points_that_make_no_path_are_named(points, keys, expected):
+def test_points_that_make_no_path_are_named(points, closed, expected):
     with pytest.raises(ValueError, match=expected):
-        ref(*points, **keys)
+        ref(*points, closed=closed)
 
 
 def test_a_way_there_and_back_is_a_path_with_headings():

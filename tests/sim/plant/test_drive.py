@@ -113,10 +113,6 @@ def test_tiny_euler_steps_go_the_same_way(magnitudes):
     assert drive.pose_at(drive.tick) == pytest.approx((naive.x, naive.y, naive.theta), abs=2e-4)
 
 
-def battery_work_j(winding, charge_c):
-    return 7.2 * (winding.drive * charge_c if winding.drive else -abs(charge_c))
-
-
 def energy_j(drive):
     currents = (drive.left_winding.current_a, drive.right_winding.current_a)
     return drive.body.kinetic_energy_j() + sum(0.5 * 45e-6 * i * i for i in currents)
@@ -130,13 +126,12 @@ def test_no_step_ends_with_more_energy_than_it_had_and_the_battery_gave(steps):
         for side, value in enumerate((left, right)):
             drive.set_bridge(drive.tick, side, 1 if value else 0, 1 if value >= 0 else 0)
         before, work = energy_j(drive), 0.0
-        for winding, speed in (
-            (drive.left_winding, drive.body.left_rad_s),
-            (drive.right_winding, drive.body.right_rad_s),
-        ):
+        windings = (drive.left_winding, drive.right_winding)
+        for winding, speed in zip(windings, (drive.body.left_rad_s, drive.body.right_rad_s), strict=True):
             copy = Winding(PROMPT)
             restore(copy, snapshot(winding))
-            work += battery_work_j(copy, copy.step(ticks, 6.92e-3 * speed) / 24e6)
+            charge_c = copy.step(ticks, 6.92e-3 * speed) / 24e6
+            work += 7.2 * (copy.drive * charge_c if copy.drive else -abs(charge_c))
         drive.advance(drive.tick + ticks)
         assert energy_j(drive) <= before + work + 1e-15
 
