@@ -123,6 +123,8 @@ class Adapter:
             if given.get("stopOnEntry", True) is False:
                 self._go("continue", False)
             else:
+                if session.why == "begin":
+                    self.its.step("into")  # to the first line of C: an editor shows nothing of what is before
                 self._stopped(session.why, "\n".join(session.said))
 
         self.begin = begin

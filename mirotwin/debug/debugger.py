@@ -223,10 +223,10 @@ class Debugger:
         return self._at_end() or INTERRUPTED
 
     def step(self, how: How, back: bool = False, by_instruction: bool = False) -> str:
-        """One line, or one instruction where it asks for that or no line is known. Raises BadInput."""
+        """One line, or one instruction where it asks for that or the image has no lines. Raises BadInput."""
         if how == "out":
             return self._out_back() if back else self._out()
-        if by_instruction or self.symbols.line(self.cpu.pc) is None:
+        if by_instruction or not self.symbols.line_begins:
             return self._instruction_back(how) if back else self._instruction(how)
         return self._line_back(how) if back else self._line(how)
 
@@ -309,13 +309,18 @@ class Debugger:
         return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, cpu.pc == entry)
 
     def _line(self, how: How) -> str:
-        """On to where another line begins, of this function, of its caller, or (`into`) of one that it calls."""
+        """On to where another line begins, of this function, of its caller, or (`into`) of one that it calls.
+
+        Code without lines, as before `main`, is passed to the next line, wherever that is.
+        """
         here = self._line_of(self.cpu)
-        without_lines = [frame.pc for frame in self.frames()[1:] if self.symbols.line(frame.pc) is None]
+        over = how == "over" and here.line is not None
+        callers = self.frames()[1:] if here.line is not None else []
+        without_lines = [frame.pc for frame in callers if self.symbols.line(frame.pc) is None]
 
         def ask(core: Core) -> object:
             there = self._line_of(core.cpu)
-            if there.base > here.base and (how == "over" or there.level != here.level):
+            if there.base > here.base and (over or there.level != here.level):
                 return None
             return there if there[:2] != here[:2] else None
 

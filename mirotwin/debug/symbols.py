@@ -50,7 +50,7 @@ class Symbols:
         self.variables = variables_of(image)
         self.blocks = parse_blocks(read_text(image.path.with_suffix(".cdb")))
         self.overlays = map_overlays(read_text(image.path.with_suffix(".map")))
-        self.line_begins = dict(self.debug.lines)
+        self.line_begins = {at: line for at, line in self.debug.lines if self.line(at) is not None}
         functions = [first for first, _ in self.names.functions]
         known = [*self.unwinder.heights, *self.line_begins, *functions]
         self.instructions = instructions_of(image.code, image.used, known)

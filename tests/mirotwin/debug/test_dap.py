@@ -165,7 +165,7 @@ def test_null_stands_for_arguments_that_are_left_out(adapter):
 
 def test_breakpoints_that_cannot_be_set_say_why(adapter):
     _, client = adapter
-    client.begin(subject="fig6")
+    client.begin(subject="fig6", at="0s")
     source = {"path": "/elsewhere/failsafe.c"}
     lines = [
         {"line": 146, "condition": "age >"},
@@ -251,6 +251,13 @@ def test_it_listens_on_a_port_of_this_machine_alone():
         assert client.begin(subject="fig6", at="20ms")["reason"] == "goto"
         client.ask("disconnect")
     assert ended(process)[0] == 0
+
+
+def test_an_editor_begins_at_the_first_line_of_c(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    first = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]
+    assert (first["name"], first["source"]["name"]) == ("main", "main.c")
 
 
 def test_robots_are_threads_that_stop_together(adapter, short):

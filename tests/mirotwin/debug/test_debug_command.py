@@ -42,6 +42,13 @@ def test_a_scenario_is_stepped_through_forwards_and_backwards(console):
     assert lines[14] == " #0  failsafe.c:145 in failsafe_tick"
 
 
+@pytest.mark.parametrize("step", ["step", "next"])
+def test_a_step_passes_the_code_without_lines_before_main(console, step):
+    lines = console("fig6", lines=[step, f"r{step}"]).splitlines()
+    assert "  step: main.c:" in lines[2]
+    assert "  the run begins here: 0x0000 in reset" in lines[4]
+
+
 def test_a_recording_opens_at_a_time(console, finished):
     out = console(finished, "--at", "100ms", "--slot", 2, lines=["print tick >= 2400000"])
     assert "net0/robot2  goto: main.c:" in out
