@@ -26,7 +26,7 @@ cdef class Filter:
     cpdef after_load(self)
     @cython.locals(i=int, j=int)
     cpdef check_positive(self)
-    @cython.locals(lower='double *', i=int, j=int, k=int, rest=double)
+    @cython.locals(lower='double *', i=int, j=int, k=int)
     cdef int factorise(self, int size) except -1
     @cython.locals(total=double, index=int)
     cpdef bint finite(self)
@@ -37,17 +37,16 @@ cdef class Filter:
     cpdef forget(self, int index, double variance)
     @cython.locals(motion=Motion)
     cpdef run(self, double to_s)
-    @cython.locals(motion=Motion, time_s=double, middle=double, p='double *', n=int, i=int, j=int, rim_m2=double,
-                   sin=double, cos=double)
+    @cython.locals(motion=Motion, time_s=double, middle=double, p='double *', n=int, i=int, j=int)
     cpdef predict(self, double to_s)
     cpdef loosen(self, double position_m2, double heading_rad2)
     @cython.locals(p='double *', column='double *', i=int, j=int)
     cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
     @cython.locals(kept=double, p='double *', index=int, other=int)
     cdef int warp_on(self, double way_m) noexcept
-    @cython.locals(p='double *', lower='double *', i=int, j=int, rest=double)
+    @cython.locals(p='double *', lower='double *', i=int, j=int)
     cpdef decompose(self, double position_m2, double heading_rad2)
-    @cython.locals(lower='double *', a=double, b=double, c=double)
+    @cython.locals(lower='double *', a=double, b=double)
     cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,
                            double heading_rad2) except? -7.5
     @cython.locals(p='double *')
@@ -56,6 +55,6 @@ cdef class Filter:
     cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
     @cython.locals(innovation=double, believed=cython.bint)
     cpdef bint count(self, int extra, double extra_m, double variance, double gate)
-    @cython.locals(p='double *', column='double *', n=int, i=int, j=int, whole=double, gain=double, against=double)
+    @cython.locals(p='double *', column='double *', n=int, i=int, j=int)
     cdef int correct(self, int one, int other, double innovation, double variance) except -1
     cdef int tidy(self) except -1

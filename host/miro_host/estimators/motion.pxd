@@ -16,18 +16,16 @@ cdef class Motion:
     cdef readonly double x_by_theta, x_by_left, x_by_right, y_by_theta, y_by_left, y_by_right
     cdef readonly double theta_by_left, theta_by_right
 
-    @cython.locals(index=int, left_start=double, right_start=double)
+    @cython.locals(index=int)
     cpdef remember(self, double left_m_s, double right_m_s, double period_s)
-    @cython.locals(length_s=double)
     cdef double speed(self, double start_m_s, double to_m_s, double time_s) noexcept
     cpdef begin(self, double x_m, double y_m, double theta_rad)
-    @cython.locals(index=int, oldest=double, since_s=double, begin_s=double, end_s=double)
+    @cython.locals(index=int)
     cpdef run(self, double from_s, double to_s, double effect_s, double period_s, double left_factor,
               double right_factor)
     @cython.locals(left_start=double, left_to=double, right_start=double, right_to=double, left_s=double,
                    right_s=double, first_s=double, second_s=double, from_s=double, to_s=double, half_s=double,
                    left=double, right=double, doubt_s=double, cut=int)
     cdef int hold(self, int index, double begin_s, double end_s, double left_factor, double right_factor) except -1
-    @cython.locals(length=double, half=double, sin=double, cos=double, shrink=double, dx=double, dy=double,
-                   middle_left=double, middle_right=double)
+    @cython.locals(length=double)
     cdef int arc(self, double left_m, double right_m, double left_factor, double right_factor) except -1

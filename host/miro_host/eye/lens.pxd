@@ -13,7 +13,5 @@ cdef class Lens:
 
     @cython.locals(right=double, up=double, drawn=double, radius=double, nearer=double, square=double, growth=double, fall=double)
     cpdef slopes(self, double u, double v)
-    @cython.locals(fall_m=double)
     cpdef (double, double) ground(self, double u, double v, double z_m)
-    @cython.locals(dx=double, dy=double, dz=double, depth=double, right=double, up=double, square=double, scale=double)
     cpdef (double, double) pixel(self, double x_m, double y_m, double z_m)

@@ -23,7 +23,6 @@ cdef class Patches:
 
     @cython.locals(region=int)
     cpdef int look(self, bytearray pixels, int left, int top, int width, int height) except -1
-    @cython.locals(u=double, v=double, x_m=double, y_m=double)
     cdef void place(self, int region) except *
     @cython.locals(area=int)
     cdef bint is_patch(self, int region) noexcept
@@ -34,9 +33,9 @@ cdef class Patches:
     cpdef int choose(self, int team, int identity) except -1
     @cython.locals(region=int)
     cdef bint is_whole(self, int patch, int kind) noexcept
-    @cython.locals(dx=double, dy=double, square=double)
+    @cython.locals(dx=double, dy=double)
     cdef bint fits(self, int one, int other) noexcept
-    @cython.locals(off=double, dx=double, dy=double)
+    @cython.locals(off=double)
     cdef void take(self, int one, int other) noexcept
     @cython.locals(least=double, at=int, tx=double, ty=double, ix=double, iy=double, off=double)
     cdef double off_m(self, int team, int identity) noexcept

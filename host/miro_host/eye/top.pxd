@@ -11,11 +11,7 @@ cdef class Top:
     cdef readonly Lens lens
     cdef readonly double angle_rad, distance_m, z_m, area_px, side_px
 
-    @cython.locals(sin=double, cos=double, dx=double, dy=double)
     cpdef (double, double, double, double) places(self, double x_m, double y_m, double theta_rad)
-    @cython.locals(team_x=double, team_y=double, identity_x=double, identity_y=double)
     cpdef (double, double, double) posture(self, double team_u, double team_v, double identity_u, double identity_v)
-    @cython.locals(least=double)
     cpdef double confidence(self, double gap_m, int team_area, int identity_area) except? -1.0
-    @cython.locals(share=double)
     cdef double margin(self, int area) except? -1.0

@@ -15,6 +15,4 @@ cdef class Track:
     cpdef remember(self, sighting)
     cdef double unseen_s(self, long long tick) noexcept
     cdef double reach_m(self, long long tick) noexcept
-    @cython.locals(gap_s=double, ahead=double, dx=double, dy=double, length_m=double, most_m=double, ahead_x=double,
-                   turn=double)
     cpdef (double, double, double) predicted(self, long long tick)

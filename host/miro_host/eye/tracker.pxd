@@ -40,14 +40,13 @@ cdef class Tracker:
     cdef Pair _followed(self, frame, long long tick, int slot)
     @cython.locals(whole_width=int, whole_height=int, width=int, height=int, left=int, top=int, pixels=bytearray)
     cpdef bytearray _look(self, frame, double u, double v, int size, int slot)
-    @cython.locals(team_x=double, team_y=double, identity_x=double, identity_y=double)
+    @cython.locals(team_x=double, team_y=double, identity_x=double)
     cpdef _expect(self, double x_m, double y_m, double theta_rad)
     @cython.locals(patches=Patches, track=Track)
     cpdef Pair _chosen(self, bytearray pixels, long long tick, int slot)
     @cython.locals(slot=int, other=int, pair=Pair, rival=Pair)
     cdef _part(self, list pairs)
-    @cython.locals(patches=Patches, u=double, v=double, identity_u=double, identity_v=double, x_m=double, y_m=double,
-                   theta_rad=double)
+    @cython.locals(patches=Patches, u=double, v=double, identity_u=double, identity_v=double, x_m=double, y_m=double)
     cdef Pair _pair(self, bytearray pixels, long long tick, int slot)
     @cython.locals(patches=Patches, regions=Regions, weighing=Weighing, team=int, identity=int, team_u=double,
                    team_v=double, identity_u=double, identity_v=double, left=int, top=int)
@@ -55,5 +54,4 @@ cdef class Tracker:
 
 
 cdef bint _same_patch(Pair one, Pair other) noexcept
-@cython.locals(first=double)
 cdef int _first(double middle, int size, int whole) noexcept

@@ -28,7 +28,7 @@ cdef class Sensor:
     @cython.locals(light=double)
     cpdef begin(self, long long frame, long long tick, int samples)
     @cython.locals(twice_hz='long long', turns=double, phase=double, sine_end=double, sine_begin=double, cosine=double,
-                   mean=double, _=double)
+                   mean=double)
     cdef double _lamps(self, long long tick) except? -1.0
     @cython.locals(red=int, green=int, blue=int)
     cdef void put(self, int column, long long total, long long light) noexcept

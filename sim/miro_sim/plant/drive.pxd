@@ -31,13 +31,13 @@ cdef class Winding:
     cdef inline void _ask(self, int wanted) noexcept
     cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(wait=int, charge=double)
+    @cython.locals(wait=int)
     cdef inline double _pass(self, int ticks, double emf_v) noexcept
     @cython.locals(start=double, kind=cython.longlong, final=double, end=double, goes_on=cython.bint)
     cdef inline double _flow(self, int ticks, double emf_v) noexcept
-    @cython.locals(start=double, ratio=double, crossing=double)
+    @cython.locals(start=double)
     cdef double _through_zero(self, int ticks, double emf_v, double final, double tau) noexcept
-    @cython.locals(kind=cython.longlong, final=double)
+    @cython.locals(kind=cython.longlong)
     cdef inline double _onward(self, double ticks, double emf_v) noexcept
 
 @cython.final
@@ -93,8 +93,8 @@ cdef class DifferentialDrive(Plant):
     @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, other=cython.longlong)
     cpdef int run_pulses(self, long long tick) except -1
     @cython.final
-    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int, steps=cython.int, constant=double,
-                   impulse=double, left_charge=double, right_charge=double)
+    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int,
+                   steps=cython.int, constant=double, impulse=double, left_charge=double)
     cdef void _run(self, long long until, long long last, long long left_tick, long long right_tick) except *
     @cython.final
     @cython.locals(still=cython.bint)
