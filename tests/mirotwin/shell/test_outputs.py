@@ -4,6 +4,8 @@ import os
 
 import pytest
 
+from tests.mirotwin.conftest import hex_file
+
 WITH_FORCE = {
     "export": ("export", "RUN", "--as", "pcapng", "--out"),
     "export for Foxglove": ("export", "RUN", "--as", "foxglove", "--out"),
@@ -17,6 +19,8 @@ WITH_FORCE = {
     "points of camera calibrate": ("camera", "calibrate", "--scenario", "fig6", "--out", "OTHER", "--points-out"),
 }  # fmt: skip
 COMMANDS = {**WITH_FORCE, "fw run": ("fw", "run", "IMAGE", "--dump")}
+SAYS_C = bytes.fromhex("759850 758bff 758920 d28e 7599c3 80fe")
+"""Sends a character at once: a place is refused before the firmware runs."""
 READING = [name for name, words in COMMANDS.items() if {"RUN", "IMAGE"} & set(words)]
 
 
@@ -25,7 +29,7 @@ def line(finished, tmp_path):
     """The words of a command that writes to a place, and reads the recording or the image of that name beside it."""
     given = {"RUN": tmp_path / "run.mcap", "IMAGE": tmp_path / "a.ihx", "OTHER": tmp_path / "other"}
     given["RUN"].write_bytes((finished / "run.mcap").read_bytes())
-    given["IMAGE"].write_text(":0200000080FE80\n:00000001FF\n")
+    hex_file(given["IMAGE"], SAYS_C)
     return lambda name, place: [*(given.get(word, word) for word in COMMANDS[name]), place]
 
 
