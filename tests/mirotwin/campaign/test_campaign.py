@@ -223,18 +223,12 @@ def test_ten_million_runs_have_to_be_asked_for(tmp_path):
 STEPS = """
 scenario = "silent"
 duration_s = 0.3
-[[step]]
-pause_ms = 40
-[[step]]
-send = "team"
-left_m_s = 0.2
-right_m_s = 0.2
-[[step]]
-expect = "wheels"
-left_m_s = 0.2
-within_ms = WITHIN
-[[step]]
-check = { inside_pitch = true }
+step = [
+    { pause_ms = 40 },
+    { send = "team", left_m_s = 0.2, right_m_s = 0.2 },
+    { expect = "wheels", left_m_s = 0.2, within_ms = WITHIN },
+    { check = { inside_pitch = true } },
+]
 """
 
 

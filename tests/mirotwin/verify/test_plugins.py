@@ -10,17 +10,14 @@ from tests.host import distribution
 CHECKS = '''
 from mirotwin.verify.checks.interface import Check, Monitor
 
-
 class Own(Check, frozen=True, kw_only=True):
     KIND = "safety"
 
     def monitor(self, subject):
         return globals()[f"{type(self).__name__}Monitor"](self, subject)
 
-
 class Raises(Own, frozen=True, kw_only=True, tag="raises"):
     pass
-
 
 class RaisesMonitor(Monitor):
     def period(self, record, tick):
@@ -29,63 +26,49 @@ class RaisesMonitor(Monitor):
     def helper(self):
         raise RuntimeError("oh")
 
-
 class GivesNone(Own, frozen=True, kw_only=True, tag="gives_none"):
     def monitor(self, subject):  # none
         RaisesMonitor(self, subject)
 
-
 class Hears(Own, frozen=True, kw_only=True, tag="hears_wrong"):
     pass
-
 
 class HearsMonitor(Monitor):
     EVENTS = ("comand",)
 
-
 class HearsText(Own, frozen=True, kw_only=True, tag="hears_text"):
     pass
-
 
 class HearsTextMonitor(Monitor):
     EVENTS = "command"
 
-
 class NoSuper(Own, frozen=True, kw_only=True, tag="no_super"):
     pass
-
 
 class NoSuperMonitor(Monitor):
     def __init__(self, check, subject):
         pass
 
-
 class NoKind(Check, frozen=True, kw_only=True, tag="no_kind"):
     pass
-
 
 class Objects(Own, frozen=True, kw_only=True, tag="objects"):
     def problem(self, end_tick):
         return 1 // 0
 
-
 class Leaves(Own, frozen=True, kw_only=True, tag="leaves"):
     def __post_init__(self):
         raise SystemExit(0)
 
-
 class FloatTick(Own, frozen=True, kw_only=True, tag="float_tick"):
     pass
-
 
 class FloatTickMonitor(Monitor):
     def period(self, record, tick):
         self.fail(tick / 2, "one thing", "another")
 
-
 class Still(Own, frozen=True, kw_only=True, tag="stands_still"):
     """No robot hears a frame: one that does what it should."""
-
 
 class StillMonitor(Monitor):
     EVENTS = ("frame",)
@@ -97,26 +80,21 @@ class StillMonitor(Monitor):
 LAWS = """
 from miro_host.laws.interface import Law, LawParameters
 
-
 class Raises(LawParameters, frozen=True, tag="law_raises"):
     def law(self):
         return RaisesLaw(self)
-
 
 class RaisesLaw(Law):
     def step(self, given):
         return {}["speed"]
 
-
 class Nothing(LawParameters, frozen=True, tag="law_none"):
     def law(self):
         return None
 
-
 class Says(LawParameters, frozen=True, tag="law_says"):
     def __post_init__(self):
         raise ValueError("how: is refused")
-
 
 class Refuses(LawParameters, frozen=True, tag="law_refuses"):
     def __post_init__(self):
@@ -125,11 +103,9 @@ class Refuses(LawParameters, frozen=True, tag="law_refuses"):
 ESTIMATORS = """
 from miro_host.estimators.interface import Estimator, EstimatorParameters
 
-
 class Raises(EstimatorParameters, frozen=True, tag="estimator_raises"):
     def estimator(self):
         return RaisesEstimator(self)
-
 
 class RaisesEstimator(Estimator):
     def step(self, given):

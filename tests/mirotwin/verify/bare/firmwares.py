@@ -11,9 +11,7 @@ SETB TR1
 MOV SCON,#50h
 """
 
-POLLS = (
-    SERIAL
-    + """
+POLLS = f"""{SERIAL}
 loop:
 JNB RI,$
 CLR RI
@@ -23,11 +21,9 @@ INC 30h
 CJNE A,#21h,loop
 LJMP 4000h
 """
-)
 """Echoes; at `!` it runs into nothing. 30h counts. It never sleeps."""
 
-SLEEPS = (
-    """
+SLEEPS = f"""
 LJMP start
 ORG 23h
 JBC RI,got
@@ -47,15 +43,12 @@ answer:
 MOV SBUF,A
 RETI
 start:
-"""
-    + SERIAL
-    + """
+{SERIAL}
 MOV IE,#90h
 sleep:
 ORL PCON,#01h
 SJMP sleep
 """
-)
 """Echoes from its interrupt and sleeps; at `!` it runs into nothing, at `?` it is stuck. XRAM 1234h: the last one."""
 
 DEAF = "loop:\nSJMP loop"

@@ -81,30 +81,27 @@ def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
         assert not (tmp_path / "was_run").exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("#: [bare]", "#: [set]", "says nothing of a bare processor"),
-        ("bit_ticks = 1152", "bit_ticks = 1", "a bit of 1 ticks is outside 32..24000000"),
-        ("bit_ticks = 1152", "", "says no bit_ticks; give the length of a bit"),
-        (
-            "bit_ticks = 1152",
-            'bit_ticks = "x"',
-            "header: bare.bit_ticks: expected a whole number, got a string; mend the value",
-        ),
-        ("crystal_hz = 24000000", "crystal_hz = 5", "crystal 5 Hz is outside"),
-        ("begin_tick = ", "begin_tick = -1", "begin_tick -1"),
-        ("no_fault = true", "no_fault = true\n#: never_sleeps = true", "a case has one check"),
-    ],
-)
-def test_a_header_that_says_nothing_useful_is_refused(tmp_path, old, new, said):
+NO_TICKS = ("bit_ticks = 1152", 'bit_ticks = "x"')
+HEADERS = {
+    ("#: [bare]", "#: [set]"): "says nothing of a bare processor",
+    ("bit_ticks = 1152", "bit_ticks = 1"): "a bit of 1 ticks is outside 32..24000000",
+    ("bit_ticks = 1152", ""): "says no bit_ticks; give the length of a bit",
+    NO_TICKS: "header: bare.bit_ticks: expected a whole number, got a string; mend the value",
+    ("crystal_hz = 24000000", "crystal_hz = 5"): "crystal 5 Hz is outside",
+    ("begin_tick = ", "begin_tick = -1"): "begin_tick -1",
+    ("no_fault = true", "no_fault = true\n#: never_sleeps = true"): "a case has one check",
+}
+
+
+@pytest.mark.parametrize("change", HEADERS)
+def test_a_header_that_says_nothing_useful_is_refused(tmp_path, change):
     path = case(tmp_path, b"ab!")
     text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
+    assert change[0] in text
+    path.write_text(text.replace(*change))
     with pytest.raises(BadInput) as caught:
         rerun_bare_case(path, image(SLEEPS))
-    assert said in str(caught.value)
+    assert HEADERS[change] in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
 

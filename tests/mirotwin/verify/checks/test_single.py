@@ -138,17 +138,10 @@ def test_a_robot_without_supply_or_in_reset_is_not_asked():
 TWO = """
 name = "two"
 duration_s = 1.0
-[[network]]
-[[network.robot]]
-slot = 0
-reference.kind = "line"
-[[network.robot]]
-slot = 2
-reference = {kind = "line", start_y_cm = 40.0}
-[[network]]
-[[network.robot]]
-slot = 1
-reference = {kind = "line", start_y_cm = 60.0}
+network = [
+    { robot = [{ slot = 0, reference.kind = "line" }, { slot = 2, reference = { kind = "line", start_y_cm = 40 } }] },
+    { robot = [{ slot = 1, reference = { kind = "line", start_y_cm = 60 } }] },
+]
 """
 
 
