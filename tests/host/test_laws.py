@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot, values
 from miro_host.integrator import Integrator, Limits
+from miro_host.laws.epsilon_tracking import RETUNED
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
@@ -83,17 +84,17 @@ def test_before_the_first_measurement_every_inner_value_is_there_and_zero():
     assert pilot(Leaky(LeakyParameters())).update(None, 0.0).inner == {"error_m": 0.0}
 
 
-def test_what_a_law_remembers_is_saved_with_the_pilot_and_makes_the_same_commands():
-    whole, cut = pilot(Leaky(LeakyParameters())), pilot(Leaky(LeakyParameters()))
-    postures = [Posture(0.01 * k, 0.0, 0.1 * k) for k in range(8)]
+@pytest.mark.parametrize("parameters", [LeakyParameters(), RETUNED], ids=["leaky", "epsilon tracking"])
+def test_what_a_law_remembers_is_saved_with_the_pilot_and_makes_the_same_commands(parameters):
+    whole, cut = pilot(parameters.law()), pilot(parameters.law())
+    postures = [Posture(0.01 * k, 0.0, math.remainder(0.9 * k, math.tau)) for k in range(8)]
     commands = [whole.update(posture, k * PERIOD_S) for k, posture in enumerate(postures)]
     for k, posture in enumerate(postures):
-        other = pilot(Leaky(LeakyParameters()))
+        other = pilot(parameters.law())
         restore(other, snapshot(cut))
         cut = other
         assert cut.update(posture, k * PERIOD_S) == commands[k]
     assert snapshot(cut) == snapshot(whole)
-    assert cut.law.periods == 8
 
 
 def test_a_law_without_memory_adds_nothing_to_the_state():
