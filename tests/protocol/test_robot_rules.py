@@ -1,6 +1,6 @@
 """Which frames are fresh, and the rules by which robots are judged, beside their slow twins on histories of chance."""
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
@@ -137,6 +137,7 @@ def test_stale_frames_neither_move_the_window_nor_restart_the_clock():
 
 
 @given(st.lists(st.tuples(st.integers(0, 63), st.integers(0, 200 * MS))), st.integers(0, 50))
+@example(frames=[(0, 0)], place=0)  # of one that has judged none
 def test_a_restored_snapshot_judges_the_rest_alike(frames, place):
     fresh, other, tick, verdicts = Freshness(), Freshness(), 0, []
     for number, (seq, pause) in enumerate(frames):
