@@ -9,26 +9,17 @@ cdef double _EXP_MAX, _EXP_MIN, _L1, _L2, _L3, _L4, _L5, _L6, _L7, _SQRT2, _LARG
 cpdef double sin(double x) except? -7.5
 cpdef double cos(double x) except? -7.5
 cpdef (double, double) sincos(double x)
-@cython.locals(scaled=double, n=cython.longlong, count=double, rest=double, carry=double, before=double,
-               high=double, low=double, z=double, w=double, v=double, r=double, half=double, top=double,
-               s=double, c=double, quadrant=cython.int)
+@cython.locals(n=cython.longlong, quadrant=cython.int)
 cdef (double, double) sincos_within(double x) noexcept
 cpdef double atan(double x) except? -7.5
-@cython.locals(high=double, low=double, rest=double, z=double, w=double, odd=double, even=double)
 cdef double _atan(double a, double more, bint supplement) except? -7.5
-@cython.locals(spread=double, q_high=double, q_low=double, x_high=double, x_low=double, product=double, error=double)
 cdef double _lost(double q, double y, double x) except? -7.5
-@cython.locals(angle=double, ratio=double, more=double)
 cpdef double atan2(double y, double x) except? -7.5
-@cython.locals(scaled=double, turns=double, result=double)
 cpdef double wrap_pi(double x) except? -7.5
 cpdef double exp(double x) except? -7.5
-@cython.locals(k=cython.int, high=double, low=double, r=double, t=double, c=double)
+@cython.locals(k=cython.int)
 cdef double exp_within(double x) noexcept
 cdef double _scaled(double y, int k) noexcept
-@cython.locals(power=double)
 cdef double _power_of_two(int k) noexcept
 cpdef double log(double x) except? -7.5
-@cython.locals(k=cython.int, f=double, s=double, z=double, w=double, even=double, odd=double, half=double,
-               powers=double)
 cdef double log_within(double x) noexcept

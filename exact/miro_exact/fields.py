@@ -215,11 +215,8 @@ class Row:
         self.split = split
         self.make = make
         self.layout: struct.Struct | None = None
-        self.head: struct.Struct | None = None  # of a row whose last column alone is bytes: all before these
         if "s" not in self.form:
             self.layout = struct.Struct(f"<{self.form}")
-        elif self.form.index("s") == len(self.form) - 1:
-            self.head = struct.Struct(f"<{self.form[: len(self.form) - 1]}I")
         self.reals = [index for index, kind in enumerate(kinds) if kind[0] == "d"]
         self.bounded = [
             (index, *column.bounds)
@@ -240,9 +237,6 @@ class Row:
                 raise ValueError("holds NaN")
         if self.layout is not None:
             return self.layout.pack(*cells)
-        if self.head is not None:
-            data: bytes = cells[len(cells) - 1]
-            return self.head.pack(*cells[: len(cells) - 1], len(data)) + data
         return b"".join([column.encode(cell) for column, cell in zip(self.columns, cells, strict=True)])
 
     def decode(self, data: bytes, at: int) -> tuple[Any, int]:

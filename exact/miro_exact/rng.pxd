@@ -8,7 +8,6 @@ cdef long long _INDICES
 cdef u64_t[::1] _TABLE
 
 
-@cython.locals(p0=u64_t, p1=u64_t)
 cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t k1) noexcept
 
 
@@ -16,7 +15,8 @@ cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t
 cdef class Stream:
     cdef readonly object seed
     cdef readonly str name
-    cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
+    cdef u64_t k0, k1, name0, name1, block
+    cdef u64_t words[4]
     cdef long long group
     cdef unsigned int draws[16]
     cdef unsigned int least
@@ -26,7 +26,6 @@ cdef class Stream:
     cdef void blocks(self, u64_t first, int count, unsigned int *words) noexcept
     @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, lane=int, _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
     cdef void _four_blocks(self, u64_t first, unsigned int *four) noexcept
-    @cython.locals(place=int)
     cdef void _load_draws(self, long long group) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1
@@ -34,8 +33,6 @@ cdef class Stream:
     cpdef u64_t u64(self, long long index) except? 1
     cdef u64_t pair(self, u64_t kind, long long index) except? 1
     cpdef int bit(self, long long index) except -1
-    @cython.locals(part=int)
     cpdef u64_t bits(self, long long index) except? 1
     cpdef double uniform(self, long long index) except? -1.0
-    @cython.locals(draw=u64_t, magnitude=u64_t, low=u64_t, cell=int, above=int, half=int, fraction=double, middle=double, place=double, z=double)
     cpdef double gauss(self, long long index) except? -1000.0

@@ -56,8 +56,7 @@ class Stream:
     """
 
     NOT_STATE = (
-        "block", "draws", "group", "k0", "k1", "least", "name", "name0", "name1", "seed", "w0",
-        "w1", "w2", "w3",
+        "block", "draws", "group", "k0", "k1", "least", "name", "name0", "name1", "seed", "words",
     )  # fmt: skip
 
     def __init__(self, seed: int, name: str) -> None:
@@ -71,7 +70,7 @@ class Stream:
         self.name0 = int.from_bytes(tag[0:4], "little")
         self.name1 = int.from_bytes(tag[4:8], "little")
         self.block = _NO_BLOCK
-        self.w0 = self.w1 = self.w2 = self.w3 = 0
+        self.words = [0] * 4
         self.group = -1  # number of the 16 draws of `u32` that are in `draws`
         self.draws = [0] * 16
         self.least = 0  # of them
@@ -80,9 +79,9 @@ class Stream:
         return f"Stream({self.seed}, {self.name!r})"
 
     def load(self, block: int) -> None:
-        """Puts block `kind << 56 | number` into w0..w3; the last one stays there as a cache."""
+        """Puts block `kind << 56 | number` into `words`; the last one stays there as a cache."""
         if block != self.block:
-            self.w0, self.w1, self.w2, self.w3 = philox4x32(
+            self.words[0], self.words[1], self.words[2], self.words[3] = philox4x32(
                 block & _WORD, block >> 32, self.name0, self.name1, self.k0, self.k1
             )
             self.block = block
@@ -171,9 +170,8 @@ class Stream:
         if index < 0 or index >= _INDICES:
             raise ValueError(f"{self!r}: index {index} is outside 0 .. 2^56 - 1")
         self.load(kind | (index >> 1))
-        if index & 1 == 0:
-            return (self.w1 << 32) | self.w0
-        return (self.w3 << 32) | self.w2
+        first = (index & 1) << 1
+        return (self.words[first + 1] << 32) | self.words[first]
 
     def bit(self, index: int) -> int:
         """One random bit, 0 or 1."""
@@ -184,14 +182,7 @@ class Stream:
         if index < 0 or index >= _INDICES:
             raise ValueError(f"{self!r}: index {index} is outside 0 .. 2^56 - 1")
         self.load(_BITS | (index >> 7))
-        part = (index >> 5) & 3
-        if part == 0:
-            return self.w0
-        if part == 1:
-            return self.w1
-        if part == 2:
-            return self.w2
-        return self.w3
+        return self.words[(index >> 5) & 3]
 
     def uniform(self, index: int) -> float:
         """A multiple of 2^-53 in [0, 1): the upper 53 bits of `u64(index)`, exact."""

@@ -37,13 +37,13 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, cached_property, partial
 from itertools import groupby
-from operator import attrgetter, itemgetter
-from struct import Struct, calcsize
+from operator import itemgetter
+from struct import calcsize
 from typing import Any, NamedTuple, Protocol
 
 from miro_exact import engine
 from miro_exact.domain import DomainError
-from miro_exact.fields import FLAG, TICK, Items, Kind, Number, Octets, Queue, Row, Rows, out_of_range
+from miro_exact.fields import FLAG, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
 
 __all__ = [
     "FLAG",
@@ -180,43 +180,6 @@ class One:
 
     def put(self) -> None:
         self.kind.write(self.part, self.name, self.value)
-
-
-class Some:
-    """Numbers of one part that is not compiled: packed together, because that is quicker."""
-
-    def __init__(self, fields: list[StateField]) -> None:
-        self.fields = fields
-        self.part = fields[0].part
-        numbers = [field.kind for field in fields if isinstance(field.kind, Number)]
-        self.layout = Struct("<" + "".join(number.code for number in numbers))
-        self.get = attrgetter(*(field.name for field in fields))
-        self.reals = [index for index, number in enumerate(numbers) if number.is_real]
-        self.bounded = [(index, *number.bounds) for index, number in enumerate(numbers) if number.bounds]
-        self.names = [field.name for field in fields]
-        self.values: tuple[Any, ...] = ()
-
-    def pack(self) -> bytes:
-        values = self.get(self.part)
-        for index in self.reals:
-            if values[index] != values[index]:
-                raise DomainError(f"{self.fields[index].path} is NaN")
-        return self.layout.pack(*values)
-
-    def check(self, data: bytes, at: int) -> int:
-        end = at + self.layout.size
-        if end > len(data):
-            raise ValueError(f"{self.fields[0].path} ends {end - len(data)} bytes early")
-        self.values = self.layout.unpack_from(data, at)
-        for index, low, high in self.bounded:
-            if not low <= self.values[index] <= high:
-                what = out_of_range(self.values[index], low, high)
-                raise ValueError(f"{self.fields[index].path} {what}")
-        return end
-
-    def put(self) -> None:
-        for name, value in zip(self.names, self.values, strict=True):
-            setattr(self.part, name, value)
 
 
 class Flat:
@@ -357,8 +320,6 @@ def _own_entries(cls: type, part: Any) -> Iterator[Group | Below]:
         fields = [(name, kind_of(declared[name])) for name in names]
         if sort == "compiled":
             yield Group(fields, counts, _layout(part, fields, places))
-        elif sort == "numbers":
-            yield Group(fields, counts)
         else:
             yield from [Group([field], counts) for field in fields]
 
@@ -367,10 +328,7 @@ def _sort(name: str, declared: Any, places: dict[str, Any]) -> str:
     """What a field is packed with."""
     if isinstance(declared, type | list):
         return "below"
-    kind = kind_of(declared)
-    if name in places and isinstance(kind, (Number, Queue)):
-        return "compiled"
-    return "numbers" if isinstance(kind, Number) and not kind.count else "alone"
+    return "compiled" if name in places and isinstance(kind_of(declared), (Number, Queue)) else "alone"
 
 
 def _places(cls: type, part: Any) -> dict[str, tuple[int, str, int]]:
@@ -423,10 +381,9 @@ def _blocks(pieces: list[Piece]) -> list[Known]:
             memory = Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group])
             found.append(Known(memory, counts, [(memory, "", MEMORY, b"", 0, None)]))
             continue
-        for fields in map(Piece.fields, group):
+        for (field,) in map(Piece.fields, group):
             before = found[len(found) - 1].block if found else None
-            block = Some(fields) if len(fields) > 1 else One(fields[0], before)
-            found.append(Known(block, counts, _attributes(fields)))
+            found.append(Known(One(field, before), counts, _attributes(field)))
     return found
 
 
@@ -446,11 +403,9 @@ def _together(known: list[Known]) -> list[Packed]:
     return found
 
 
-def _attributes(fields: list[StateField]) -> list[tuple[Any, ...]] | None:
-    """What `memory.Attributes` has to know of fields that are Python objects; None where it cannot pack them."""
-    if engine.active() != "compiled" or not all(_is_simple(field.kind) for field in fields):
-        return None
-    return [_attribute(field) for field in fields]
+def _attributes(field: StateField) -> list[tuple[Any, ...]] | None:
+    """What `memory.Attributes` has to know of a field that is a Python object; None where it cannot pack it."""
+    return [_attribute(field)] if engine.active() == "compiled" and _is_simple(field.kind) else None
 
 
 def _is_simple(kind: Kind) -> bool:
