@@ -7,11 +7,10 @@ from typing import Literal
 import msgspec
 
 from miro_protocol.table import VELOCITY_SATURATION
-from miro_robot.lm629.orders import WheelOrders
+from miro_robot.lm629.orders import WheelOrder
 from miro_sim.world.events import SIDES, Event
 
 _LOW_BITS = 56
-_WHATS: tuple[Literal["off", "stop", "drive"], ...] = ("off", "stop", "drive")
 
 
 def saturated(word: int) -> int:
@@ -47,28 +46,22 @@ class Orders:
     """The orders to both wheels of a robot, from its `command` events. `last`: the one in force, by side."""
 
     def __init__(self) -> None:
-        self.wheels = WheelOrders()
+        self.wheels = {side: WheelOrder() for side in SIDES}
         self.last = {side: Order(0, side, "off") for side in SIDES}
 
     def take(self, event: Event) -> Order | None:
         """The order that this command gives, if it gives one."""
-        wheels, side = self.wheels, SIDES.index(event.side)
+        wheel = self.wheels[event.side]
         value = int.from_bytes(event.data, "big")
-        high, low = value >> _LOW_BITS, value & (1 << _LOW_BITS) - 1
-        if not wheels.take(side, event.opcode, len(event.data), high, low):
+        if not wheel.take(event.opcode, len(event.data), value >> _LOW_BITS, value & (1 << _LOW_BITS) - 1):
             return None
-        what, velocity, acceleration = (
-            _WHATS[wheels.what(side)],
-            wheels.velocity(side),
-            wheels.acceleration(side),
-        )
-        order = Order(event.tick, event.side, what, velocity, acceleration, wheels.abrupt(side))
+        order = Order(event.tick, event.side, wheel.what, wheel.velocity, wheel.acceleration, wheel.abrupt)
         self.last[event.side] = order
         return order
 
     def words(self) -> tuple[int, int]:
         """The velocities of both wheels as the radio carries them, a number that no frame holds where it cannot."""
-        return self.wheels.word(0), self.wheels.word(1)
+        return self.wheels["left"].word(), self.wheels["right"].word()
 
     def moving(self) -> list[str]:
         """The sides whose wheel is told to turn."""

@@ -40,7 +40,7 @@ from miro_protocol.table import (
 from miro_robot import event_log
 from miro_robot.board import Board
 from miro_robot.harness.harness import LiveOracle
-from miro_robot.lm629.orders import OFF, WheelOrders
+from miro_robot.lm629.orders import WheelOrder
 from miro_robot.lm629.signals import COMMAND_ERROR
 
 NAMES = (
@@ -69,7 +69,6 @@ _SEQS = SEQ_MODULUS
 _SLOT_MASK = SLOT_MASK
 _RECEIVED, _SENT, _COMMAND, _FAULT = event_log.RECEIVED, event_log.SENT, event_log.COMMAND, event_log.FAULT
 _COMMAND_ERROR = COMMAND_ERROR
-_OFF_ORDER = OFF
 
 
 class FastOracle(LiveOracle):
@@ -79,7 +78,7 @@ class FastOracle(LiveOracle):
         *LiveOracle.NOT_STATE,
         *("board", "log", "slot", "robots", "payload", "window", "telemetry", "freshness", "read", "pc"),
         *("accepted", "decided", "up_tick", "fresh_tick", "fresh_seq", "told_tick", "left", "right"),
-        *("orders", "driving", "origin", "answers", "stop", "off"),
+        *("left_order", "right_order", "driving", "origin", "answers", "stop", "off"),
     )
 
     def __init__(self, board: Board, slot: int, robots: int) -> None:
@@ -93,7 +92,8 @@ class FastOracle(LiveOracle):
         self.window = Scanner(form)
         self.telemetry = Scanner(TELEMETRY)
         self.freshness = Freshness()
-        self.orders = WheelOrders()
+        self.left_order = WheelOrder()
+        self.right_order = WheelOrder()
         self.driving = DrivingRule()
         self.origin = OriginRule(TICKS_PER_SECOND)
         self.answers = AnswerRule()
@@ -129,7 +129,8 @@ class FastOracle(LiveOracle):
         self.freshness.last_seq = None
         self.fresh_tick = -1
         self.told_tick = -1
-        self.orders.begin()
+        self.left_order.begin()
+        self.right_order.begin()
         self.driving.begin()
         self.answers.begin()
         self.stop.begin(-1)
@@ -183,7 +184,7 @@ class FastOracle(LiveOracle):
     def _pass(self, tick: int) -> None:
         """What had to have happened before `tick`."""
         if self.told_tick >= 0 and tick > self.told_tick:
-            if not self.origin.allows(self.told_tick, self.orders.word(0), self.orders.word(1)):
+            if not self.origin.allows(self.told_tick, self.left_order.word(), self.right_order.word()):
                 self._found(_ACCEPTS, self.told_tick)
             self.told_tick = -1
         if tick > self.driving.deadline:
@@ -196,15 +197,13 @@ class FastOracle(LiveOracle):
 
     def _pass_silence(self, code: int, silence: SilenceRule, tick: int) -> None:
         if silence.is_over(tick):
-            if not (self._is_over(code, 0) and self._is_over(code, 1)):
+            if not (self._is_over(code, self.left_order) and self._is_over(code, self.right_order)):
                 self._found(code, silence.deadline())
             silence.begin(-1)
 
-    def _is_over(self, code: int, side: int) -> bool:
+    def _is_over(self, code: int, order: WheelOrder) -> bool:
         """Whether a wheel is as it has to be in silence: stopped or off."""
-        if code == _OFF:
-            return self.orders.what(side) == _OFF_ORDER
-        return not self.orders.moves(side)
+        return order.what == "off" if code == _OFF else not order.moves()
 
     # ---- what is received ----------------------------------------------------------------------------------
 
@@ -245,10 +244,10 @@ class FastOracle(LiveOracle):
 
     def _stops_already(self) -> bool:
         """Whether velocity 0 is wanted, and both wheels are told so with their loops closed."""
-        for side in range(2):
-            if self.orders.what(side) == _OFF_ORDER or self.orders.moves(side):
-                return False
-        return self.left == 0 and self.right == 0
+        if self.left_order.what == "off" or self.right_order.what == "off":
+            return False
+        told = self.left_order.moves() or self.right_order.moves()
+        return not told and self.left == 0 and self.right == 0
 
     def _read_pair(self) -> bool:
         """What the team frame has for this robot; False if it is not to be acted on."""
@@ -270,23 +269,22 @@ class FastOracle(LiveOracle):
     # ---- what the wheels are told, and what is sent --------------------------------------------------------
 
     def _command(self, tick: int, code: int, size: int, high: int, low: int) -> None:
-        side = code >> 8 & 1
-        moved = self.orders.moves(side)
-        driven = self.orders.what(side) != _OFF_ORDER
-        if self.orders.take(side, code & 0xFF, size, high, low):
-            self._order(tick, side, moved, driven)
+        order = self.right_order if code >> 8 & 1 else self.left_order
+        moved, driven = order.moves(), order.what != "off"
+        if order.take(code & 0xFF, size, high, low):
+            self._order(tick, order, moved, driven)
 
-    def _order(self, tick: int, side: int, moved: bool, driven: bool) -> None:
+    def _order(self, tick: int, order: WheelOrder, moved: bool, driven: bool) -> None:
         """A wheel is told something. `moved`, `driven`: whether it was told to turn, or to keep its loop closed."""
-        if self.orders.moves(side):
+        if order.moves():
             self.told_tick = tick
             if not self.driving.may_move(tick):
                 self._found(_MOVES, tick)
         elif moved and self.stop.is_early(tick):
             self._found(_STOPS, tick)
-        if driven and self.orders.what(side) == _OFF_ORDER and self.off.is_early(tick):
+        if driven and order.what == "off" and self.off.is_early(tick):
             self._found(_OFF, tick)
-        self.driving.told(self.orders.word(0), self.orders.word(1))
+        self.driving.told(self.left_order.word(), self.right_order.word())
 
     def _sent(self, tick: int, value: int) -> None:
         if not self.answers.character():

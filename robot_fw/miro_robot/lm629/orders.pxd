@@ -1,36 +1,21 @@
-cimport cython
-
-cdef int _OFF, _STOP, _DRIVE, _RESET, _STT, _LTRJ, _NO_WORD
-cdef int _WORD_OFF, _WORD_STOPS, _WORD_ABRUPT, _VELOCITY_MODE, _FORWARD
-cdef int _ACCELERATION, _ACCELERATION_RELATIVE, _VELOCITY, _VELOCITY_RELATIVE
+cdef int ACCELERATION, FORWARD, MOTOR_OFF, STOP_ABRUPTLY, STOPS, VELOCITY, VELOCITY_MODE
+cdef int _RESET, _STT, _LTRJ, _NO_WORD
 
 
-cdef class WheelOrders:
-    cdef int _control[2]
-    cdef long long _velocity[2]
-    cdef long long _acceleration[2]
-    cdef int _what[2]
-    cdef long long _speed[2]
-    cdef long long _started[2]
-    cdef int _abrupt[2]
+cdef class WheelOrder:
+    cdef readonly str what
+    cdef readonly long long velocity, acceleration
+    cdef readonly bint abrupt
+    cdef int _control
+    cdef long long _velocity, _acceleration
 
-    @cython.locals(side=int)
-    cpdef void begin(self) noexcept
-    cpdef bint take(self, int side, int opcode, int size, long long high, long long low) noexcept
-    cpdef int what(self, int side) noexcept
-    cpdef long long velocity(self, int side) noexcept
-    cpdef long long acceleration(self, int side) noexcept
-    cpdef bint abrupt(self, int side) noexcept
-    cpdef bint moves(self, int side) noexcept
-    cpdef int word(self, int side) noexcept
-    cdef void _reset(self, int side) noexcept
-    @cython.locals(control=int, backward=bint)
-    cdef void _start(self, int side) noexcept
-    @cython.locals(control=int, at=int, value='long long', relative=bint)
-    cdef void _load(self, int side, int size, long long high, long long low) noexcept
+    cpdef begin(self)
+    cpdef bint take(self, int opcode, int size, long long high, long long low) except -1
+    cpdef bint moves(self) noexcept
+    cpdef int word(self) noexcept
+    cdef int _start(self) except -1
+    cdef int _load(self, int size, long long high, long long low) except -1
 
 
-@cython.locals(value='long long', place=int)
 cdef long long _number(int size, long long high, long long low, int at) noexcept
-@cython.locals(behind=int)
 cdef int _byte(int size, long long high, long long low, int at) noexcept
