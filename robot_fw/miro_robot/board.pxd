@@ -13,26 +13,23 @@ cdef int _CS, _BOTH_STROBES, _RST
 cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
 cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE, PORTS
-cdef long long CYCLE_TICKS, FAR
+cdef long long CYCLE_TICKS
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT, _REPLAN
 cdef long long RESET_PULSE_TICKS, _NEVER
 
 
 cdef class Board(Bus):
-    cdef public object wiring
-    cdef public object faults
+    cdef public object wiring, faults
     cdef public Probe probe
     cdef readonly object symbols
     cdef readonly Cpu cpu
-    cdef readonly Lm629 left
-    cdef readonly Lm629 right
+    cdef readonly Lm629 left, right
     cdef readonly Plant plant
     cdef readonly EventLog log
     cdef public bint stop_on_fault
     cdef public long long fault_count
     cdef long long horizon
-    cdef int strobed
-    cdef int reset_pins
+    cdef int strobed, reset_pins
     cdef long long busy_writes
     cdef int contention
     cdef readonly int held
@@ -45,10 +42,8 @@ cdef class Board(Bus):
     cdef unsigned char bridge_enable[2]
     cdef unsigned char bridge_sign[2]
     cdef unsigned char hi_seen[2]
-    cdef readonly BusTiming left_timing
-    cdef readonly BusTiming right_timing
-    cdef int on_movx_bus
-    cdef int data_bank
+    cdef readonly BusTiming left_timing, right_timing
+    cdef int on_movx_bus, data_bank
     cdef unsigned short pin_levels[3328]
     cdef int pin_banks
     cdef int pin_bank[10]
@@ -64,31 +59,26 @@ cdef class Board(Bus):
     cdef int hi_inverted[8]
     cdef int hi_side[8]
 
-    @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int, levels=cython.int)
+    @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int)
     cdef _resolve_outputs(self, wiring)
-    @cython.locals(earliest_tick=cython.longlong, latest_tick=cython.longlong, next_tick=cython.longlong)
+    @cython.locals(latest_tick=cython.longlong)
     cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
-    @cython.locals(stopped=cython.int)
     cpdef int run(self, long long until_tick) except -1
-    @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
     cpdef int go_on(self, long long until_tick) except -1
     @cython.final
     cdef inline long long _next_interrupt(self, Lm629 chip) noexcept
-    @cython.locals(now=cython.longlong)
     cpdef int sync(self, long long tick) except -1
     cpdef byte_received(self, int value, int stop, long long tick)
     cpdef byte_sent(self, int value, long long tick)
     cpdef port_written(self, int port, int latch, long long tick)
     @cython.final
-    @cython.locals(changed=cython.int)
     cdef inline int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.final
-    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, broken=cython.int, too=cython.int)
     cdef inline bint _only_levels(self, long long tick) except -1
-    @cython.locals(start=cython.longlong, page=cython.int, heard=bint, index=cython.int, value=cython.int)
+    @cython.locals(heard=bint)
     cpdef int movx_read(self, int address, long long tick) except -1
-    @cython.locals(start=cython.longlong, page=cython.int, changed=bint, index=cython.int)
+    @cython.locals(changed=bint)
     cpdef movx_write(self, int address, int value, long long tick)
     cdef int _put_address(self, int address, long long start) except -1
     cpdef fault(self, int kind, int pc, long long tick)
@@ -97,29 +87,20 @@ cdef class Board(Bus):
     @cython.final
     cdef int _set_bridge(self, long long tick, int side, Lm629 chip) except -1
     @cython.final
-    @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
     cdef int _drive_interrupts(self, long long tick) except -1
     @cython.final
-    @cython.locals(pins=cython.int, index=cython.int, bank=cython.int)
     cdef inline int _pins(self) noexcept
     @cython.final
     cdef inline int _strobes(self, int pins) noexcept
     @cython.final
-    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, at_left=cython.int, at_right=cython.int, levels=cython.int, due=cython.longlong)
     cdef inline int _drive_chips(self, long long tick) except -1
     @cython.final
-    @cython.locals(busy_writes=cython.longlong)
     cdef inline int _watch_bus(self, int both_drive, long long tick) except -1
     @cython.final
-    @cython.locals(broken=cython.int, too=cython.int)
-    cdef inline int _watch_timing(self, int left, int right, int at_left, int at_right, int data, long long tick) except -1
-    @cython.final
-    cdef inline int _watch_chip(self, BusTiming timing, int pins, int strobed, int data, long long tick) noexcept
+    cdef inline int _note_timing(self, int left, int right, long long tick) except -1
     @cython.final
     cdef int _reset_chips(self, int left, int right, long long tick) except -1
     @cython.final
     cdef inline bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
-    @cython.locals(left=cython.int, right=cython.int)
-    cdef int _watch_sample(self, long long tick) except -1
     cdef int _timing_fault(self, int limit, long long ticks, long long tick) except -1
     cdef int _note(self, int kind, int pc, long long tick, detail) except -1

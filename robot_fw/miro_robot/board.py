@@ -356,11 +356,7 @@ class Board(Bus):
         self.left.port.ps, self.left.port.data = left, data
         self.right.port.ps, self.right.port.data = right, data
         broken = self.left_timing.left_alone(tick, left, data)
-        too = self.right_timing.left_alone(tick, right, data)
-        if broken:
-            self._timing_fault(broken, self.left_timing.ticks, tick)
-        elif too:
-            self._timing_fault(too, self.right_timing.ticks, tick)
+        self._note_timing(broken, self.right_timing.left_alone(tick, right, data), tick)
         return True
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
@@ -404,7 +400,7 @@ class Board(Bus):
         value = self.bank[self.data_bank] & self.bus_levels if heard else 0xFF
         if self.on_movx_bus:
             if heard:
-                self._watch_sample(tick)
+                self._note_timing(self.left_timing.sampled(tick), self.right_timing.sampled(tick), tick)
             self._set_pins(3, self.bank[3] | _RD, start + _STROBE_ENDS)
             self._set_pins(2, page, start + _PAGE_ENDS)
         return value
@@ -436,7 +432,9 @@ class Board(Bus):
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
         at_left = self._strobes(left) | self.left.port.writing | self.left.port.reading
         at_right = self._strobes(right) | self.right.port.writing | self.right.port.reading
-        self._watch_timing(left, right, at_left, at_right, data, tick)
+        broken = self.left_timing.pins(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
+        too = self.right_timing.pins(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
+        self._note_timing(broken, too, tick)
         if (pins ^ self.reset_pins) & _BOTH_RST:
             self._reset_chips(left, right, tick)
             self.reset_pins = pins & _BOTH_RST
@@ -483,19 +481,12 @@ class Board(Bus):
             self.fault(FaultKind.BUS_CONTENTION, self.cpu.at, tick)
         self.contention = both_drive
 
-    def _watch_timing(self, left: int, right: int, at_left: int, at_right: int, data: int, tick: int) -> None:
-        """Checks the timing of both chips; an edge that violates it at both is one fault."""
-        broken = self._watch_chip(self.left_timing, left, at_left, data, tick)
-        too = self._watch_chip(self.right_timing, right, at_right, data, tick)
-        if broken:
-            self._timing_fault(broken, self.left_timing.ticks, tick)
-        elif too:
-            self._timing_fault(too, self.right_timing.ticks, tick)
-
-    def _watch_chip(self, timing: BusTiming, pins: int, strobed: int, data: int, tick: int) -> int:
-        if strobed:
-            return timing.pins(tick, pins & 1, pins >> 1 & 1, pins >> 2 & 1, pins >> 3 & 1, data)
-        return timing.left_alone(tick, pins >> 3 & 1, data)
+    def _note_timing(self, left: int, right: int, tick: int) -> None:
+        """Limits that an edge breaks at the chips, if any: at both it is one fault."""
+        if left:
+            self._timing_fault(left, self.left_timing.ticks, tick)
+        elif right:
+            self._timing_fault(right, self.right_timing.ticks, tick)
 
     def _reset_chips(self, left: int, right: int, tick: int) -> None:
         """/RST of a chip has another level."""
@@ -509,14 +500,6 @@ class Board(Bus):
     def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:
         """/RST rises, less than 8 LM629 clocks after it fell."""
         return level != 0 and chip.reset_level == 0 and tick - chip.reset_tick < RESET_PULSE_TICKS
-
-    def _watch_sample(self, tick: int) -> None:
-        """The CPU takes the byte that a chip drives."""
-        left, right = self.left_timing.sampled(tick), self.right_timing.sampled(tick)
-        if left:
-            self._timing_fault(left, self.left_timing.ticks, tick)
-        elif right:
-            self._timing_fault(right, self.right_timing.ticks, tick)
 
     def _timing_fault(self, limit: int, ticks: int, tick: int) -> None:
         self._note(FaultKind.LM629_TIMING, self.cpu.at, tick, LIMITS[limit].breach(ticks))

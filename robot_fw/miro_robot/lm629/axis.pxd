@@ -1,7 +1,7 @@
 cimport cython
 
 from miro_robot.event_log cimport EventLog
-from miro_robot.lm629.buffers cimport FilterBuffer, TrajectoryBuffer
+from miro_robot.lm629.buffers cimport FilterBuffer, TrajectoryBuffer, signed_31
 from miro_robot.lm629.encoder cimport Encoder
 from miro_robot.lm629.host_port cimport HostPort
 from miro_robot.lm629.pid cimport Pid
@@ -16,16 +16,13 @@ cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTO
 cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY
 
 
-cdef long long _signed_31(long long value) noexcept
 cdef int _side(long long value) noexcept
 
 
 cdef class MotorAxis:
     cdef readonly object options
-    cdef readonly long long reset_ticks, reset_pulse_ticks
-    cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats
-    cdef readonly int clamps, rates_of_buffer, starts_at_sample, stop_bits_stay, stop_lifts_refusal, unsent_is_working
-    cdef readonly int relative_to_real, relative_to_target
+    cdef readonly long long reset_ticks
+    cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats, clamps
     cdef readonly HostPort port
     cdef readonly Encoder encoder
     cdef readonly ProfileGenerator trajectory
@@ -41,43 +38,29 @@ cdef class MotorAxis:
     cdef public int mode, reset_level, start_taken
     cdef public long long threshold, real_position, real_velocity, index_position, breakpoint
     cdef public int breakpoint_armed, breakpoint_side, excessive
-    cdef public int pwm, pwm_magnitude, sign, hi
-    cdef public int pulses
+    cdef public int pwm, pwm_magnitude, sign, hi, pulses
 
     cpdef set_reset(self, long long tick, int level)
     cpdef _enter_reset(self, int mode, int lock, long long until_tick)
-    @cython.final
     cdef _end_reset(self, long long now)
-    @cython.locals(now=cython.longlong)
     cpdef int advance(self, long long tick) except -1
-    @cython.locals(now=cython.longlong, passed=cython.longlong)
     cpdef rest(self, long long tick)
     @cython.final
     cdef inline int _period(self, long long now) except -1
-    @cython.final
     cdef bint _late_pulse_begins(self, long long now) noexcept
     @cython.final
-    @cython.locals(flags=cython.int, drive=cython.int, error=cython.longlong)
     cdef inline int _sample(self, long long now) except -1
     @cython.final
-    @cython.locals(flags=cython.int, moved=cython.longlong)
     cdef inline int _latch_position(self, long long now) noexcept
-    @cython.final
-    @cython.locals(profile=ProfileGenerator, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
+    cdef long long _relative_base(self) except? 1
     @cython.final
-    cdef long long _relative_base(self) noexcept
-    @cython.final
-    @cython.locals(flags=cython.int)
     cdef inline int _step_profile(self) noexcept
     @cython.final
-    @cython.locals(flags=cython.int, before=cython.int)
     cdef inline int _check_error(self, long long error) noexcept
     @cython.final
-    @cython.locals(top=cython.int)
     cdef inline void _put_out(self, int drive) noexcept
     @cython.final
-    @cython.locals(side=cython.int)
     cdef inline int _check_breakpoint(self) noexcept
     cpdef int set_breakpoint(self, long long place) except -1
     cpdef long long live_position(self, long long tick) except? -1

@@ -10,7 +10,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import EventLog
 from miro_robot.lm629 import buffers, host_port, signals
-from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer
+from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer, signed_31
 from miro_robot.lm629.encoder import Encoder
 from miro_robot.lm629.host_port import HostPort
 from miro_robot.lm629.options import DEFAULT_OPTIONS, TICKS_PER_CLOCK, Lm629Options
@@ -39,11 +39,6 @@ _TRAJECTORY_COMPLETE = signals.TRAJECTORY_COMPLETE
 _VELOCITY_MODE, _FORWARD = buffers.VELOCITY_MODE, buffers.FORWARD
 """They stand in the same place in the control word and in the signals register."""
 _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY = buffers.MOTOR_OFF, buffers.STOP_ABRUPTLY, buffers.STOP_SMOOTHLY
-
-
-def _signed_31(value: int) -> int:
-    """Sign-extended from bit 30: the chip's position space."""
-    return ((value + 0x40000000) & 0x7FFFFFFF) - 0x40000000
 
 
 def _side(value: int) -> int:
@@ -81,32 +76,14 @@ class MotorAxis:
         "excessive": FLAG,
     }
     NOT_STATE = (
-        *("options", "reset_ticks", "reset_pulse_ticks"),
-        *(
-            "rounds_down",
-            "negative",
-            "pulse_late",
-            "keeps_sign",
-            "open_clears",
-            "error_full",
-            "error_repeats",
-            "clamps",
-            "rates_of_buffer",
-            "starts_at_sample",
-            "stop_bits_stay",
-            "stop_lifts_refusal",
-            "unsent_is_working",
-            "relative_to_real",
-            "relative_to_target",
-        ),
-        *("commands", "encoder_edges", "log", "side", "pulses"),
+        *("options", "reset_ticks", "rounds_down", "negative", "pulse_late", "keeps_sign", "open_clears"),
+        *("error_full", "error_repeats", "clamps", "commands", "encoder_edges", "log", "side", "pulses"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
     )
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
         self.options = options
         self.reset_ticks = options.reset_clocks * TICKS_PER_CLOCK
-        self.reset_pulse_ticks = options.reset_pulse_clocks * TICKS_PER_CLOCK
         self.rounds_down = 1 if options.output_rounding == "down" else 0
         self.negative = options.sign_of_negative
         self.pulse_late = 1 if options.pulse_at == "end" else 0
@@ -115,13 +92,6 @@ class MotorAxis:
         self.error_full = 1 if options.error_test == "full" else 0
         self.error_repeats = 1 if options.error_flag_repeats else 0
         self.clamps = 1 if options.out_of_range == "clamped" else 0
-        self.rates_of_buffer = 1 if options.relative_rates == "buffer" else 0
-        self.starts_at_sample = 1 if options.start_takes == "sample" else 0
-        self.stop_bits_stay = 1 if options.stop_bits_stay else 0
-        self.stop_lifts_refusal = 1 if options.stop_lifts_refusal else 0
-        self.unsent_is_working = 1 if options.unsent == "working" else 0
-        self.relative_to_real = 1 if options.relative_base == "real" else 0
-        self.relative_to_target = 1 if options.relative_base == "target" else 0
         self.port = HostPort(options.busy_clocks * TICKS_PER_CLOCK, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
@@ -156,7 +126,7 @@ class MotorAxis:
             self.threshold = 0x7FFF
             self.encoder.settle(tick)
             self._enter_reset(_HELD, host_port.HARDWARE_RESET, _NEVER)
-        elif tick - self.reset_tick >= self.reset_pulse_ticks:
+        elif tick - self.reset_tick >= self.options.reset_pulse_clocks * TICKS_PER_CLOCK:
             self.mode = _RESETTING
             self.next_tick = (tick + 3 & -4) + self.reset_ticks
 
@@ -203,7 +173,7 @@ class MotorAxis:
         self.encoder.settle(now)
         self.encoder.clear(self.options.reset_clears_index)
         if not self.encoder.armed:
-            self.signals.clear_bits(_ACQUIRE_INDEX)
+            self.signals.word &= ~_ACQUIRE_INDEX
         self.port.reset(host_port.OPEN)
         self.signals.after_reset()
         self.hi = self.signals.word >> 15
@@ -277,7 +247,7 @@ class MotorAxis:
         drive = 0
         if not self.signals.word & _MOTOR_OFF:
             flags |= self._step_profile()
-            error = _signed_31((self.trajectory.position >> 16) - self.real_position)
+            error = signed_31((self.trajectory.position >> 16) - self.real_position)
             flags |= self._check_error(error)
             if not self.signals.word & _MOTOR_OFF:
                 drive = self.pid.step(error)
@@ -289,7 +259,7 @@ class MotorAxis:
         self._put_out(drive)
         flags |= self._check_breakpoint()
         self.signals.raise_flags(flags)
-        self.signals.clear_bits(_UPDATE_PENDING)
+        self.signals.word &= ~_UPDATE_PENDING
         self.hi = self.signals.word >> 15
 
     def _latch_position(self, now: int) -> int:
@@ -297,13 +267,13 @@ class MotorAxis:
         self.encoder.settle(now)
         flags = 0
         if self.encoder.caught:
-            self.index_position = _signed_31(self.real_position + self.encoder.caught_counts)
+            self.index_position = signed_31(self.real_position + self.encoder.caught_counts)
             self.encoder.caught = 0
-            self.signals.clear_bits(_ACQUIRE_INDEX)
+            self.signals.word &= ~_ACQUIRE_INDEX
             flags = _INDEX_ACQUIRED
         self.real_velocity = self.encoder.counts
         moved = self.real_position + self.encoder.counts
-        self.real_position = _signed_31(moved)
+        self.real_position = signed_31(moved)
         self.encoder.counts = 0
         if self.real_position != moved:
             flags |= _WRAP_AROUND
@@ -313,8 +283,8 @@ class MotorAxis:
         """The accepted STT takes effect. Returns flags."""
         profile = self.trajectory
         buffer = self.trajectory_buffer
-        if self.starts_at_sample:
-            buffer.take(self.stop_bits_stay)
+        if self.options.start_takes == "sample":
+            buffer.take(self.options.stop_bits_stay)
         control = buffer.taken_control
         profile.target = buffer.resolve(self._relative_base())
         profile.acceleration = buffer.taken_acceleration
@@ -322,15 +292,15 @@ class MotorAxis:
         profile.velocity_mode = 1 if control & _VELOCITY_MODE else 0
         profile.forward = 1 if control & _FORWARD else 0
         self.start_taken = 0
-        self.signals.clear_bits(_MOTOR_OFF | _ON_TARGET | _VELOCITY_MODE | _FORWARD)
-        self.signals.set_bits(control & (_VELOCITY_MODE | _FORWARD))
+        self.signals.word &= ~(_MOTOR_OFF | _ON_TARGET | _VELOCITY_MODE | _FORWARD)
+        self.signals.word |= control & (_VELOCITY_MODE | _FORWARD)
         if control & _TURN_OFF:
-            self.signals.set_bits(_MOTOR_OFF)
+            self.signals.word |= _MOTOR_OFF
             return _TRAJECTORY_COMPLETE
         if control & _STOP_ABRUPTLY:
             at_real = self.options.abrupt_stop_at == "real"
             profile.stop_abruptly(self.real_position if at_real else profile.position >> 16)
-            self.signals.set_bits(_ON_TARGET)
+            self.signals.word |= _ON_TARGET
             return _TRAJECTORY_COMPLETE
         if control & _STOP_SMOOTHLY:
             profile.stop_smoothly()
@@ -347,9 +317,9 @@ class MotorAxis:
 
     def _relative_base(self) -> int:
         """What a relative position adds to (T6)."""
-        if self.relative_to_real:
+        if self.options.relative_base == "real":
             return self.real_position
-        if self.relative_to_target and not self.trajectory.velocity_mode:
+        if self.options.relative_base == "target" and not self.trajectory.velocity_mode:
             return self.trajectory.target
         return self.trajectory.position >> 16
 
@@ -357,7 +327,7 @@ class MotorAxis:
         flags = 0
         if self.trajectory.moving:
             if self.trajectory.step():
-                self.signals.set_bits(_ON_TARGET)
+                self.signals.word |= _ON_TARGET
                 flags = _TRAJECTORY_COMPLETE
             if self.trajectory.crossed:
                 flags |= _WRAP_AROUND
@@ -373,7 +343,7 @@ class MotorAxis:
             return 0
         flags = _EXCESSIVE_ERROR if self.error_repeats or not before else 0
         if self.signals.word & _STOP_ON_ERROR:
-            self.signals.set_bits(_MOTOR_OFF)
+            self.signals.word |= _MOTOR_OFF
             flags |= _TRAJECTORY_COMPLETE
         return flags
 
@@ -397,11 +367,11 @@ class MotorAxis:
 
     def set_breakpoint(self, place: int) -> None:
         """Arms it; which side of it the axis is on now decides when it is passed."""
-        self.breakpoint = _signed_31(place)
+        self.breakpoint = signed_31(place)
         self.breakpoint_side = _side(self.real_position - self.breakpoint)
         self.breakpoint_armed = 1
 
     def live_position(self, tick: int) -> int:
         """Counts of the last sample and those since."""
         self.encoder.settle(tick)
-        return _signed_31(self.real_position + self.encoder.counts)
+        return signed_31(self.real_position + self.encoder.counts)

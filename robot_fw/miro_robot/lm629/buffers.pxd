@@ -26,13 +26,12 @@ cdef class TrajectoryBuffer:
     cpdef int begin(self, int control) noexcept
     cpdef int words_due(self) noexcept
     cpdef void refresh(self, long long acceleration, long long velocity, long long target) noexcept
-    @cython.locals(high=cython.longlong, value=cython.longlong, bit=cython.int, relative=cython.bint, fits=cython.bint)
+    @cython.locals(high=cython.longlong, relative=cython.bint, fits=cython.bint)
     cpdef int word(self, int word, long long acceleration, long long velocity, bint clamp=*) noexcept
     cdef int _next_parameter(self) noexcept
     cpdef void abandon(self) noexcept
     cpdef void shift(self, long long real_position) noexcept
     cpdef void take(self, bint keep_stops=*) noexcept
-    @cython.locals(position=cython.longlong, relative=cython.bint, target=cython.longlong)
     cpdef long long resolve(self, long long base) noexcept
 
 
@@ -44,7 +43,6 @@ cdef class FilterBuffer:
     cpdef void reset(self) noexcept
     cpdef int begin(self, int control) noexcept
     cpdef int words_due(self) noexcept
-    @cython.locals(value=cython.int)
     cpdef int word(self, int word, bint clamp=*) noexcept
     cpdef void abandon(self) noexcept
     cpdef void take(self) noexcept

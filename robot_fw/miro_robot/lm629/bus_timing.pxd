@@ -12,11 +12,9 @@ cdef class BusTiming:
     cdef long long begin_tick, end_tick, written_tick, ps_tick, data_tick
 
     cpdef void rest(self, int writing, int reading, int ps, int data) noexcept
-    @cython.locals(writing=cython.int, reading=cython.int, broken=cython.int, moved=cython.int, within=cython.int)
+    @cython.locals(moved=cython.int)
     cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data) noexcept
-    @cython.locals(broken=cython.int)
     cdef int left_alone(self, long long tick, int ps, int data) noexcept
     cpdef int sampled(self, long long tick) noexcept
-    @cython.locals(broken=cython.int)
     cdef int _ends(self, long long tick) noexcept
     cdef inline int _short(self, int limit, long long ticks) noexcept

@@ -23,31 +23,21 @@ cdef unsigned char _WORDS_OUT[256]
 cdef class Lm629(MotorAxis):
     cpdef void set_encoder(self, long long tick, int a, int b) noexcept
     cpdef void set_index(self, long long tick, int level) noexcept
-    @cython.locals(outcome=cython.int)
     cpdef int set_bus(self, long long tick, int cs, int rd, int wr, int ps, int data) except -1
     cdef int _host(self, long long tick, int outcome) except -1
-    @cython.locals(record=bytes, size=cython.int, index=cython.int, high=cython.longlong, low=cython.longlong)
+    @cython.locals(high=cython.longlong, low=cython.longlong)
     cdef int _finished(self, long long tick) except -1
-    @cython.locals(opcode=cython.int)
     cdef int _command(self, long long tick) except -1
     cdef int _execute(self, long long tick, int opcode) except -1
     cdef int _complain(self, flags) except -1
-    @cython.locals(resting=cython.int, stopping=cython.int)
-    cdef void _accept_start(self) noexcept
+    cdef int _accept_start(self) except -1
     cdef _answer(self, long long tick, int opcode)
-    @cython.locals(opcode=cython.int)
     cdef int _word(self, long long tick) except -1
-    @cython.locals(buffer=TrajectoryBuffer, profile=ProfileGenerator, outcome=cython.int)
     cdef _trajectory_word(self, int word)
     cdef int _filter_word(self, int word) except -1
-    @cython.locals(word=cython.int, base=cython.longlong)
     cdef int _load(self, int opcode) except -1
     cpdef int data_out(self, long long tick) noexcept
-    @cython.locals(waiting=cython.int)
     cpdef int after_load(self) except -1
-    @cython.locals(latest_tick=cython.longlong, late=cython.bint)
     cpdef int check_times(self, long long earliest_tick) except -1
     cpdef int status_at(self, long long tick) noexcept
-    @cython.final
-    @cython.locals(left=cython.longlong, length=cython.int)
     cdef long long _due_tick(self) noexcept

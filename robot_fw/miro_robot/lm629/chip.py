@@ -157,9 +157,9 @@ class Lm629(MotorAxis):
             self._accept_start()
         elif opcode == _UDF:
             self.filter_buffer.take()
-            self.signals.set_bits(_UPDATE_PENDING)
+            self.signals.word |= _UPDATE_PENDING
         elif opcode == _SIP:
-            self.signals.set_bits(_ACQUIRE_INDEX)
+            self.signals.word |= _ACQUIRE_INDEX
             self.encoder.arm(tick)
         elif opcode == _DFH:
             if self.options.home_shifts_buffer:
@@ -170,9 +170,9 @@ class Lm629(MotorAxis):
             self.encoder.settle(tick)
             self._enter_reset(_RESETTING, _SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
         elif opcode == _PORT12 and self.options.port12_clears:
-            self.signals.clear_bits(_OUTPUT_8_BIT)
+            self.signals.word &= ~_OUTPUT_8_BIT
         elif opcode == _PORT8:
-            self.signals.set_bits(_OUTPUT_8_BIT)
+            self.signals.word |= _OUTPUT_8_BIT
         elif opcode != _PORT12:
             self._complain(self.options.unknown_opcode_flags)
 
@@ -183,14 +183,14 @@ class Lm629(MotorAxis):
     def _accept_start(self) -> None:
         """STT is refused when it would change the acceleration of a motion that goes on (T2)."""
         resting = self.signals.word & (_ON_TARGET | _MOTOR_OFF)
-        stopping = self.trajectory_buffer.control & _STOPS and self.stop_lifts_refusal
+        stopping = self.trajectory_buffer.control & _STOPS and self.options.stop_lifts_refusal
         if self.signals.word & _ACCELERATION_LOADED and not resting and not stopping:
             self.signals.raise_flags(_COMMAND_ERROR)
-            return
-        if not self.starts_at_sample:
-            self.trajectory_buffer.take(self.stop_bits_stay)
-        self.signals.clear_bits(_ACCELERATION_LOADED)
-        self.start_taken = 1
+        else:
+            if self.options.start_takes != "sample":
+                self.trajectory_buffer.take(self.options.stop_bits_stay)
+            self.signals.word &= ~_ACCELERATION_LOADED
+            self.start_taken = 1
 
     def _answer(self, tick: int, opcode: int) -> int:
         """What a reading command says, as it is when the command arrives."""
@@ -224,15 +224,15 @@ class Lm629(MotorAxis):
         profile = self.trajectory
         if self.port.recorded == 2:
             self.port.expect(buffer.begin(word))
-            if self.unsent_is_working:
+            if self.options.unsent == "working":
                 buffer.refresh(profile.acceleration, profile.max_velocity, profile.target)
             return
-        if self.rates_of_buffer:
+        if self.options.relative_rates == "buffer":
             outcome = buffer.word(word, buffer.acceleration, buffer.velocity, self.clamps)
         else:
             outcome = buffer.word(word, profile.acceleration, profile.max_velocity, self.clamps)
         if outcome & _COMPLETED:
-            self.signals.set_bits(_ACCELERATION_LOADED)
+            self.signals.word |= _ACCELERATION_LOADED
         if outcome & _OUT_OF_RANGE:
             self._complain(self.options.range_flags)
 
@@ -252,9 +252,9 @@ class Lm629(MotorAxis):
         elif opcode in (_LPES, _LPEI):
             self.threshold = fit_15(word, self.clamps)
             self._complain(self.options.range_flags and word > 0x7FFF)
-            self.signals.clear_bits(_STOP_ON_ERROR)
+            self.signals.word &= ~_STOP_ON_ERROR
             if opcode == _LPES:
-                self.signals.set_bits(_STOP_ON_ERROR)
+                self.signals.word |= _STOP_ON_ERROR
         elif opcode in (_SBPA, _SBPR):
             base = self.trajectory.target if opcode == _SBPR else 0
             self.set_breakpoint(base + int.from_bytes(self.port.data_bytes(), "big"))

@@ -12,7 +12,6 @@ cdef class InputFilter:
     cdef public long long run_tick, pin_tick, due
 
     cpdef void take(self, int level, long long tick=*) noexcept
-    @cython.locals(clock=cython.longlong)
     cpdef inline void set(self, long long tick, int level) noexcept
     cpdef inline void accept(self) noexcept
 
@@ -27,14 +26,12 @@ cdef class Encoder:
 
     cpdef void clear(self, int disarm=*) noexcept
     cpdef void set_phases(self, long long tick, int a, int b) noexcept
-    @cython.locals(clock=cython.longlong)
     cdef void set_place(self, long long tick, int place) noexcept
-    @cython.locals(quadrature=InputFilter, clock=cython.longlong, waits=cython.bint)
+    @cython.locals(waits=cython.bint)
     cdef int set_run(self, long long first_tick, long long before_tick, long long last_tick, long long edges, long long step,
                      long long count) noexcept
     cpdef void set_index(self, long long tick, int level) noexcept
     cpdef void arm(self, long long tick) noexcept
-    @cython.locals(now=cython.longlong)
     cpdef void settle(self, long long tick) noexcept
     cdef inline void _count(self) noexcept
     cdef void _watch(self) noexcept

@@ -12,8 +12,7 @@ cdef class HostPort:
     cdef readonly long long busy_ticks
     cdef readonly int judged_at_end, reset_status, keeps_phase, undue_flags, status_flags
     cdef public int ps, data, writing, reading, fate, drive
-    cdef public long long busy_until
-    cdef public long long writes_while_busy
+    cdef public long long busy_until, writes_while_busy
     cdef public int buffer, lock, command, abandoned, words_left, incoming, low_next, word
     cdef public long long answer
     cdef unsigned char record[16]
@@ -22,7 +21,6 @@ cdef class HostPort:
     cpdef reset(self, int lock)
     cpdef bint is_busy(self, long long tick) noexcept
     cpdef int status(self, long long tick, int flags) noexcept
-    @cython.locals(writing=cython.int, reading=cython.int, outcome=cython.int)
     cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data, int flags) except -1
     cdef void _write_begins(self, long long tick) noexcept
     cdef void _read_begins(self, long long tick, int flags) noexcept

@@ -13,7 +13,6 @@ cdef class Pid:
 
     cpdef void load(self, long long kp, long long ki, long long kd, long long il, long long ds) noexcept
     cpdef void open_loop(self) noexcept
-    @cython.locals(e=cython.longlong)
     cpdef int step(self, long long position_error) noexcept
     cpdef int top_of_sum(self) noexcept
     cdef long long _top(self) noexcept

@@ -14,6 +14,4 @@ cdef class Signals:
     cpdef void raise_flags(self, int flags) noexcept
     cpdef void reset_interrupts(self, int keep) noexcept
     cpdef void mask_interrupts(self, int mask) noexcept
-    cdef void _follow(self) noexcept
-    cpdef void set_bits(self, int bits) noexcept
-    cpdef void clear_bits(self, int bits) noexcept
+    cdef inline void _follow(self) noexcept

@@ -78,9 +78,3 @@ class Signals:
             self.word &= 0x7FFF
             if self.word & self.mask:
                 self.word |= 0x8000
-
-    def set_bits(self, bits: int) -> None:
-        self.word |= bits
-
-    def clear_bits(self, bits: int) -> None:
-        self.word &= ~bits

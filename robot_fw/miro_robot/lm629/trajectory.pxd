@@ -7,7 +7,6 @@ cdef long long _NEVER, _HALF_SPACE, _SPACE_MASK
 cdef long long _wrapped(long long position) noexcept
 
 
-@cython.locals(n=cython.longlong)
 cdef long long _stopping_distance(long long speed, long long acceleration) noexcept
 
 
@@ -25,12 +24,9 @@ cdef class ProfileGenerator:
     cpdef void define_home(self, long long real_position) noexcept
     cpdef int step(self) noexcept
     cdef int _slow_to_rest(self) noexcept
-    @cython.locals(velocity=cython.longlong)
     cdef void _approach(self, long long goal) noexcept
-    @cython.locals(a=cython.longlong, distance=cython.longlong, v=cython.longlong, backwards=cython.int)
+    @cython.locals(backwards=cython.int)
     cdef int _towards_target(self) noexcept
-    @cython.locals(a=cython.longlong, up=cython.longlong)
     cdef long long _speed(self, long long v, long long distance) noexcept
-    @cython.locals(moved=cython.longlong)
     cdef void _move(self, long long velocity) noexcept
     cdef void _arrive(self) noexcept
