@@ -10,37 +10,21 @@ cdef class Core:
     cdef unsigned int lines[65536]
     cdef unsigned short line_of[256]
     cdef unsigned char iram[256]
-    cdef public int pc
-    cdef public int a
-    cdef public int b
-    cdef public int sp
-    cdef public int dptr
-    cdef public int cy
-    cdef public int ac
-    cdef public int ov
-    cdef public int user_flags
-    cdef public int bank
-    cdef readonly long long cycles
-    cdef readonly long long start
-    cdef readonly long long at
-    cdef long long limit
-    cdef long long until
+    cdef public int pc, a, b, sp, dptr, cy, ac, ov, user_flags, bank
+    cdef readonly long long cycles, start, at
+    cdef long long limit, until
     cdef int stop
-    cdef readonly long long instructions
-    cdef readonly long long idle_cycles
-    cdef readonly long long faults
+    cdef readonly long long instructions, idle_cycles, faults
     cdef unsigned char[::1] edges
-    cdef int edge_mask
-    cdef int edge_before
+    cdef int edge_mask, edge_before
     cdef int edge_outer[8]
     cdef int edge_depth
     cdef public int highest_sp
-    cdef readonly int stack_floor
-    cdef readonly int stack_end
+    cdef readonly int stack_floor, stack_end
 
     cpdef begin_edges(self)
     @cython.final
-    @cython.locals(place='unsigned int', index=int, count=int)
+    @cython.locals(place='unsigned int')
     cdef void count_edge(self, int target) noexcept
     @cython.final
     cdef void enter_edges(self) noexcept

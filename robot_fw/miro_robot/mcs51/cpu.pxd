@@ -18,31 +18,22 @@ cdef int _MAIN_LOOP_STARVED, _MARK_CYCLES, _ONE_INSTRUCTION
 
 cdef class Cpu(Executor):
     cdef readonly Peripherals peripherals
-    cdef readonly Line rxd
-    cdef readonly Line txd
-    cdef readonly int pcon
-    cdef readonly int idle
-    cdef readonly int powered_down
-    cdef long long next_event
-    cdef long long blocked
+    cdef readonly Line rxd, txd
+    cdef readonly int pcon, idle, powered_down
+    cdef long long next_event, blocked
     cdef public long long main_loop_limit
-    cdef long long next_mark
-    cdef long long marks
+    cdef long long next_mark, marks
     cdef readonly int code_limit
     cdef public int stop_asleep
     cdef public object inspector
 
     cpdef load(self, bytes image, used=*)
-    @cython.locals(address=int)
     cdef void _erase(self) noexcept
-    @cython.locals(address=int, size=int)
     cdef int _program(self, bytes image) except -1
-    @cython.locals(address=int)
     cdef void _use(self, int first, int end) noexcept
     cpdef int write_code(self, int address, int value) except -1
     cpdef is_loaded(self, int address)
     cpdef int code_at(self, int address) noexcept
-    @cython.locals(now='long long', port=int)
     cpdef reset(self)
     cpdef hold(self)
     cpdef int run(self, long long until_cycle) except -1
@@ -51,7 +42,6 @@ cdef class Cpu(Executor):
     cpdef int before_save(self) except -1
     cpdef int after_load(self) except -1
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
-    @cython.locals(address=int)
     cpdef int run_until_any(self, tuple addresses, long long until_cycle) except -1
     cpdef request_stop(self)
     cdef void replan(self) noexcept
@@ -59,43 +49,30 @@ cdef class Cpu(Executor):
     cpdef asleep(self)
     cpdef int peek_iram(self, int address) noexcept
     cpdef int sfr(self, int address) except -1
-    @cython.locals(now='long long')
     cdef int end_run(self) except -1
-    @cython.locals(now='long long', event='long long')
     cdef int boundary(self) except -1
     @cython.final
-    @cython.locals(peripherals=Peripherals, blocked=bint, source=int)
+    @cython.locals(blocked=bint)
     cdef inline int _attend(self, long long now) except -1
-    @cython.final
-    cdef inline int _note_end(self, long long now) except -1
-    @cython.final
-    @cython.locals(turn='long long')
+    cdef int _note_end(self, long long now) except -1
     cdef int _look_for_sleep(self, long long now) except -1
-    @cython.final
-    cdef inline int _watch_main_loop(self, long long now) except -1
+    cdef int _watch_main_loop(self, long long now) except -1
     @cython.final
     cdef inline int _taken_over(self) noexcept
-    @cython.final
-    cdef inline int _enter(self, int source) except -1
+    cdef int _enter(self, int source) except -1
     @cython.final
     cdef inline int _block(self) except -1
     @cython.final
     cdef inline int _expect(self, long long earliest) except -1
     @cython.final
-    @cython.locals(event='long long')
     cdef inline long long _next_look(self) noexcept
     @cython.final
     cdef inline int _written(self, int address, int sooner) except -1
     @cython.final
-    @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1
     @cython.final
     cdef inline int _other_register(self, int address, long long cycle) except -1
-    @cython.locals(value=int, port=int)
     cdef int write_sfr_bit(self, int address, int mask, int level) except -1
-    @cython.final
     cdef int write_pcon(self, int value) except -1
-    @cython.final
     cdef int write_port(self, int port, int value) except -1
-    @cython.locals(value=int)
     cdef int movx_read(self, int address) except -1

@@ -11,7 +11,6 @@ cdef int _CORE
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
-    @cython.locals(stopped=int)
     cpdef int run(self, long long until_cycle) except -1
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
                    pc='long long', line='unsigned long long', row=int, at='long long', address=int, value=int)
@@ -20,13 +19,11 @@ cdef class Executor(Core):
     @cython.final
     cdef inline int read(self, int address) except -1
     @cython.final
-    @cython.locals(value=int)
     cdef int read_register(self, int address) except -1
     @cython.final
     cdef inline int core_register(self, int address) noexcept
     @cython.final
     cdef int write_register(self, int address, int value) except -1
-    @cython.locals(folded=int, parity=int)
     cpdef int psw(self) noexcept
     @cython.final
     cdef void write_psw(self, int value) noexcept
@@ -35,16 +32,12 @@ cdef class Executor(Core):
     @cython.final
     cdef inline int write(self, int address, int value) except -1
     @cython.final
-    @cython.locals(byte=int)
     cdef inline int read_bit(self, int bit) except -1
     @cython.final
-    @cython.locals(byte=int)
     cdef inline int latched_bit(self, int bit) except -1
     @cython.final
-    @cython.locals(address=int, kept=int)
     cdef inline int write_bit(self, int bit, int level) except -1
     @cython.final
-    @cython.locals(value=int)
     cdef int write_register_bit(self, int address, int mask, int level) except -1
     @cython.final
     cdef inline int branch(self, int pc, int offset) noexcept
@@ -55,24 +48,20 @@ cdef class Executor(Core):
     @cython.final
     cdef inline int claim(self) except -1
     @cython.final
-    @cython.locals(value=int, empty=bint)
+    @cython.locals(empty=bint)
     cdef inline int pop(self) except -1
     @cython.final
-    @cython.locals(before=int, end=int, round_the_top=bint)
+    @cython.locals(round_the_top=bint)
     cdef int set_sp(self, int value) except -1
     @cython.final
-    @cython.locals(a=int, total=int)
     cdef inline void add(self, int operand, int carry) noexcept
     @cython.final
-    @cython.locals(a=int, total=int)
     cdef inline void subtract(self, int operand) noexcept
     @cython.final
     cdef inline int compare(self, int pc, int left, int right, int offset) noexcept
     @cython.final
-    @cython.locals(quotient=int)
     cdef inline void divide(self) noexcept
     @cython.final
-    @cython.locals(value=int)
     cdef inline void decimal_adjust(self) noexcept
     @cython.final
     cdef int fault(self, int kind) except -1

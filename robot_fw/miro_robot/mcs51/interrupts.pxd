@@ -4,22 +4,17 @@ cdef long long _NEVER
 
 @cython.final
 cdef class Interrupts:
-    cdef public int ie
-    cdef public int ip
-    cdef public int in_service
+    cdef public int ie, ip, in_service
     cdef long long since[6]
     cdef long long until[6]
     cdef int asked
 
-    @cython.locals(source=int)
     cpdef void clear(self) noexcept
     cpdef void ask(self, int source, long long cycle) noexcept
     cpdef void withdraw(self, int source, long long cycle) noexcept
     cdef inline int enabled(self) noexcept
     cdef inline int open(self) noexcept
-    @cython.locals(waiting=int, source=int, chosen=int, latched='long long')
     cpdef int choose(self, long long boundary) noexcept
-    @cython.locals(waiting=int, source=int, earliest='long long', boundary='long long')
     cpdef long long next_boundary(self, long long now) noexcept
     cpdef void enter(self, int source) noexcept
     cpdef void leave(self) noexcept
@@ -32,10 +27,7 @@ cdef class ExternalInterrupts:
     cdef public int levels
 
     cpdef void clear(self, long long cycle) noexcept
-    @cython.locals(bit=int)
     cpdef void sample(self, int number, int level, long long cycle) noexcept
-    @cython.locals(number=int)
     cpdef void write(self, int value, long long cycle) noexcept
     cpdef void taken(self, int number, long long cycle) noexcept
-    @cython.locals(flag=int)
     cdef void _follow(self, int number, long long cycle) noexcept

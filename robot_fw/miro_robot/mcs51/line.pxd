@@ -12,31 +12,20 @@ cdef class Line:
     cdef long long[::1] _ticks
     cdef long long _mask
     cdef int _before
-    cdef long long _first
-    cdef long long _end
-    cdef long long _cursor
-    cdef long long _heard
+    cdef long long _first, _end, _cursor, _heard
 
     cpdef int append(self, long long tick, int level) except -1
-    @cython.final
-    @cython.locals(last='long long')
     cdef int _change_last(self, long long tick, int level) except -1
-    @cython.final
     cdef int _make_room(self) except -1
-    @cython.final
-    @cython.locals(old='long long[::1]', old_mask='long long', serial='long long')
+    @cython.locals(old='long long[::1]')
     cdef int _resize(self, long long size) except -1
     cpdef int level_at(self, long long tick) noexcept
     cpdef long long next_edge(self, long long tick) noexcept
     cpdef long long edge_at(self, long long tick) noexcept
-    @cython.locals(cursor='long long', level=int, edge='long long', levels=int, taken=int)
     cpdef int samples(self, long long tick, long long step, long long width, long long end, int most) noexcept
     cpdef void forget(self, long long tick) noexcept
     cpdef void hear(self, long long tick) noexcept
     cpdef long long full_tick(self) noexcept
     cpdef long long last_tick(self) noexcept
-    @cython.final
     cdef inline int _last_level(self) noexcept
-    @cython.final
-    @cython.locals(cursor='long long')
     cdef void _seek(self, long long tick) noexcept

@@ -32,14 +32,11 @@ cdef class Peripherals:
     cdef readonly Shift shift
     cdef readonly Ports ports
     cdef readonly int smod
-    cdef int p1
-    cdef int p3
+    cdef int p1, p3
     cdef public int frozen
     cdef int pulsed
     cdef readonly long long now
-    cdef long long timer_wait
-    cdef long long serial_wait
-    cdef long long quiet
+    cdef long long timer_wait, serial_wait, quiet
     cdef int timer1_free
     cdef readonly long long p3_reads
 
@@ -49,51 +46,35 @@ cdef class Peripherals:
     cpdef int freeze(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
     cdef int _catch_up(self, long long cycle) except -1
-    @cython.locals(serial='long long')
     cdef inline void _note_quiet(self) noexcept
     cpdef void look_again(self) noexcept
     cpdef int settle(self) except -1
     cdef int _settle_serial(self) except -1
-    @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')
     cdef int _sync_pulsed(self, long long cycle) except -1
-    @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
+    @cython.locals(halved=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
-    @cython.locals(event='long long', flag='long long', sources=int)
     cpdef long long next_event(self, long long now) except *  # Cython 3.2 writes -1 wrongly in a final class
-    @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
-    @cython.locals(tick='long long')
     cdef long long serial_turn(self) noexcept
     cdef int clock_serial(self) except -1
-    @cython.locals(mode=int, next1='long long', period1='long long', next2='long long', period2='long long',
-                   rx2=int, tx2=int)
     cdef void _set_serial_clock(self) noexcept
-    @cython.locals(cycle='long long')
     cdef long long _timer1_tick(self) noexcept
     cdef int push(self, int port, int levels, long long tick) except -1
-    @cython.locals(cycle='long long')
     cdef int apply_pushes(self, long long now) except -1
-    @cython.locals(ports=Ports, p1=int, p3=int, changed1=int, changed3=int)
     cdef int sample_pins(self, long long cycle) except -1
-    @cython.locals(p1=int, p3=int, number=int)
     cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
     cdef int _external_pin(self, int number, int level, long long cycle) except -1
-    @cython.locals(levels=int, tick='long long')
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cdef int _read_rarely(self, int address, long long cycle) noexcept
-    @cython.locals(timers=bint, value=int)
+    @cython.locals(timers=bint)
     cdef int write_bit(self, int address, int mask, int level, long long cycle) except -1
-    @cython.locals(sooner=int)
     cpdef int write(self, int address, int value, long long cycle) except -1
-    @cython.locals(sooner=int, hastened=int)
     cdef inline int _write_timer(self, int address, int value, long long cycle) except -1
     cdef inline void _note_timers(self) noexcept
     cdef inline int writes_flags(self, int value) noexcept
-    @cython.locals(both=int)
-    cdef void _note_timer1(self, int mode) noexcept
+    cdef void _note_clocks(self, int mode) noexcept
     cdef int write_serial(self, int address, int value, long long cycle) except -1
-    @cython.locals(period='long long')
     cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1
     cdef int write_p3(self, int value, long long cycle) except -1

@@ -248,8 +248,7 @@ class Peripherals:
         """With all parts at the same cycle."""
         self.look_again()
         mode = self.uart.mode()
-        self.pulsed = 0
-        self._note_timer1(mode)
+        self._note_clocks(mode)
         if mode == 0:
             self.uart.set_clock(_NEVER, 0, _NEVER, 0)
             return
@@ -262,7 +261,6 @@ class Peripherals:
             period1 = 12 * self.timers.span(1) * (1 if self.smod else 2)
             next2 = self.timer2.next_overflow_tick()
             period2 = 2 * self.timer2.span()
-            self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
         rx2 = self.timer2.control & _RCLK
         tx2 = self.timer2.control & _TCLK
         self.uart.set_clock(
@@ -272,9 +270,11 @@ class Peripherals:
             period2 if tx2 else period1,
         )
 
-    def _note_timer1(self, mode: int) -> None:
+    def _note_clocks(self, mode: int) -> None:
+        """What clocks the serial port: in modes 1 and 3 timers, of which one may count a pin."""
         both = _RCLK | _TCLK
         self.timer1_free = 1 if self.timer2.control & both == both and mode & 1 else 0
+        self.pulsed = self.timers.counts_pin(1) | self.timer2.counts_pin() if mode & 1 else 0
 
     def _timer1_tick(self) -> int:
         """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one since reset (U1)."""
@@ -510,10 +510,7 @@ class Peripherals:
         """Time is where timer 0 is; whether a pin clocks the serial port follows from the modes."""
         self.now = self.timers.synced
         self.look_again()
-        self._note_timer1(self.uart.mode())
-        self.pulsed = 0
-        if self.uart.mode() & 1:
-            self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
+        self._note_clocks(self.uart.mode())
 
     def check_times(self, cycle: int) -> None:
         """Raises ValueError unless all parts stand at `cycle`."""

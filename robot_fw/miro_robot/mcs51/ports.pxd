@@ -11,6 +11,5 @@ cdef class Ports:
 
     cpdef int after_load(self) except -1
     cpdef int level(self, int port) noexcept
-    @cython.locals(cycle='long long')
     cpdef int push(self, int port, int levels, long long tick) except -1
     cpdef int apply(self, long long cycle) except -1

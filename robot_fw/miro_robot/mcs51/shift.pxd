@@ -13,8 +13,7 @@ cdef class Shift:
     cdef Uart uart
     cdef readonly Line data
     cdef readonly int flag
-    cdef int value
-    cdef int number
+    cdef int value, number
     cdef long long cycle
 
     cpdef int check_times(self, long long cycle) except -1
@@ -23,8 +22,6 @@ cdef class Shift:
     cdef void begin_reception(self, long long cycle) noexcept
     cdef void _begin(self, int flag, int value, long long cycle) noexcept
     cdef int sync(self, long long tick) except -1
-    @cython.locals(uart=Uart)
     cdef int _bit(self, long long tick) except -1
-    @cython.locals(tick='long long', flag=int)
     cdef int _finish(self) except -1
     cpdef long long flag_tick(self) noexcept

@@ -13,11 +13,8 @@ cdef int _STATES
 @cython.final
 cdef class Timer2:
     cdef Interrupts interrupts
-    cdef readonly int control
-    cdef readonly int t2mod
-    cdef public int count
-    cdef public int capture
-    cdef public int up
+    cdef readonly int control, t2mod
+    cdef public int count, capture, up
     cdef long long edge_cycle
     cdef readonly int clock_out
     cdef readonly long long synced
@@ -25,7 +22,6 @@ cdef class Timer2:
 
     cpdef void clear(self, long long cycle) noexcept
     cpdef int drives_pin(self) noexcept
-    cdef int generates_baud(self) noexcept
     cdef int silent(self) noexcept
     cdef int up_down(self) noexcept
     cdef int down(self) noexcept
@@ -33,12 +29,9 @@ cdef class Timer2:
     cdef int left(self) noexcept
     @cython.locals(captures=int)
     cdef int span(self) noexcept
-    @cython.locals(rate=int)
     cpdef void sync(self, long long cycle) noexcept
-    @cython.locals(left=int, down=int, step=int, span=int, overflows='long long', beyond='long long')
     cdef void _pass(self, long long counts, int rate, long long first) noexcept
     cdef void _overflowed(self, long long overflows, long long cycle) noexcept
-    @cython.locals(overflow='long long')
     cpdef long long next_flag(self) noexcept
     cpdef long long next_overflow_tick(self) noexcept
     cdef int counts_pin(self) noexcept
@@ -49,9 +42,7 @@ cdef class Timer2:
     cpdef int falls(self) noexcept
     cdef void _note_sleep(self) noexcept
     cpdef int after_load(self) except -1
-    @cython.locals(acts=int)
     cdef void _external(self, long long cycle) noexcept
     cpdef void write_control(self, int value, long long cycle) noexcept
     cpdef void write_mode(self, int value, long long cycle) noexcept
-    @cython.locals(flags=int)
     cdef void _ask_or_withdraw(self, long long cycle) noexcept

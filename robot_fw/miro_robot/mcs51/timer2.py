@@ -72,12 +72,9 @@ class Timer2:
         """Clock output on P1.0."""
         return 1 if self.t2mod & _T2OE and not self.control & _C_T2 else 0
 
-    def generates_baud(self) -> int:
-        return 1 if self.control & (_RCLK | _TCLK) else 0
-
     def silent(self) -> int:
         """Overflows set no TF2: baud rate generator and clock output."""
-        return 1 if self.generates_baud() or self.drives_pin() else 0
+        return 1 if self.control & (_RCLK | _TCLK) or self.drives_pin() else 0
 
     def up_down(self) -> int:
         return 1 if self.t2mod & _DCEN and not self.silent() and not self.control & _CP_RL2 else 0

@@ -122,20 +122,13 @@ class Timers:
             self.due = self.synced  # a fall may wait
         steady = counting & ~self.on_pins
         changed = steady ^ self.steady
-        if changed & 1:
-            self._turn(0, steady & 1)
-        if changed & 2:
-            self._turn(1, steady & 2)
-        if changed & 4:
-            self._turn(2, steady & 4)
+        for part in range(3):
+            if changed >> part & 1:
+                if steady >> part & 1:
+                    self._begin(part)
+                else:
+                    self._put(part, self.synced - self.start[part])
         self.steady = steady
-
-    def _turn(self, part: int, on: int) -> None:
-        """It begins to count cycles, or stops."""
-        if on:
-            self._begin(part)
-        else:
-            self._put(part, self.synced - self.start[part])
 
     def _begin(self, part: int) -> None:
         """From now on it counts cycles."""
@@ -188,12 +181,8 @@ class Timers:
         if self.steady >> part & 1:
             return self.start[part] + self.top[part] - 1
         if self.counting >> part & 1 and self.top[part] - self.value(part) == 1:
-            return self.next_fall(part)
+            return self.edge_cycle[part] if self.edge_cycle[part] >= self.synced else _NEVER
         return _NEVER
-
-    def next_fall(self, timer: int) -> int:
-        """Cycle in which a fall of T0, T1 that was seen already counts, or NEVER_TICK."""
-        return self.edge_cycle[timer] if self.edge_cycle[timer] >= self.synced else _NEVER
 
     def next_flag(self, timers: int) -> int:
         """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK. `timers`: which, as in IE."""
