@@ -1,18 +1,14 @@
 # C layout of miro_robot.plant.
-cimport cython
-
 from miro_robot.lm629.chip cimport Lm629
 
 cdef long long _SAMPLE_TICKS
 
 cdef class Plant:
-    cdef public Lm629 left
-    cdef public Lm629 right
+    cdef public Lm629 left, right
     cdef public long long next_tick
 
     # A plant may be written in Python: `object` lets it raise, and costs less than asking for an exception.
     cpdef attach(self, Lm629 left, Lm629 right)
     cpdef advance(self, long long tick)
-    @cython.locals(left=Lm629, right=Lm629)
     cpdef int run_pulses(self, long long tick) except -1
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)

@@ -1,5 +1,3 @@
-cimport cython
-
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
 from miro_robot.harness.program cimport Program
@@ -34,11 +32,8 @@ cdef class Moment:
     cdef int edge_before, edge_depth, highest_sp
     cdef int edge_outer[8]
 
-    @cython.locals(cpu=Cpu, serial='long long', depth=int)
     cdef int keep(self, long long tick, long long begun, bytes edges) except -1
-    @cython.locals(cpu=Cpu, place='Py_ssize_t', count=int, depth=int)
     cdef int put(self) except -1
-    @cython.locals(serial='long long')
     cdef int tell(self) except -1
 
 
@@ -57,21 +52,14 @@ cdef class Harness:
     cdef int _forget_records(self, Board board) except -1
     cdef int _begin(self, Program program) except -1
     cdef bint _opens(self, Board board, Program program) except -1
-    @cython.locals(begun='long long', tick='long long', value=int, stopped=int)
     cdef int _open(self, EventLog log) except -1
-    @cython.locals(first=int, tick='long long', pause='long long', place=int, flaws=int, waiting=int)
     cpdef int play(self, Program program) except -1
-    @cython.locals(bit='long long', levels=int, place=int, rxd=Line)
     cdef int _character(self, int value, int bad_stop, long long tick) except -1
     cdef int _reset(self, long long tick) except -1
     cdef int _set_reset(self, int level) except -1
-    @cython.locals(stopped=int)
     cdef int _move(self, long long until) except -1
     cdef int _go_on(self, long long until) except -1
-    @cython.locals(stopped=int)
     cdef int _run(self, long long until) except -1
-    @cython.locals(latest='long long')
     cdef int _settle(self, long long tick) except -1
-    @cython.locals(cpu=Cpu, stopped=int, asleep=int)
     cdef bint _falls_asleep(self, long long until) except -1
     cdef bint _faulted(self) noexcept

@@ -29,31 +29,22 @@ cdef class Program:
     cpdef int read(self, data) except -1
     cpdef long long trailing_ticks(self) noexcept
     cpdef bint ends_with_reset(self) noexcept
-    @cython.locals(size=int, place=int)
     cpdef bint opens_with(self, bytes characters) noexcept
     cdef bint _has_room(self) noexcept
-    @cython.locals(value=int)
     cdef int _next(self) noexcept
-    @cython.locals(place=int)
     cdef void _put(self, int value) noexcept
     cdef void _pause(self, long long ticks) noexcept
     cdef void _forget_flaws(self) noexcept
-    @cython.locals(hdr=int)
     cdef int _one_frame(self) except -1
     cdef int _operation(self, int kind) except -1
-    @cython.locals(hdr=int)
     cdef int _frame_operation(self, int kind) except -1
-    @cython.locals(place=int)
     cdef void _payload_from_input(self) noexcept
-    @cython.locals(place=int, value=int)
     cdef void _own_velocities(self) noexcept
-    @cython.locals(body='unsigned char *', place=int, register='unsigned int', kind=int)
+    @cython.locals(body='unsigned char *')
     cdef void _seal(self, int hdr) noexcept
-    @cython.locals(count=int, size=int, left=int, place=int, value=int)
+    @cython.locals(value=int)
     cdef int _foreign(self) except -1
-    @cython.locals(first=int, size=int, place=int)
     cdef void _again(self) noexcept
     cdef void _begin_frame(self) noexcept
-    @cython.locals(before=int)
     cdef void _put_of_frame(self, int value) noexcept
     cdef void _end_frame(self) noexcept

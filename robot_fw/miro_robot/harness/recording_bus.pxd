@@ -1,5 +1,3 @@
-cimport cython
-
 from miro_robot.harness.harness cimport LiveOracle
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.xram cimport XramBus
@@ -15,9 +13,7 @@ cdef class RecordingBus(XramBus):
     cdef readonly int received
     cdef unsigned char sent_values[4096]
     cdef long long sent_ticks[4096]
-    cdef readonly int sent_count
-    cdef readonly int fault_kind
-    cdef readonly int fault_pc
+    cdef readonly int sent_count, fault_kind, fault_pc
     cdef readonly long long fault_tick
     cdef public long long reset_tick
 
@@ -34,5 +30,4 @@ cdef class BareOracle(LiveOracle):
     cpdef begin(self, long long tick)
     cpdef restarted(self, long long tick)
     cpdef look(self, long long tick)
-    @cython.locals(now='long long')
     cpdef bint waits(self) except -1

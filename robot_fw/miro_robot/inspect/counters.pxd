@@ -1,5 +1,3 @@
-cimport cython
-
 from miro_robot.inspect.watcher cimport Watcher
 from miro_robot.mcs51.cpu cimport Cpu
 
@@ -15,14 +13,12 @@ cdef class Counters(Watcher):
     cpdef long long executed_at(self, int address)
     cpdef long long cycles_at(self, int address)
     cpdef long long jumped_at(self, int address)
-    @cython.locals(address=int)
     cpdef list addresses(self)
 
 cdef int _RETI, _CALL_CYCLES, _DEPTH
 
 cdef class Activity(Watcher):
-    cdef readonly long long cycles
-    cdef readonly long long asleep_cycles
+    cdef readonly long long cycles, asleep_cycles
     cdef readonly int highest_sp
     cdef readonly long long highest_sp_tick
     cdef long long count[6]
@@ -38,9 +34,7 @@ cdef class Activity(Watcher):
 
     cpdef attached(self, Cpu cpu)
     cpdef executed(self, Cpu cpu, int pc, long long start)
-    @cython.locals(asked='long long', latency='long long')
     cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
-    @cython.locals(source=int, duration='long long')
     cdef int _leave(self, long long cycle) except -1
     cpdef slept(self, Cpu cpu, long long start, long long end)
     cpdef ran(self, Cpu cpu, long long start)

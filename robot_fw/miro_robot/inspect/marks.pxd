@@ -1,5 +1,3 @@
-cimport cython
-
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.execute cimport Executor
 
@@ -8,9 +6,7 @@ cdef int _BREAKPOINT
 cdef class MarkInspector:
     cdef readonly Cpu cpu
     cdef public dict marked
-    cdef public object ask
-    cdef public object others
+    cdef public object ask, others
 
     cpdef int run(self, long long until_cycle) except -1
-    @cython.locals(cpu=Cpu, reason=int, place=int)
     cdef int _pass_marks(self, long long until_cycle) except -1

@@ -20,20 +20,15 @@ cdef class BoardTap(Probe):
     cdef int levels[45]
     cdef long long busy_end[2]
     cdef readonly long long passed_tick
-    cdef list left_edges
-    cdef list right_edges
+    cdef list left_edges, right_edges
 
     cpdef attach(self, long long tick)
     cpdef detach(self)
-    @cython.locals(board=Board, tick='long long')
     cpdef long long known(self) except -1
     cpdef moved(self, long long tick)
     cpdef passed(self, long long tick)
-    @cython.locals(board=Board, pins=int, pin=int)
     cdef int _look_at_pins(self, long long tick) except -1
-    @cython.locals(board=Board, port=int)
     cdef int _look(self, long long tick) except -1
-    @cython.locals(board=Board, chip=Lm629, place=int, busy_end='long long')
     cdef int _look_at_chip(self, long long tick, int side) except -1
     cdef int _start_edges(self, int place, int state) except -1
     @cython.locals(tick='long long', a=int, b=int)
@@ -51,24 +46,18 @@ cdef class CpuTap(Watcher):
     cdef long long cycles
     cdef int routine[2]
 
-    @cython.locals(tick='long long')
     cpdef long long known(self) except -1
     cpdef detach(self)
     cpdef attached(self, Cpu cpu)
     cpdef starting(self, Cpu cpu)
     cpdef executed(self, Cpu cpu, int pc, long long start)
-    @cython.locals(tick='long long', high=int)
     cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
     cpdef slept(self, Cpu cpu, long long start, long long end)
     cpdef ran(self, Cpu cpu, long long start)
-    @cython.locals(place=int, port=int, source=int, in_service=int, line=Line)
     cdef int _begin(self, Cpu cpu) except -1
-    @cython.locals(tick='long long', port=int, in_service=int)
     cdef int _look(self, Cpu cpu) except -1
     cdef int _leave(self, long long tick, int high, int level) except -1
-    @cython.locals(source=int)
     cdef int _leave_unseen(self, long long tick) except -1
     cdef int _take_outputs(self, Cpu cpu) except -1
-    @cython.locals(tick='long long')
     cdef int _take_line(self, int place, Line line, long long until_tick) except -1
     cdef inline int _see(self, long long tick, int place, int level) except -1

@@ -18,11 +18,11 @@ cdef class Inspector:
     cdef readonly Cpu cpu
     cdef public list watchers
 
-    @cython.locals(cpu=Cpu, began='long long', reason=int, watcher=Watcher)
+    @cython.locals(watcher=Watcher)
     cpdef int run(self, long long until_cycle) except -1
-    @cython.locals(cpu=Cpu, pc=int, start='long long', executed='long long', reason=int, watcher=Watcher)
+    @cython.locals(watcher=Watcher)
     cdef int _step(self) except -1
-    @cython.locals(cpu=Cpu, pc=int, start='long long', end='long long', ended=int, woken=bint, watcher=Watcher)
+    @cython.locals(woken=bint, watcher=Watcher)
     cdef int _sleep(self, long long until_cycle) except -1
-    @cython.locals(source=int, watcher=Watcher)
+    @cython.locals(watcher=Watcher)
     cdef int _tell_interrupted(self, int pc, long long start) except -1
