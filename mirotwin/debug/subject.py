@@ -20,7 +20,7 @@ from mirotwin.firmware.subject import SubjectOptions, open_run, which_robot
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, command_of
-from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, debugged_image, load_images
+from mirotwin.shell.debug_files import LinesFrom, SourceFolders, debugged_image, load_images
 from mirotwin.shell.options import AT, RESUME
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
@@ -94,10 +94,9 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
     assert isinstance(run, RobotRun | BareRun | CaseRun)
     if options.resume is not None:
         _resume(run, options.resume)
-    image, folders = debugged_image(
-        run.image, load_images(options.lines_from, run.image), checked_sources(options.sources)
-    )
-    symbols = Symbols(image, folders)
+    images = load_images(options.lines_from, run.image)
+    symbols = Symbols(*debugged_image(run.image, images, options.sources))
+    image = symbols.image
     timeline = Timeline(run)
     session = Opened(Debugger(timeline, symbols, everyone), [], "begin")
     if not image.symbols.names:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
-from pathlib import Path
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import CYCLE_TICKS
@@ -40,11 +39,11 @@ _CHIP = {
 class Symbols:
     """Of one image. Raises ImageError where a debug file beside it is another image's."""
 
-    def __init__(self, image: Image, folders: Sequence[Path]) -> None:
+    def __init__(self, image: Image, sources: Sources) -> None:
         self.image = image
         self.debug = DebugInfo.of(image)
         self.line = self.debug.line_at
-        self.sources = Sources([image.path.parent, *folders])
+        self.sources = sources
         self.names = SymbolNames(image)
         self.unwinder = Unwinder(image, self.names)
         self.variables = variables_of(image)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,14 +44,14 @@ NOWHERE = Path("no-such-folder") / "image.ihx"
 
 
 class AnnotatedImage:
-    """One image with its debug files, as far as they are there. `folders`: where C files may be.
+    """One image with its debug files, as far as they are there. `sources`: where C files may be.
 
     `problem`: why the debug files are not used, where they belong to another image.
     """
 
-    def __init__(self, image: Image, folders: Sequence[Path] = ()) -> None:
+    def __init__(self, image: Image, sources: Sources) -> None:
         self.problem: BadInput | None = None
-        self.sources = Sources([image.path.parent, *folders])
+        self.sources = sources
         try:
             self.debug = DebugInfo.of(image)
         except BadInput as error:

@@ -70,10 +70,13 @@ def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
     return images
 
 
-def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, list[Path]]:
-    """The image with its debug files, those beside one of `images` or the robot's own, and where C files may be."""
+def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]) -> tuple[Image, Sources]:
+    """The image with its debug files, those beside one of `images` or the robot's own, and where its C files are.
+
+    Raises BadInput for a folder that is not there.
+    """
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
-    return known, [*_own_sources(image), *map(Path, sources)]
+    return known, source_folders(known, sources)
 
 
 def _own_sources(image: Image) -> list[Path]:

@@ -3,6 +3,7 @@
 import json
 
 from miro_robot.firmware import source_folder
+from miro_robot.image.debug_info import Sources
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
@@ -49,4 +50,4 @@ def golden_digest(name):
 
 def debugger_of(run, everyone=False):
     """A debugger at the start of `run`, with the sources of the robot's own firmware."""
-    return Debugger(Timeline(run), Symbols(run.image, [source_folder()]), everyone)
+    return Debugger(Timeline(run), Symbols(run.image, Sources([source_folder()])), everyone)

@@ -260,6 +260,15 @@ def test_an_editor_begins_at_the_first_line_of_c(adapter):
     assert (first["name"], first["source"]["name"]) == ("main", "main.c")
 
 
+def test_an_editor_opens_the_files_of_the_folder_that_is_named_first(adapter, tmp_path):
+    _, client = adapter
+    mine = tmp_path / "main.c"
+    mine.write_text("")
+    client.begin(subject="fig6", sources=[str(tmp_path)])
+    first = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]
+    assert first["source"]["path"] == str(mine)
+
+
 def test_robots_are_threads_that_stop_together(adapter, short):
     _, client = adapter
     client.begin(subject=str(short))

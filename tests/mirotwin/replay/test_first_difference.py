@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 import mirotwin
 from miro_robot.image import Symbols
+from miro_robot.image.debug_info import Sources
 from miro_sim.scenario.file import parse
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
@@ -134,8 +135,8 @@ END = 9_600_000
 
 
 def apart(other, until_tick=END, sources=()):
-    one = AnnotatedImage(own_image(), [SOURCE])
-    return first_instruction(world, one, AnnotatedImage(other, sources), until_tick)
+    one = AnnotatedImage(own_image(), Sources([SOURCE]))
+    return first_instruction(world, one, AnnotatedImage(other, Sources(sources)), until_tick)
 
 
 def sources_of(image):
@@ -280,7 +281,9 @@ def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instructi
 @needs_sdcc
 def test_code_that_only_moved_counts_as_the_same(images):
     image = images["slower"]
-    map_ = moved(AnnotatedImage(own_image(), [SOURCE]), AnnotatedImage(image, sources_of(image)))
+    map_ = moved(
+        AnnotatedImage(own_image(), Sources([SOURCE])), AnnotatedImage(image, Sources(sources_of(image)))
+    )
     assert len(map_.same) > 30
     assert set(map_.places)
     assert {own_image().symbols.name_at(at) for at in map_.places} == set(map_.changed)
