@@ -83,3 +83,21 @@ def test_any_edges_break_what_they_break_for_one_who_keeps_them_all(edges):
         broken = theirs.pins(tick, pins)
         found = ours.pins(tick, *pins)
         assert LIMITS[found].name == (broken[0] if broken else "")
+
+
+def test_pins_that_move_on_one_tick_have_no_time_between_them():
+    assert broken_by((20, (0, 1, 0, 1, 0x02))) == ["PS set-up"]  # PS together with /WR
+    assert broken_by((20, WRITING), (40, (1, 1, 1, 1, 0x02))) == ["PS hold"]  # MOV P2,#0FFh
+    assert broken_by((20, WRITING), (40, (1, 1, 1, 0, 0xFF))) == ["write data hold"]
+    assert broken_by((20, READING), (40, WRITING)) == ["recovery between two accesses"]
+
+
+def test_ps_must_not_move_while_a_strobe_is_low():
+    assert broken_by((20, WRITING), (40, (0, 1, 0, 1, 0x02))) == ["PS hold"]
+
+
+def test_chip_select_makes_a_strobe_as_well_as_rd_and_wr():
+    assert broken_by((0, (1, 1, 0, 0, 2)), (20, WRITING), (23, (1, 1, 0, 0, 2))) == ["/WR pulse"]
+    assert (
+        broken_by((0, (1, 1, 0, 0, 2)), (9, (1, 1, 1, 1, 7)), (10, (1, 0, 1, 0, 5))) == []
+    )  # no chip is selected

@@ -283,3 +283,43 @@ def test_out_of_range_parameters_are_taken_modulo_their_width():
 
 def test_the_table_has_every_opcode_once():
     assert len(COMMANDS) == len(BY_NAME) == len({command.opcode for command in COMMANDS}) == 22
+
+
+def test_a_reset_selects_the_8_bit_output_again():
+    bench = Bench.running()
+    bench.command("PORT12")
+    bench.command("RESET")
+    bench.wait(30000)
+    assert bench.signals() & 0x0100
+
+
+def test_excessive_error_flags_or_stops():
+    for name, status in (("LPEI", EXCESS), ("LPES", MOTOR_OFF | EXCESS | COMPLETE)):
+        bench = moving()
+        bench.filter(kp=100)
+        bench.command(name, 30)
+        while abs(bench.chip.desired_position - bench.chip.real_position) <= 30:
+            assert bench.chip.status == 0
+            bench.sample()
+            if bench.chip.status:
+                break
+        assert bench.chip.status == status
+        assert (bench.chip.pwm_magnitude == 0) == (name == "LPES")
+        assert bench.signals() & 0x0200 == (0x0200 if name == "LPES" else 0)
+
+
+def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
+    bench = Bench.running()
+    bench.start(0x1828, 0x100000, 0x100000, samples=2)
+    bench.chip.trajectory.position = (2**30 - 20) * 65536
+    bench.sample()
+    assert bench.status() & WRAP == 0
+    bench.sample()
+    assert bench.status() & WRAP
+    assert bench.ask("RDDP") == -(2**30) + 12
+    bench.command("RSTI", 0x006E)
+    bench.chip.real_position = -(2**30)
+    bench.turn(-1)
+    bench.sample()
+    assert bench.status() & WRAP
+    assert bench.ask("RDRP") == 2**30 - 1

@@ -109,3 +109,56 @@ def test_the_last_byte_is_always_on_record():
         (0x0C, b"\x01\x80"),
         (0x1F, bytes.fromhex("000A 0001 0002 0003 0004")),
     ]
+
+
+def test_a_write_ends_with_cs_as_well_as_with_wr():
+    for last in ("cs", "wr"):
+        bench = Bench.running()
+        bench.ready()
+        bench.drive(ps=0, cs=0, data=0x02)
+        bench.drive(wr=0)
+        assert not bench.chip.status_at(bench.tick) & 1
+        bench.drive(**{last: 1})
+        assert bench.chip.status_at(bench.tick) & 1
+        assert bench.chip.commands[-1][1:] == (0x02, b"")
+
+
+def test_the_byte_that_counts_is_the_one_before_the_strobe_ends():
+    bench = Bench.running()
+    bench.ready()
+    bench.drive(ps=0, cs=0, data=0x55)
+    bench.drive(wr=0)
+    bench.drive(data=0x02)
+    bench.drive(wr=1, data=0x77, ps=1)
+    assert bench.chip.commands[-1][1:] == (0x02, b"")
+
+
+def test_read_data_is_fixed_when_the_strobe_begins_and_gone_when_it_ends():
+    bench = Bench.running()
+    bench.command("DFH")
+    assert bench.chip.data_out(bench.tick) == -1
+    bench.drive(ps=0, cs=0)
+    bench.drive(rd=0)
+    assert bench.chip.data_out(bench.tick) == 0x81
+    bench.wait(2 * BUSY)
+    assert bench.chip.data_out(bench.tick) == 0x81
+    bench.drive(cs=1)
+    assert bench.chip.data_out(bench.tick) == -1
+    bench.drive(rd=1)
+    assert bench.status() == 0x80
+
+
+def test_reading_when_a_write_is_due_and_writing_when_a_read_is_due_raise_the_command_error():
+    bench = Bench.running()
+    bench.command("LPEI")
+    bench.ready()
+    bench.read(1)
+    assert bench.status() == 0x82
+    bench.word(0x0777)
+    assert bench.chip.threshold == 0x0777
+    bench.command("RSTI", 0)
+    bench.command("RDSIGS")
+    bench.ready()
+    bench.write(1, 0x12)
+    assert bench.status() == 0x82
+    assert (bench.read(1), bench.read(1)) == (0x01, 0x80)
