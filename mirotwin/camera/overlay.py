@@ -17,9 +17,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from miro_exact.dmath import sincos
-from miro_host.eye.notes import Notes, Window
 from miro_host.eye.patterns import COLOURS
-from miro_host.eye.tracker import Pair, Tracker
+from miro_host.eye.tracker import Notes, Pair, Tracker, Window
 from mirotwin.camera.picture import Picture
 
 SCALE = 3

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import seconds
-from miro_host.eye.notes import Notes
+from miro_host.eye.tracker import Notes
 from miro_sim.world.sight import PixelSight
 from miro_sim.world.world import World
 from mirotwin.camera.picture import Picture, png, taken

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from miro_exact.bad_input import BadInput
-from miro_host.eye.notes import Notes
 from miro_host.eye.track import Sighting
+from miro_host.eye.tracker import Notes
 from miro_host.posture import Posture
 from mirotwin.camera import overlay
 from mirotwin.camera.overlay import INK, LOST, SCALE, Box, draw

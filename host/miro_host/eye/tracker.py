@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.colours import CLASS_OF, ColourClasses
 from miro_host.eye.grabber import Pixels
-from miro_host.eye.notes import Notes, Window
 from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.regions import Regions
@@ -29,7 +28,7 @@ from miro_host.eye.top import Top
 from miro_host.eye.track import Sighting, Track
 from miro_host.eye.weighing import Weighing
 
-__all__ = ["CentroidKind", "Pair", "Sighting", "Tracker"]
+__all__ = ["CentroidKind", "Notes", "Pair", "Sighting", "Tracker", "Window"]
 
 CentroidKind = Literal["binary", "weighted"]
 
@@ -60,6 +59,37 @@ class Pair:
 
     def __repr__(self) -> str:
         return f"Pair({self.sighting!r}, u={self.u:.2f}, v={self.v:.2f})"
+
+
+class Window(NamedTuple):
+    """A window that was read, in pixels of the picture; `slot`: of the robot it is for, -1 in a search for all."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    slot: int
+
+
+class Notes:
+    """What a tracker did with its last picture, for a person to look at; no state, and nothing is found otherwise.
+
+    `tick`: of its exposure, -1 before the first. `pairs`: by slot, None: lost.
+    """
+
+    NOT_STATE = ("tick", "windows", "pairs")
+
+    def __init__(self) -> None:
+        self.begin(-1)
+
+    def __repr__(self) -> str:
+        return f"Notes(tick={self.tick}, {len(self.windows)} windows, {self.pairs!r})"
+
+    def begin(self, tick: int) -> None:
+        """A new picture."""
+        self.tick = tick
+        self.windows: list[Window] = []
+        self.pairs: list[Pair | None] = []
 
 
 class Tracker:

@@ -23,21 +23,17 @@ cdef class Camera:
     cdef list stood, covers
     cdef long long changes, scene_changed
     cdef long long changed[10], drift_um[10]
-    cdef int covered_first[4], covered_end[4]
-    cdef int instants[6]
+    cdef int covered_first[4], covered_end[4], instants[6]
     cdef double after_s[6]
-    cdef int team_paint[10], identity_paint[10]
-    cdef int x[80], y[80], cos[84], sin[84]
+    cdef int team_paint[10], identity_paint[10], x[80], y[80], cos[84], sin[84]
     cdef long long shift_u[80], shift_v[80]
-    cdef int edges[132]
-    cdef int corner_u[5632], corner_v[5632]
+    cdef int edges[132], corner_u[5632], corner_v[5632]
     cdef int line_least_u[704], line_most_u[704], line_least_v[704], line_most_v[704]
     cdef int least_u[352], most_u[352], least_v[352], most_v[352]
     cdef int fall_u[4], fall_v[4], low_u[4], high_u[4], low_v[4], high_v[4]
     cdef unsigned char covered[16384]
     cdef long long total[16384]
-    cdef int u[64], v[64]
-    cdef int seen[128], height_um[128]
+    cdef int u[64], v[64], seen[128], height_um[128]
 
     @cython.locals(stood=tuple, body=int, number=int, place=int, after_s=double, way_m=double, sine=double, cosine=double,
                    least_u=int, most_u=int, least_v=int, most_v=int)
