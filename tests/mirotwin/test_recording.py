@@ -27,6 +27,7 @@ from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import BrokenOff, RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import TOGETHER, Recorder, RunSource
+from mirotwin.recording.rows import Chunk
 from mirotwin.recording.writer import MAGIC, McapWriter
 from tests.mirotwin.synthetic import periods
 from tests.naive import recording_messages
@@ -138,6 +139,16 @@ def test_a_period_is_written_as_the_messages_that_readers_make_of_it(written, ch
     ]
     wanted = [message for period in written for message in recording_messages.messages(period)]
     assert found == [(topic, nanoseconds(tick), data) for topic, tick, data in wanted]
+
+
+def test_a_message_that_cannot_be_written_leaves_nothing_in_its_chunk():
+    chunk = Chunk(1 << 20, pytest.fail)
+    chunk.add(1, 5, channels.DutyMessage(0, 1))
+    before = bytes(chunk.data)
+    with pytest.raises(TypeError, match="Encoding objects of type object"):
+        chunk.add(1, 6, channels.DutyMessage(0, object()))
+    assert chunk.data == before
+    assert chunk.last_ns == 5
 
 
 def write_all(recorder, written):
