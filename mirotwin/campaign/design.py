@@ -8,7 +8,6 @@ A run is computed from its number, so a plan of millions takes no memory.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -135,8 +134,8 @@ class Design(msgspec.Struct, frozen=True):
         drawn = tuple(one.value(self.draw_seed, draw) for one in self.draws)
         return DesignPoint(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
 
-    def settings(self, levels: Sequence[Level], drawn: Sequence[Value]) -> tuple[str, ...]:
+    def settings(self, point: DesignPoint) -> tuple[str, ...]:
         """What a point sets, in the order of the file."""
-        found = [setting for level in levels for setting in level.settings]
-        found += [draw.setting(value) for draw, value in zip(self.draws, drawn, strict=True)]
+        found = [setting for level in point.levels for setting in level.settings]
+        found += [draw.setting(value) for draw, value in zip(self.draws, point.drawn, strict=True)]
         return tuple(found)

@@ -18,7 +18,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import EXPECT, OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
-from mirotwin.campaign.design import Design, Factor, Level, Value
+from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
 from mirotwin.campaign.single import prepared
 from mirotwin.campaign.versions import Versions, versions
@@ -30,21 +30,14 @@ from mirotwin.verify.steps.player import check_symbols
 OWN_IMAGE = "own"
 
 
-class ScenarioSource(msgspec.Struct, frozen=True):
-    """A scenario by its name or path, and all of its text."""
-
-    origin: str
-    text: str
-
-
 class Plan(msgspec.Struct, frozen=True):
-    """A campaign that can be run. `scenarios`, `images`: by the names and paths that the file uses.
+    """A campaign that can be run. `scenarios` (whole texts), `images`: by the names and paths that the file uses.
 
     `checks`: names of all checks, in the order in which they are met. `notes`: what settings left out, a line each.
     """
 
     file: CampaignFile
-    scenarios: Mapping[str, ScenarioSource]
+    scenarios: Mapping[str, str]
     images: Mapping[str, ImageFile]
     checks: tuple[str, ...]
     versions: Versions
@@ -62,8 +55,8 @@ class Plan(msgspec.Struct, frozen=True):
     def hash(self) -> str:
         """What two campaigns with the same rows have in common, but for the versions."""
         content = (
-            self.scenarios[self.file.scenario].text,
-            [source.text for _, source in sorted(self.scenarios.items())],
+            self.scenarios[self.file.scenario],
+            [text for _, text in sorted(self.scenarios.items())],
             [image.sha256 for _, image in sorted(self.images.items())],
             self.file.settings,
             _nameless(self.design),
@@ -73,22 +66,20 @@ class Plan(msgspec.Struct, frozen=True):
 
     def work(self, run: int) -> Work:
         """The job of run number `run`."""
-        point = self.design.point(run)
-        return self._work(run, point.levels, point.drawn, point.seed)
+        return self.work_at(run, self.design.point(run))
 
-    def _work(self, run: int, levels: Sequence[Level], drawn: Sequence[Value], seed: int) -> Work:
+    def work_at(self, run: int, point: DesignPoint) -> Work:
         scenario, image = self.file.scenario, self.file.firmware
-        for level in levels:
+        for level in point.levels:
             scenario = level.scenario or scenario
             image = level.firmware or image
-        source = self.scenarios[scenario]
         settings = [setting for setting, _ in self.file.settings]
         return Work(
             run=run,
-            origin=source.origin,
-            text=source.text,
-            settings=(*settings, *self.design.settings(levels, drawn)),
-            seed=seed,
+            origin=scenario,
+            text=self.scenarios[scenario],
+            settings=(*settings, *self.design.settings(point)),
+            seed=point.seed,
             firmware=self.images[image],
             engine=engine.active(),
             versions=self.versions,
@@ -139,12 +130,12 @@ def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
     return msgspec.structs.replace(plan, checks=tuple(tried.checks), notes=tuple(tried.notes))
 
 
-def _scenarios(file: CampaignFile) -> dict[str, ScenarioSource]:
+def _scenarios(file: CampaignFile) -> dict[str, str]:
     found = {}
     for name, place in _named(file, file.scenario, "scenario"):
         try:
             own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
-            found[name] = ScenarioSource(name, load(name, own).text)
+            found[name] = load(name, own).text
         except ScenarioError as error:
             raise BadInput(file.path, place, f"{error}") from None
     return found
@@ -190,26 +181,27 @@ class _Tried:
                 self._try(first, [*drawn[:at], value, *drawn[at + 1 :]])
 
     def _try(self, levels: Sequence[Level], drawn: Sequence[Value]) -> None:
-        job = self.plan._work(0, levels, drawn, self.plan.design.first_seed)
+        point = DesignPoint(tuple(levels), tuple(drawn), 0, self.plan.design.first_seed)
+        job = self.plan.work_at(0, point)
         try:
-            ready = prepared(job.origin, job.text, job.settings)
-            check_symbols(ready.steps, load_firmware(job.firmware.path), job.origin)
+            text, expected, steps = prepared(job.origin, job.text, job.settings)
+            check_symbols(steps, load_firmware(job.firmware.path), job.origin)
         except BadInput as error:
-            raise _placed(self.plan, levels, drawn, error) from error.__cause__
-        for checks in ready.expected.values():
+            raise _placed(self.plan, point, error) from error.__cause__
+        for checks in expected.values():
             self.checks |= dict.fromkeys(check.name for check in checks)
-        for step in ready.steps:
+        for step in steps:
             if isinstance(step, CheckStep):
                 self.checks |= dict.fromkeys(check.name for check in step.checks)
-        places = _places(self.plan, levels, drawn)
-        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in ready.text.notes)
+        places = _places(self.plan, point)
+        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in text.notes)
 
 
-def _places(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value]) -> dict[str, str]:
+def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
     """What says each setting of a run: a place in the campaign's file, or an option."""
     places = dict(plan.file.settings)
-    places |= {setting: level.place for level in levels for setting in level.settings}
-    for draw, value in zip(plan.design.draws, drawn, strict=True):
+    places |= {setting: level.place for level in point.levels for setting in level.settings}
+    for draw, value in zip(plan.design.draws, point.drawn, strict=True):
         places[draw.setting(value)] = f"random.range.{draw.name}"
     return places
 
@@ -223,9 +215,9 @@ def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
     return note
 
 
-def _placed(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value], error: BadInput) -> BadInput:
+def _placed(plan: Plan, point: DesignPoint, error: BadInput) -> BadInput:
     """The same error at the place of the campaign file that made it; the whole line where no single place did."""
-    places = _places(plan, levels, drawn)
+    places = _places(plan, point)
     text = f"{error.place}".removeprefix(f"{OPTION} ")
     if f"{error.place}".startswith("--expect "):
         text = EXPECT + f"{error.place}".removeprefix("--expect ")

@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
-import msgspec
-
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
@@ -33,19 +31,13 @@ from mirotwin.verify.steps.player import Player, player_of
 from mirotwin.verify.steps.reading import steps_of
 
 
-class Prepared(msgspec.Struct, frozen=True):
-    """A scenario with its settings made, what it expects, and its steps."""
-
-    text: ScenarioText
-    expected: dict[RobotId, list[Check]]
-    steps: list[Step]
-
-
 @lru_cache(maxsize=64)
-def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
-    """Raises BadInput for a scenario that cannot be run with these settings."""
+def prepared(
+    origin: str, text: str, settings: tuple[str, ...]
+) -> tuple[ScenarioText, dict[RobotId, list[Check]], list[Step]]:
+    """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
     found = of_text(text, origin, settings)
-    return Prepared(found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin))
+    return found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin)
 
 
 def run_single(job: Work) -> RunOutcome:
@@ -65,14 +57,14 @@ def run_single(job: Work) -> RunOutcome:
 
 def _run(job: Work) -> RunOutcome:
     image = load_firmware(job.firmware.path)
-    found = prepared(job.origin, job.text, job.settings)
-    scenario = found.text.scenario
+    text, expected, steps = prepared(job.origin, job.text, job.settings)
+    scenario = text.scenario
     world = World(scenario, job.seed, image)
-    checks = Checks(world, found.expected)
-    player = player_of(world, found.steps, job.origin)
+    checks = Checks(world, expected)
+    player = player_of(world, steps, job.origin)
     tracks = Tracks(delay_frames=scenario.camera.delay_frames)
     began_s = now_s()
-    with _recorder(job.recording, found.text, world) as recorder:
+    with _recorder(job.recording, text, world) as recorder:
         _move(world, player, tracks, recorder)
     wall_s = now_s() - began_s
     checks.finish()

@@ -114,18 +114,18 @@ class Adapter:
         return {f"supports{one}": True for one in CAPABILITIES}
 
     def on_launch(self, given: Message) -> None:
-        session = open_subject(launched(given), everyone=True)
-        self.use(session.debugger)
+        debugger, said, why = open_subject(launched(given), everyone=True)
+        self.use(debugger)
 
         def begin() -> None:
-            for line in session.said:
+            for line in said:
                 self._event("output", category="important", output=line + "\n")
             if given.get("stopOnEntry", True) is False:
                 self._go("continue", False)
             else:
-                if session.why == "begin":
+                if why == "begin":
                     self.its.step("into")  # to the first line of C: an editor shows nothing of what is before
-                self._stopped(session.why, "\n".join(session.said))
+                self._stopped(why, "\n".join(said))
 
         self.begin = begin
 

@@ -55,10 +55,10 @@ def debug(options: DebugOptions) -> int:
             return _serve(Wire(partial(os.read, _stdin("connect to --listen").fileno()), sink))
     if not options.subject:
         raise click.UsageError("Missing argument 'SUBJECT'.")
-    session = open_subject(options)
-    console = Console(session.debugger)
-    console.say(session.why)
-    for line in (*session.said, *console.lines):
+    debugger, said, why = open_subject(options)
+    console = Console(debugger)
+    console.say(why)
+    for line in (*said, *console.lines):
         show_line(line)
     if not options.commands:
         return _interact(console)

@@ -48,14 +48,6 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
-class Opened(msgspec.Struct):
-    """`said`: what there is to know before anything is asked; `why`: why it stands where it does."""
-
-    debugger: Debugger
-    said: list[str]
-    why: str
-
-
 def launched(given: Mapping[str, Any]) -> DebugSubject:
     """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput."""
     words: list[str] = []
@@ -79,8 +71,11 @@ def _key(name: str) -> str:
     return first + "".join(one.capitalize() for one in others)
 
 
-def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
-    """Stands at the start, at `--at`, or at the failed check of a case. Raises BadInput."""
+def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugger, list[str], str]:
+    """A debugger at the start, at `--at`, or at the failed check of a case. Raises BadInput.
+
+    With it what there is to know before anything is asked, and why it stands where it does.
+    """
     subject = options.subject
     if not subject:
         raise BadInput("", "subject", "is missing", "name a scenario, an image, a recording or a case")
@@ -98,21 +93,21 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> Opened:
     symbols = Symbols(*debugged_image(run.image, images, options.sources))
     image = symbols.image
     timeline = Timeline(run)
-    session = Opened(Debugger(timeline, symbols, everyone), [], "begin")
+    debugger, said, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
     if not image.symbols.names:
-        session.said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
+        said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
     elif not symbols.has_sources():
-        session.said.append("no C files: --sources names their folder")
+        said.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
         if judge is not None:
-            session.why = "case"
+            why = "case"
             verdict = judge(timeline)
-            session.said += verdict.lines
+            said += verdict.lines
             if verdict.failure is not None:
                 _stand_at(timeline, verdict.failure, options.slot)
         if options.at is not None:
-            session.why = session.debugger.go_to(options.at.ticks(run.tick_hz))
-    return session
+            why = debugger.go_to(options.at.ticks(run.tick_hz))
+    return debugger, said, why
 
 
 Judge = Callable[[Timeline], CaseVerdict]

@@ -19,7 +19,7 @@ from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
-from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
+from mirotwin.report.page.run_page import Material, PageHeader, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job, replaying
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -166,7 +166,8 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         again=again,
         sources=source_folders(image, wanted.sources),
         extras=extras,
-        replayed=Replayed(what, found),
+        replayed=what,
+        differences=found,
         steps=None if summary is None else summary.steps,
         broken_off=extras.broken_off,
     )

@@ -55,15 +55,11 @@ class PageHeader(msgspec.Struct, frozen=True):
     name: str = ""
 
 
-class Replayed(msgspec.Struct, frozen=True):
-    """How the recorded run and the one that this page made compare: what of, and where they differ."""
-
-    what: str
-    differences: Sequence[Difference] = ()
-
-
 class Material(msgspec.Struct, frozen=True):
-    """All that a page is made from. `periods`: those that are drawn; `shown`: numbers of the wanted ones."""
+    """All that a page is made from. `periods`: those that are drawn; `shown`: numbers of the wanted ones.
+
+    `replayed`: what is compared with the recorded run, "" for nothing; `differences`: where they differ.
+    """
 
     about: PageHeader
     scenario: Scenario
@@ -72,7 +68,8 @@ class Material(msgspec.Struct, frozen=True):
     again: Reproduction
     sources: Sources
     extras: Extras = Extras()
-    replayed: Replayed | None = None
+    replayed: str = ""
+    differences: Sequence[Difference] = ()
     steps: StepResults | None = None
     shown: range | None = None
     broken_off: bool = False
@@ -111,7 +108,8 @@ def run_page(material: Material) -> bytes:
         "interrupts": [one for one in again.profile.interrupts if one.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),
         "replayed": material.replayed,
-        "channels": first_per_channel(material.replayed.differences)[:FIRST] if material.replayed else [],
+        "differences": material.differences,
+        "channels": first_per_channel(material.differences)[:FIRST],
         "frames": material.extras.frames,
     }
     return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
@@ -182,7 +180,7 @@ def _verdict(material: Material) -> tuple[str, str]:
 def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:
     """Name, what is shown, and the whole of it where that is shortened."""
     about, digest = material.about, material.again.digest
-    if material.periods and material.replayed is not None:
+    if material.periods and material.replayed:
         digest = material.periods[-1].digest
     facts = [
         ("seed", f"{about.seed}", ""),

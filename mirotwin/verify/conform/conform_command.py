@@ -240,10 +240,10 @@ def _tell(
 
 def _explain(rule: Rule, firmware: Image, seed: int) -> int:
     """The timeline of a rule's trial; the exit code."""
-    story = explain(rule, firmware, seed)
-    for line in story.lines:
+    lines, failed, faults = explain(rule, firmware, seed)
+    for line in lines:
         show_line(line)
-    return FIRMWARE_FAULT if story.faults else EXPECTATION_FAILED if story.failed else DONE
+    return FIRMWARE_FAULT if faults else EXPECTATION_FAILED if failed else DONE
 
 
 def _make_room(folder: Path, rules: Sequence[Rule]) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-import msgspec
-
 from miro_exact.bad_input import amount
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
@@ -27,16 +25,11 @@ Row = tuple[int, str, str]
 _STT = BY_NAME["STT"].opcode
 
 
-class Story(msgspec.Struct, frozen=True):
-    """`failed` of the rule's expectations; `faults`: how many of the firmware."""
+def explain(rule: Rule, image: Image, seed: int = 0) -> tuple[list[str], int, int]:
+    """Runs the trial and tells what happened in it, robot by robot.
 
-    lines: list[str]
-    failed: int
-    faults: int
-
-
-def explain(rule: Rule, image: Image, seed: int = 0) -> Story:
-    """Runs the trial and tells what happened in it, robot by robot."""
+    With the lines, how many of the rule's expectations failed, and how many faults the firmware had.
+    """
     trial = trial_of(rule)
     lines = [f"{rule.id} {rule.name}: {rule.text}", f"({rule.source})"]
     failed = faults = 0
@@ -53,7 +46,7 @@ def explain(rule: Rule, image: Image, seed: int = 0) -> Story:
         ]
         rows = sorted([*_rows(listener), *told, *verdicts], key=lambda row: row[0])
         lines += map(_line, _collapsed(rows))
-    return Story(lines, failed, faults)
+    return lines, failed, faults
 
 
 def _summary(verdicts: list[Row], bad: int) -> str:
