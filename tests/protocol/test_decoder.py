@@ -158,6 +158,13 @@ def test_damage_is_named_and_a_bad_crc_alone_counts_as_rejected(symbols, reason)
     assert (event.reason, decoder.rejected) == (reason, reason == Reason.BAD_CRC)
 
 
+@pytest.mark.parametrize("n", [3, 5])
+def test_of_all_65536_crcs_one_is_taken(n):
+    frame = FRAMES[n]
+    events = Decoder(n).feed(b"".join(frame[:-2] + crc.to_bytes(2, "little") for crc in range(1 << 16)))
+    assert [event.data for event in events if isinstance(event, Received)] == [frame]
+
+
 def test_a_bad_stop_bit_in_the_preamble_harms_nothing():
     symbols = [(byte, place >= 6, 25000 * place) for place, byte in enumerate(FRAMES[3])]
     events = Decoder(3).feed_symbols(symbols)

@@ -245,6 +245,16 @@ def test_velocity_mode_and_its_reversal():
     assert positions == [0, 0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 13, 14, 14, 15, 15, 14, 14, 13, 12, 11, 9, 8, 6]
 
 
+def test_a_smooth_stop_slows_down_by_the_acceleration_and_ends_on_a_whole_count():
+    trajectory = generator(0x3000, 0x9000, 0, velocity_mode=1, forward=0)
+    for _ in range(6):
+        trajectory.step()
+    assert trajectory.position == -0x2D000
+    trajectory.stop_smoothly()
+    assert run(trajectory) == ([-0x6000, -0x3000, 0], [-4, -4, -4])  # -3.2, -3.4, down to -4
+    assert (trajectory.position, trajectory.target) == (-4 * 65536, -4)
+
+
 def test_without_acceleration_nothing_ever_moves_or_ends():
     trajectory = generator(0, 0x10000, 20)
     assert [trajectory.step() for _ in range(50)] == [0] * 50
@@ -348,6 +358,26 @@ def test_any_edges_count_like_a_sampler_that_looks_at_every_clock(filter_clocks,
     ours.settle(tick + 400)
     caught = ours.caught_counts if ours.caught else None
     assert (ours.counts, caught) == theirs.take(tick + 400)
+
+
+@pytest.mark.parametrize(("clocks", "counted"), [(8, 1), (7, 0)])
+def test_a_state_of_8_clocks_counts_and_one_of_7_does_not(clocks, counted):
+    encoder = Encoder(8)
+    encoder.set_phases(0, 0, 0)
+    encoder.set_phases(100, 1, 0)
+    encoder.set_phases(100 + 4 * clocks, 1, 1)
+    encoder.settle(100 + 4 * clocks)
+    assert encoder.counts == counted
+
+
+def test_the_first_state_is_where_the_wheel_stands():
+    encoder = Encoder(8)
+    encoder.set_phases(0, 1, 1)
+    encoder.settle(1000)
+    assert encoder.counts == 0
+    encoder.set_phases(1000, 0, 1)
+    encoder.settle(2000)
+    assert encoder.counts == 1
 
 
 def test_a_leading_b_counts_up_and_4_counts_are_a_line():

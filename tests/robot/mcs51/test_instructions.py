@@ -228,11 +228,7 @@ SIGNATURES = [
     ("SUBB A,B", 0, {"a": "CC77C850", "psw": "A5AA6EAF"}),
     ("SUBB A,B", 1, {"a": "0CA3718D", "psw": "DDAAE689"}),
     ("MUL AB", 0, {"a": "06C7FCB6", "b": "978D00AF", "psw": "15568B59"}),  # B:A, CY = 0, OV for more than 255
-    (
-        "DIV AB",
-        0,
-        {"a": "6D508E27", "b": "7FAEE11D", "psw": "94780F82"},
-    ),  # quotient and remainder, CY = OV = 0
+    ("DIV AB", 0, {"a": "6D508E27", "b": "7FAEE11D", "psw": "94780F82"}),  # quotient, remainder; CY = OV = 0
 ]
 
 

@@ -54,6 +54,15 @@ def test_a_stack_that_goes_below_its_start_is_a_fault(text):
     assert kinds(text) == [UNDER]
 
 
+@pytest.mark.parametrize("last", [0xFF, 0xF0])
+@pytest.mark.parametrize(
+    ("room", "expected"), [("28h", [OVER]), ("60h", [OVER]), ("08h\nMOV SP,A\nADD A,#0F8h", [])]
+)
+def test_a_frame_that_goes_round_the_top_of_ram_is_an_overflow(last, room, expected):
+    """SDCC makes room for local variables by MOV A,SP; ADD A,#n; MOV SP,A."""
+    assert kinds(f"MOV SP,#0E0h\nMOV A,SP\nADD A,#{room}\nMOV SP,A", last=last) == expected
+
+
 def test_leaving_the_stack_is_told_once_and_setting_it_up_is_no_fault():
     assert kinds("MOV SP,#0C0h\nINC SP\nINC SP\nMOV SP,#30h\nMOV SP,#0C0h") == [OVER, OVER]
     cpu = cpu_with("MOV SP,#2Fh\nPUSH ACC\nPOP ACC")

@@ -204,6 +204,10 @@ BY_HAND = {  # set-up, the pin that falls in cycle 20, registers, and what they 
         FULL.replace("0FFh", "0F0h", 1) + "MOV RCAP2L,#34h\nMOV T2CON,#05h\n", 0xFF,
         ("TH2", "TL2", "T2CON"), {23: (0xFF, 0xFF, 0x05), 24: (0x00, 0x00, 0x85)},
     ),
+    "auto-reload has the period of its reload value": (  # 100 cycles, counted from 10 on
+        FULL + "MOV RCAP2L,#9Ch\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n", 0xFF,
+        ("TL2", "T2CON"), {10: (0xFF, 0x04), 11: (0x9C, 0x84), 110: (0xFF, 0x84), 111: (0x9C, 0x84)},
+    ),
     "with DCEN and T2EX high it counts up and each overflow toggles EXF2": (
         DCEN, 0xFF, ("TL2", "T2CON"),
         {12: (0xFF, 0x04), 13: (0xFE, 0xC4), 14: (0xFF, 0xC4), 15: (0xFE, 0x84), 16: (0xFF, 0x84), 17: (0xFE, 0xC4)},
