@@ -102,8 +102,14 @@ def test_seeds_are_written_with_the_last_one(text, seeds):
     assert seeds_of(text) == seeds
 
 
-@given(st.text(max_size=60) | st.sampled_from(["9-0", "0-49-50", "0:50", "0-1000", "1" * 41, "0-\n"]))
-def test_any_other_text_is_refused_in_a_line(text):
+@pytest.mark.parametrize("text", ["", "-", "9-0", "a", "0-49-50", "0:50", "0-1000", "1" * 41, "0-\n"])
+def test_what_is_no_range_of_seeds_is_refused_in_a_line(text):
+    with pytest.raises(ValueError, match=r"^[^\n]*\Z"):
+        seeds_of(text)
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_a_range_of_seeds_or_refused_in_a_line(text):
     said = ""
     try:
         assert 1 <= len(seeds_of(text)) <= 1000

@@ -67,6 +67,14 @@ def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
     assert "--covering give_up: not reached by " in err
 
 
+def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
+    options = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "0.3s")
+    code, out, _ = mirotwin("fuzz", "--time", "0.3s", *options, "--out", tmp_path / "out")
+    assert code == 1
+    assert "wheels_within_m_s: judged " in out
+    assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
+
+
 @pytest.mark.parametrize("error", [RuntimeError("oh"), SystemExit(0)], ids=repr)
 def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, tmp_path, monkeypatch, error):
     def raises(*_):

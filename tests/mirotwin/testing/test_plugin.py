@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from miro_robot.firmware import image_path
+from mirotwin.testing import starter
 from mirotwin.verify.cases.artifacts import image_beside
 from tests.mirotwin.testing.sessions import run, session
 
@@ -318,6 +319,27 @@ def test_counts(link):
         done = run(tmp_path / "elsewhere", command)
         assert done.returncode == 1, done.stderr
         assert "fails as recorded: frames_accepted_min" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_printed_lines_name_the_firmware_and_another_one_cures_the_case(tmp_path):
+    shutil.copy(starter.folder() / "firmware" / "late.ihx", tmp_path)
+    tests = """
+@pytest.mark.mirotwin(expect={"failsafe_stop_ms": True})
+def test_stops(link, world):
+    link.send(velocities={0: (500, 500)})
+    world.run_for(ms(200))
+"""
+    options = ["--mirotwin-firmware=late.ihx", "--mirotwin-artifacts=left"]
+    failed = session(tmp_path, *options, tests=tests)
+    (line,) = re.findall(r"^  (pytest .*)$", failed.stdout, re.MULTILINE)
+    assert line.endswith("--mirotwin-seed 0 --mirotwin-firmware late.ihx")
+    assert "1 failed" in run(tmp_path, line).stdout
+    replay, debug = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    assert debug == replay.replace("mirotwin replay", "mirotwin debug")
+    assert "fails as recorded: failsafe_stop_ms" in run(tmp_path, replay).stderr
+    case, _, _ = replay.partition(" --firmware ")
+    assert run(tmp_path, f"{case} --firmware {image_path()}").returncode == 0
 
 
 def test_an_image_beside_a_case_that_is_another_one_is_not_taken(tmp_path):

@@ -92,6 +92,10 @@ class Nothing(LawParameters, frozen=True, tag="law_none"):
     def law(self):
         return None
 
+class Breaks(LawParameters, frozen=True, tag="law_breaks"):
+    def law(self):
+        raise RuntimeError("no model file")
+
 class Says(LawParameters, frozen=True, tag="law_says"):
     def __post_init__(self):
         raise ValueError("how: is refused")
@@ -126,7 +130,7 @@ CHECKS_TOLD = {
     "raises": f"{RAISED}; repair the check",
     "gives_none": "check 'gives_none' cannot judge: `monitor` returned None "
     f"({at('checks', '# none')} in GivesNone.monitor); return an object of a class that derives from Monitor",
-    "hears_wrong": "; did you mean command? there are sent, heard, answer, received, ",
+    "hears_wrong": "EVENTS of HearsMonitor names 'comand', which is no event (site/plugged_checks.py:",
     "hears_text": "EVENTS of HearsTextMonitor is 'command' (site/plugged_checks.py:",
     "no_super": "the constructor of NoSuperMonitor does not call that of Monitor (site/plugged_checks.py:",
     "no_kind": "plugged_checks.NoKind has no KIND",
@@ -141,6 +145,7 @@ LAW_RAISES = f"KeyError: 'speed' ({at('laws', 'speed')} in RaisesLaw.step)"
 PLUGINS_TOLD = {
     "controller={law='law_raises'}": LAW_RAISES,
     "controller={law='law_none'}": "`law` returned None (site/plugged_laws.py:",
+    "controller={law='law_breaks'}": "law 'law_breaks' cannot be made: RuntimeError: no model file (site/",
     "controller={law='law_refuses'}": f"cannot check its parameters: KeyError: 'x' ({at('laws', 'KeyError')} in ",
     "controller={law='law_says'}": "controller.how: is refused",
     "estimator={kind='estimator_raises'}": f"({at('estimators', 'given.nothing')} in RaisesEstimator.step)",
@@ -287,6 +292,11 @@ def test_a_check_that_is_wrong_is_told_with_its_file_by_run(mirotwin, name):
     said = told(mirotwin("run", "fig6", *SETTINGS, "-q", "--no-figure", "--expect", name))
     assert CHECKS_TOLD[name] in said
     assert len([line for line in said.splitlines() if "error: " in line]) == 1
+
+
+def test_a_wrong_event_is_told_the_nearest_one_and_the_list(mirotwin):
+    said = told(mirotwin("run", "fig6", *SETTINGS, "-q", "--no-figure", "--expect", "hears_wrong"))
+    assert "; did you mean command? there are sent, heard, answer, received, " in said
 
 
 @pytest.mark.parametrize("setting", PLUGINS_TOLD)

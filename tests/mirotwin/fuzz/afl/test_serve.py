@@ -137,6 +137,10 @@ def test_each_kind_of_finding_is_a_signal_that_kills(kind):
     assert os.WTERMSIG(status) > signal.SIGSYS, "none that a program dies of by itself"
 
 
+def test_no_two_of_the_first_93_kinds_have_the_same_signal():
+    assert len({wait_status(kind) for kind in range(1, 94)}) == 93
+
+
 def test_a_length_beyond_the_segment_is_cut_to_it(afl):
     afl.cases.memory[:4] = (1 << 31).to_bytes(4, "little")
     afl.cases.memory[4:8] = WORD
