@@ -88,6 +88,17 @@ def test_whoever_stops_asking_leaves_no_job_behind(monkeypatch):
     assert len(made) < 7
 
 
+def test_outcomes_come_in_the_order_of_the_jobs(monkeypatch):
+    def the_first_takes_longest(job):
+        time.sleep(0.3 * (job.run == 0))
+        return RunOutcome(job.run)
+
+    monkeypatch.setattr("mirotwin.campaign.drive.work", the_first_takes_longest)
+    with ThreadPoolExecutor(2) as executor:
+        found = outcomes_of(4 * jobs(range(1)), Workers(executor))
+        assert [one.run for one in found] == [0, 1, 2, 3]
+
+
 def test_the_processes_ignore_ctrl_c_from_their_first_instruction():
     before = signal.getsignal(signal.SIGINT)
     with processes(2) as executor:

@@ -282,6 +282,14 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
     assert b"/net0/robot0/theory" in first[channels[0]]
 
 
+def test_a_page_that_is_there_is_not_replaced_without_force(tmp_path):
+    (tmp_path / "reproduction.md").write_text("mine")
+    result = called("--out", tmp_path, "--seeds", "4")
+    assert result.exit_code == 2
+    assert "--force" in result.output
+    assert (tmp_path / "reproduction.md").read_text() == "mine"
+
+
 def test_runs_that_failed_are_told_and_end_with_2(capsys):
     assert _failures([RunRow("a", "fig6", 1, error="no such seed"), RunRow("a", "fig6", 2)]) == 2
     assert "1 of 2 runs failed" in capsys.readouterr().err

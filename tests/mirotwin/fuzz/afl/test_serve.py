@@ -15,7 +15,7 @@ from mirotwin.fuzz.afl import serve
 from mirotwin.fuzz.afl.job import read_executions
 from mirotwin.fuzz.afl.serve import CASES_VARIABLE, MAP_VARIABLE, attach, wait_status
 from tests import children
-from tests.mirotwin.fuzz.afl.double import ROOT, WORD, spec
+from tests.mirotwin.fuzz.afl.double import MAP_SIZE, ROOT, WORD, spec
 
 PRIVATE, CREATE, REMOVE = 0, 0o1000, 0
 CASES_BYTES = 4096
@@ -123,6 +123,16 @@ def afl():
     """It has said hello to the server of a double."""
     with FakeAfl(spec()) as found:
         yield found
+
+
+def test_the_first_word_says_options_size_of_the_map_and_shared_memory():
+    with FakeAfl(spec(), answers=False) as afl:
+        said = afl.hello()
+        assert said & 0x8000_0001 == 0x8000_0001
+        assert said & 0x4000_0000, "the size of the map follows"
+        assert ((said & 0x00FF_FFFE) >> 1) + 1 == MAP_SIZE
+        assert said & 0x0100_0000, "test cases come through shared memory"
+        assert not said & 0x3000_0000, "neither a snapshot module nor a dictionary"
 
 
 def test_the_process_that_is_told_cannot_exist(afl):
