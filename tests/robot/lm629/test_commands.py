@@ -8,6 +8,7 @@ from miro_robot.lm629.commands import BY_NAME, COMMANDS
 from tests.robot.lm629.bench import Bench
 
 MOTOR_OFF, BREAKPOINT, EXCESS, WRAP, INDEX, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02
+ON_TARGET = 0x0400  # of the signals
 
 
 def send(bench, text):
@@ -136,6 +137,28 @@ def test_polling_busy_before_each_byte_does_no_harm():
 # ------------------------------------------------------------------------------- starting and stopping
 
 
+def test_a_move_with_a_position_alone_goes_there_from_a_target_that_was_reached():
+    bench = moving(position=10)
+    bench.sample(20)
+    assert bench.signals() & ON_TARGET
+    bench.start(0x0002, 0)
+    assert bench.signals() & ON_TARGET == 0
+    bench.sample(30)
+    assert bench.ask("RDDP") == 0
+    assert bench.signals() & ON_TARGET
+
+
+def test_relative_parameters_add_to_the_working_ones_once():
+    bench = moving(position=10)
+    bench.sample(20)
+    bench.start(0x003F, 0x100, -0x1000, -25)
+    profile = bench.chip.trajectory
+    assert (profile.acceleration, profile.max_velocity, profile.target) == (0x8100, 0x1F000, -15)
+    bench.command("STT")
+    bench.sample()
+    assert profile.target == -15
+
+
 def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
     bench = moving()
     bench.load(0x0020, 0x4000)
@@ -147,7 +170,7 @@ def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
     assert bench.chip.trajectory.acceleration == 0x8000
     bench.start(0x0400, samples=10)
     assert bench.chip.trajectory.acceleration == 0x4000
-    assert bench.signals() & 0x4400 == 0x0400
+    assert bench.signals() & (0x4000 | ON_TARGET) == ON_TARGET
 
 
 @pytest.mark.parametrize("word", [0x0100, 0x0900])

@@ -91,6 +91,7 @@ def first_edges(bench):
 
 
 DRIVE = "sign pwm_magnitude"
+STANDS = "desired_position trajectory.target status"
 MOVE = ("start", 0x002A, 0x8000, 0x20000, 1000, {"samples": 5})
 ARRIVE = ("start", 0x002A, 0x8000, 0x20000, 2, {"samples": 15})
 SMOOTH_STOP = ("start", 0x0400, {"samples": 20})
@@ -139,7 +140,7 @@ READINGS = (  # option, its other reading, what is done, what is looked at, what
     ("relative_base", "desired", [MOVE, ("start", 3, 100)], "trajectory.target", 1100, 107),
     ("relative_base", "real", [MOVE, ("start", 3, 100)], "trajectory.target", 1100, 100),
     ("home_shifts_buffer", True, [*TURNED, ("sample",), ("load", 2, 100), DFH], "trajectory_buffer.position", 100, 92),
-    ("abrupt_stop_at", "desired", [MOVE, ("start", 0x0200)], "desired_position", 0, 7),
+    ("abrupt_stop_at", "desired", [MOVE, ("start", 0x0200)], STANDS, (0, 0, COMPLETE), (7, 7, COMPLETE)),
     ("stop_keeps_fraction", True, STOPPED, fraction_at_the_end, 0, 0xB000),
     ("breakpoint_exact", True, [("command", "SBPA", 0, 5), *TURNED, ("sample",)], status(BREAKPOINT), BREAKPOINT, 0),
     ("read_position", "live", TURNED, asked("RDRP"), 0, 8),

@@ -33,6 +33,15 @@ def test_four_pulses_a_sample_of_16_ticks_a_step_from_the_start_of_the_period():
     assert [(start, 1, 1, 0), *bench.edges] == expected
 
 
+def test_full_drive_is_127_of_128():
+    bench = Bench.running()
+    bench.closed(4000, kp=10)
+    start = bench.tick
+    bench.edges.clear()
+    bench.wait(PWM_TICKS)
+    assert bench.edges == [(start + 2032, 0, 0, 0), (start + 2048, 1, 0, 0)]
+
+
 def test_without_drive_only_samples_are_events():
     bench = Bench.running()
     bench.closed(0, kp=10)

@@ -63,6 +63,13 @@ def test_a_frame_that_goes_round_the_top_of_ram_is_an_overflow(last, room, expec
     assert kinds(f"MOV SP,#0E0h\nMOV A,SP\nADD A,#{room}\nMOV SP,A", last=last) == expected
 
 
+def test_without_a_map_the_ends_of_ram_are_the_limits():
+    cpu = cpu_with("MOV SP,#0FFh\nINC SP\nMOV SP,#80h\nMOV SP,#07h")
+    for _ in range(4):
+        cpu.step()
+    assert [(kind, pc) for kind, pc, _ in cpu.bus.faults] == [(OVER, 3)]
+
+
 def test_leaving_the_stack_is_told_once_and_setting_it_up_is_no_fault():
     assert kinds("MOV SP,#0C0h\nINC SP\nINC SP\nMOV SP,#30h\nMOV SP,#0C0h") == [OVER, OVER]
     cpu = cpu_with("MOV SP,#2Fh\nPUSH ACC\nPOP ACC")
