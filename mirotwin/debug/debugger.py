@@ -146,9 +146,11 @@ class Debugger:
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
+        return self._pushed(written, cpu) or written.are_written(cpu)
+
+    def _pushed(self, written: Bytes, cpu: Cpu) -> bool:
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
-        pushed = entered and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
-        return bool(pushed) or written.are_written(cpu)
+        return bool(entered) and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
 
     def _traps(self, step: Trap | None = None, silent: bool = False) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
@@ -358,12 +360,14 @@ class Debugger:
         """(tick, frames) before the instruction that wrote some bytes last; it stays where it is."""
         trap = Trap(self._writers(written), lambda core: self._writes(written, core.cpu) or None)
         with self.timeline.staying():
-            hit = self.timeline.find_back({self.timeline.focus: trap})
-            if hit is None and self._at_begin() == INTERRUPTED:
-                raise BadInput("", "who", "was interrupted before a writer was found")
-            if hit is not None and not written.are_written(self.cpu):
+            pushed = self._pushed(written, self.cpu)
+            if not pushed and self.timeline.find_back({self.timeline.focus: trap}) is None:
+                if self._at_begin() == INTERRUPTED:
+                    raise BadInput("", "who", "was interrupted before a writer was found")
+                return None
+            if pushed or not written.are_written(self.cpu):
                 self.timeline.step_back()  # the hardware's call of a routine wrote it
-            return None if hit is None else (self.timeline.tick, self.frames())
+            return self.timeline.tick, self.frames()
 
 
 def _named(hit: Hit) -> str:

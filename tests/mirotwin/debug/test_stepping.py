@@ -163,19 +163,34 @@ def test_the_last_writer_is_that_of_brute_force():
     assert asked > 10
 
 
-PROGRAMS = {"the robot": (), "mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
+@pytest.mark.parametrize("later", [0, 1])  # at the first instruction of the routine, or behind it
+def test_a_return_address_was_written_where_the_interrupt_came(moments, debugger, later):
+    at = next(at for at, moment in enumerate(moments) if moment.calls and moment.calls[-1][2])
+    stand(debugger, moments[at])
+    pushed = debugger.bytes_of(f"iram[{debugger.cpu.sp}]")
+    stand(debugger, moments[at + later])
+    tick, frames = debugger.last_writer(pushed)
+    assert (tick // CYCLE_TICKS, frames[0].pc) == (moments[at - 1].cycle, moments[at - 1].pc)
+    assert debugger.cpu.cycles == moments[at + later].cycle
+
+
+PROGRAMS = {"mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
 
 
 @needs_sdcc
 @pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS)
-def test_stacks_are_those_of_the_calls_and_interrupts(tmp_path, program):
-    shadow = proofs.stacks(proofs.compiled(tmp_path, *program) if program else robot_run(), SECOND // 10, 0.1)
+def test_stacks_of_a_program_of_sdcc_are_those_of_the_calls_and_interrupts(tmp_path, program):
+    shadow = proofs.stacks(proofs.compiled(tmp_path, *program), SECOND // 10, 0.1)
     assert shadow.compared > 1000
     assert shadow.wrong == []
 
 
-def test_stacks_of_a_firmware_in_assembler_are_those_of_the_calls():
-    shadow = proofs.stacks(proofs.assembled(ASM), SECOND // 50, 0.1)
+RUNS = {"the robot": (robot_run, SECOND // 10), "assembler": (lambda: proofs.assembled(ASM), SECOND // 50)}
+
+
+@pytest.mark.parametrize(("run", "end_tick"), RUNS.values(), ids=RUNS)
+def test_stacks_are_those_of_the_calls_and_interrupts(run, end_tick):
+    shadow = proofs.stacks(run(), end_tick, 0.1)
     assert shadow.compared > 1000
     assert shadow.wrong == []
 
