@@ -190,6 +190,16 @@ def test_the_assumptions_are_those_of_the_slow_twin(run):
     assert (found.assumption_1.first_s, found.assumption_1.last_s) == ends_of(outside)
 
 
+def turned(*angles):
+    return theory([period(Posture(0.5, 0.0, angle), control=commanded(0.0)) for angle in angles])
+
+
+def test_a_heading_that_turns_past_half_a_turn_breaks_assumption_1_until_it_comes_back():
+    found = turned(3.0, 3.1, 3.2, 3.3, 3.1).assumption_1
+    assert (found.seams, found.broken_s) == (2, pytest.approx(2 * PERIOD_S))
+    assert (found.first_s, found.last_s) == pytest.approx((2 * PERIOD_S, 3 * PERIOD_S))
+
+
 def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assumption_2():
     as_it_should = [period(HERE, control=commanded(0.0), reference=at) for at in (ORIGIN, HERE)]
     assert theory(as_it_should).assumption_2.broken_s == 0.0
@@ -201,6 +211,13 @@ def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assum
     found = theory(near).assumption_2
     assert found.nearest_cm == pytest.approx(100.0 * math.hypot(0.02, 0.01))
     assert found.last_s == pytest.approx(PERIOD_S)
+
+
+def test_a_heading_across_the_line_of_sight_breaks_assumption_3_and_passing_it_is_a_crossing():
+    found = turned(1.3, 1.5, 1.6, 2.0).assumption_3
+    assert (found.frames, found.crossings) == (2, 1)
+    assert (found.first_s, found.last_s) == pytest.approx((PERIOD_S, 2 * PERIOD_S))
+    assert found.nearest_rad == pytest.approx(1.6 - math.pi / 2)
 
 
 # Forward and backward.

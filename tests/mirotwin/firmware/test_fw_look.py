@@ -200,7 +200,8 @@ def test_the_folder_of_a_run_has_its_recording_named(mirotwin, finished, tmp_pat
 def test_a_window_after_the_end_of_an_image_is_empty(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", LOOP)
     out = tmp_path / "a.trace"
-    assert "the run ended at tick" in mirotwin.refuses("fw", "trace", image, "--from", "1s", "--out", out)
+    for options in ((), ("--out", out)):
+        assert "the run ended at tick" in mirotwin.refuses("fw", "trace", image, "--from", "1s", *options)
     assert not out.exists()
 
 

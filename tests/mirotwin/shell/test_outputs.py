@@ -24,6 +24,11 @@ SAYS_C = bytes.fromhex("759850 758bff 758920 d28e 7599c3 80fe")
 READING = [name for name, words in COMMANDS.items() if {"RUN", "IMAGE"} & set(words)]
 
 
+def forces(name):
+    """The options of a command with which a file is replaced."""
+    return ("--force",) if name in WITH_FORCE else ()
+
+
 @pytest.fixture
 def line(finished, tmp_path):
     """The words of a command that writes to a place, and reads the recording or the image of that name beside it."""
@@ -48,7 +53,7 @@ def test_a_file_that_is_there_is_replaced_by_force_only(mirotwin, line, tmp_path
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_where_no_file_can_be_nothing_is_written(mirotwin, line, tmp_path, name):
+def test_where_no_file_can_be_nothing_is_written_by_force_either(mirotwin, line, tmp_path, name):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
     before = sorted(tmp_path.iterdir())
@@ -57,7 +62,9 @@ def test_where_no_file_can_be_nothing_is_written(mirotwin, line, tmp_path, name)
         ("gone/mine", "there is no folder"),
         ("pipe", "exists and is not a regular file"),
     ):
-        assert mirotwin.refuses(*line(name, tmp_path / place)).startswith(f"{tmp_path / place}: {what}")
+        for options in {(), forces(name)}:
+            said = mirotwin.refuses(*line(name, tmp_path / place), *options)
+            assert said.startswith(f"{tmp_path / place}: {what}")
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -67,6 +74,6 @@ def test_the_file_that_is_read_is_never_replaced(mirotwin, line, tmp_path, name)
     link, before = tmp_path / "link", path.read_bytes()
     link.symlink_to(path)
     for place in (path, link):
-        said = mirotwin.refuses(*line(name, place), *(("--force",) if name in WITH_FORCE else ()))
+        said = mirotwin.refuses(*line(name, place), *forces(name))
         assert f"is the input itself; choose another file with {COMMANDS[name][-1]}" in said
     assert path.read_bytes() == before

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from miro_protocol import stream
@@ -125,6 +125,7 @@ def read(pieces):
     return found, None
 
 
+@example(BOM + "# note 00\r\n0x55, 0XFF:2d;55\tff2D # five\n55\r\n", [])
 @given(TEXTS, st.lists(st.integers(0, 60)))
 def test_any_text_in_any_pieces_is_read_as_character_by_character(text, cuts):
     data = text.encode()
