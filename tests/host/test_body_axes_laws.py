@@ -74,6 +74,12 @@ def test_dynamic_feedback_equals_the_published_formula_above_the_guard(path, t, 
     assert (answer.v_m_s, answer.w_rad_s) == pytest.approx((v_next, float(w)), rel=1e-11, abs=1e-11)
 
 
+def test_dynamic_feedback_records_the_acceleration_that_it_demands():
+    law = DynamicFeedbackParameters(kp_per_s2=9.0, kd_per_s=6.0).law()
+    answer = asked(law, moving(Posture(0.1, 0.02, 0.0), v=0.3), HERE, v=0.2)
+    assert answer.inner == pytest.approx({"u_x_m_s2": 6.0 * 0.1 + 9.0 * 0.1, "u_y_m_s2": 9.0 * 0.02})
+
+
 @settings(max_examples=50)
 @given(ANY_PATH, TIMES, POSTURES, SPEEDS, TURNS)
 def test_the_surfaces_equal_their_definition(path, t, posture, v, w):
@@ -193,9 +199,7 @@ def test_from_all_headings_within_60_cm_the_robot_comes_to_the_path_within_its_l
         (0.0, Posture(0.0, 0.04, 0.0)),  # a lateral error alone: under the paper's law it stays for ever
     ],
 )
-def test_no_heading_of_the_line_is_forbidden_and_a_lateral_error_alone_goes_away(
-    parameters, heading_rad, start
-):
+def test_from_beside_the_line_the_robot_comes_to_it_whatever_its_heading(parameters, heading_rad, start):
     *_, (_, truth, reference) = drive(parameters().law(), StraightLine(heading_rad=heading_rad), start, 178)
     assert apart(truth, reference)[0] < 0.002
 

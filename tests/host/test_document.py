@@ -4,6 +4,24 @@ import re
 from pathlib import Path
 
 PAGE = Path(__file__).parents[2] / "host" / "README.md"
+EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def printed(code, capsys):
+    exec(code, {"__name__": __name__})
+    return capsys.readouterr().out.splitlines()
+
+
+def test_the_first_example_prints_three_frames(capsys):
+    frames = [bytes.fromhex(line) for line in printed(EXAMPLES[0], capsys)]
+    assert [frame[5:8] for frame in frames] == [bytes.fromhex("ff 2d d4")] * 3
+
+
+def test_the_law_of_the_second_example_is_driven_and_remembers(capsys):
+    lines = [line.split() for line in printed(EXAMPLES[1], capsys)]
+    speeds_m_s, errors_m = ([float(number) for number in column] for column in zip(*lines, strict=True))
+    assert 0.0 < errors_m[0] < errors_m[1] < errors_m[2]
+    assert all(0.0 < speed_m_s <= 0.5 for speed_m_s in speeds_m_s)
 
 
 def test_the_page_names_every_module():

@@ -96,6 +96,19 @@ def test_what_may_not_be_sent_is_refused_and_uses_nothing_up():
         Station(4)
 
 
+def test_a_station_that_is_saved_goes_on_with_its_numbers_and_the_services_that_wait():
+    def frames(station):
+        return [station.frame([(1, 2)] * 3) for _ in range(20)]
+
+    whole, other = Station(3), Station(3)
+    for count in range(3):
+        whole.frame([(1, 2)] * 3)
+        whole.request(count, Opcode.FILTER, (1, 2, 3, count))
+    restore(other, snapshot(whole))
+    assert frames(other) == frames(whole)
+    assert snapshot(other) == snapshot(whole)
+
+
 CHARACTER_TICKS = 24_960  # ten bits of the robot's UART
 
 

@@ -221,6 +221,14 @@ def test_the_ball_pulls_with_its_friction_against_its_way_over_the_ground(v, w, 
     assert lost_ns == pytest.approx(most_ns * v / fast, abs=wheels_ns + 1e-9)
 
 
+def test_the_ball_brakes_a_turn_on_the_spot():
+    still, dragged = DifferentialDrive(DriveParams()), DifferentialDrive(KINDS["ball"])
+    for drive in (still, dragged):
+        pwm(drive, -30, 30, 6000)
+    assert 0.0 < dragged.velocity_at(dragged.tick)[1] < 0.98 * still.velocity_at(still.tick)[1]
+    assert abs(dragged.velocity_at(dragged.tick)[0]) < 1e-9
+
+
 @settings(max_examples=60)
 @given(st.floats(1.05, 10.0), TICKS)
 def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, ticks):

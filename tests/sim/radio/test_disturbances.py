@@ -71,6 +71,16 @@ def test_jitter_spreads_evenly_over_latency_and_what_is_on_top():
     assert sum(late) / len(late) == pytest.approx(13_000, abs=4 * 24_000 / (12 * len(late)) ** 0.5)
 
 
+def test_a_late_transmission_holds_up_the_next_one_but_never_overlaps_it():
+    downlink, line = band(clean(jitter_ticks=100_000, squelch=True, keyup_ticks=0), 2)
+    for number in range(40):
+        downlink.send(number * 25_000, b"\x55")
+    downlink.settle(3_000_000)
+    symbols = naive.receive(line.edges(), 3_000_000)
+    assert [(byte, good) for byte, good, _ in symbols] == [(0x55, True)] * 40
+    assert all(after - before >= 25_000 for (*_, before), (*_, after) in pairwise(symbols))
+
+
 @pytest.mark.parametrize(
     ("baud", "crystal", "last_edge"),
     [
@@ -174,6 +184,17 @@ def test_two_transmitters_that_say_the_same_do_not_disturb_each_other():
         assert [(byte, good) for byte, good, _ in symbols] == [(byte, True) for byte in b"same"]
 
 
+def test_where_two_differ_the_level_is_a_fair_coin():
+    radio = clean(squelch=True, keyup_ticks=0)
+    (one, line), two = band(radio, 9), Downlink(radio, 9, "two")
+    one.overhear(two)
+    one.send(0, b"\xff" * 300)
+    two.send(0, b"\x00" * 300)
+    one.settle(7_500_000)
+    coins = [line.level_at(i * 2500 + 1250) for i in range(3000) if 0 < i % 10 < 9]
+    assert abs(sum(coins) - 1200) < 4 * 24.5
+
+
 def test_a_neighbour_must_be_announced_before_its_carrier_comes_up_here():
     one, two = Downlink(clean(), 0, "one"), Downlink(clean(), 0, "two")
     one.overhear(two)
@@ -190,3 +211,19 @@ def test_lost_frames_are_as_many_as_asked_for_and_the_others_are_whole():
     assert all(frame in (BITS, quiet) for frame in levels)
     assert abs(levels.count(quiet) / 1000 - 0.3) < 4 * (0.3 * 0.7 / 1000) ** 0.5
     assert heard(clean(lost_frames=1.0, squelch=True), 3, 5) == [quiet] * 5
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        {"bursts": Bursts(good_to_bad=0.0, bad_to_good=1e-3)},
+        {"dropouts": Dropouts(every_s=1e6, length_s=0.1)},
+        {"false_starts_hz": 1e-6},
+        {"lost_character_rate": 2**-32},
+        {"lost_frames": 2**-32},
+    ],
+    ids=lambda extra: next(iter(extra)),
+)
+def test_a_disturbance_that_does_not_strike_leaves_all_other_draws_as_they_are(extra):
+    plain = {"bit_error_rate": 0.02, "carrier": "on", "keyup_ticks": 24_000}
+    assert heard(clean(**plain, **extra), 10, 20) == heard(clean(**plain), 10, 20)

@@ -105,6 +105,28 @@ def test_a_snapshot_does_not_fit_a_network_of_another_size():
         restore(band(clean())[0], snapshot(band(clean(), robots=(0, 1))[0]))
 
 
+def test_a_keyed_carrier_is_noise_then_mark_then_data_then_noise():
+    downlink, lines = band(clean(latency_ticks=100), seed=4)
+    downlink.send(100_000, b"\x55")
+    downlink.settle(250_000)
+    edges = [tick for tick, _ in lines[0].edges()]
+    before, after = ([tick for tick in edges if tick < 76_100], [tick for tick in edges if tick > 125_100])
+    assert edges[len(before) : -len(after)] == [100_100 + 2500 * i for i in range(10)]
+    assert lines[0].level_at(76_100) == 1
+    assert all(tick % 2500 == 0 for tick in before + after)
+    assert before
+
+
+def test_latency_moves_the_errors_with_the_bits():
+    heard = []
+    for latency in (0, 1234):
+        downlink, lines = band(clean(latency_ticks=latency, bit_error_rate=0.05, squelch=True), seed=5)
+        downlink.send(50_000, bytes(range(20)))
+        downlink.settle(700_000)
+        heard.append([(tick - latency, level) for tick, level in lines[0].edges()])
+    assert heard[0] == heard[1]
+
+
 def test_errors_hit_each_robot_on_its_own_and_as_often_as_the_rate_says():
     radio = clean(bit_error_rate=1e-2, carrier="on")
     downlink, lines = band(radio, seed=9, robots=(0, 1, 2))

@@ -86,6 +86,16 @@ def test_without_errors_every_byte_arrives_at_any_clock_within_two_percent(sent,
     assert bytes_of(uplink.receive(2 * UNTIL)) == b"".join(data for _, data in sent)
 
 
+def test_a_symbol_carries_the_tick_of_its_start_edge_at_the_pc():
+    uplink = band(clean(latency_ticks=700), 0, [[(10_000, b"\x00\xff")]])
+    assert uplink.receive(UNTIL) == [(0x00, True, 10_700), (0xFF, True, 10_700 + 24_960)]
+
+
+def test_two_robots_at_once_are_mixed_and_space_wins():
+    uplink = band(CLEAN, 0, [[(10_000, b"\x0f")], [(10_000, b"\x3c")]])
+    assert uplink.receive(UNTIL) == [(0x0F & 0x3C, True, 10_000)]
+
+
 def test_a_symbol_is_known_at_the_middle_of_its_stop_bit():
     uplink = band(CLEAN, 0, [[(10_000, b"A")]])
     assert uplink.receive(10_000 + 1250 + 9 * 2500) == []
