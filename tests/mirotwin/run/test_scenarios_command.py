@@ -41,12 +41,16 @@ def test_the_help_has_the_three_lines_that_derive_a_scenario(mirotwin, command):
     assert (mine.name, mine.networks[0].robot[0].controller.q1_per_s) == ("mine", 0.3)
 
 
+OFF_THE_PITCH = "network.robot.reference.heading_deg=180"
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
         (["scenarios", "show", "fig5"], "fig5: no such scenario; did you mean"),
         (["run", "fig5"], "fig5: no such scenario; did you mean"),
         (["run", "absent.toml"], "absent.toml: no such file"),
+        (["run", "fig6", "--set", OFF_THE_PITCH], f"fig6: --set {OFF_THE_PITCH}: "),
         (["run", "fig6", "--seed", "-1"], "Invalid value for '--seed': -1 is not in the range"),
         (["run", "fig6", "--seed", str(1 << 63)], "Invalid value for '--seed': 9223372036854775808"),
         (["run", "fig6", "--seed", "one"], "Invalid value for '--seed': 'one' is not a whole number"),
