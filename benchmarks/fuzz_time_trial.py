@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -23,6 +22,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
 from mirotwin.fuzz.afl.run import AflRun
+from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.inputs import seeds
 from mirotwin.fuzz.spec import TargetSpec
@@ -121,13 +121,13 @@ def _of_engine(wanted: Wanted, folder: Path) -> Trial:
     given = seeds(spec.input, ROBOTS, SLOT)
     write_seeds(folder / "seeds", {f"seed-{number}": data for number, data in enumerate(given)})
     write_dictionary(folder / "dictionary", message_tokens(ROBOTS))
-    place = (folder / "seeds", folder / "out", folder / "dictionary", 1, wanted.seed)
-    engine: Any = AflRun if wanted.engine == "afl" else HypothesisRun
+    begin = EngineInput(spec.text(), folder / "seeds", folder / "out", folder / "dictionary", 1, wanted.seed)
+    engine = AflRun(begin, spec.make()) if wanted.engine == "afl" else HypothesisRun(begin)
     looked = _Looked(target)
     with ExitStack() as at_end:
         begun_s, spent_s = time.monotonic(), 0.0
         seeded = looked.at(given)  # afl-fuzz leaves seeds out that fail
-        run = None if seeded else at_end.enter_context(engine([spec.text()], *place))
+        run = None if seeded else at_end.enter_context(engine)
         while run and not looked.checks and _goes_on(wanted, begun_s, spent_s):
             time.sleep(LOOK_S)
             spent_s = of_descendants()

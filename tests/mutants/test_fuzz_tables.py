@@ -1,12 +1,15 @@
 """The tables of docs/fuzzing.md: what a trial becomes, and that the page has each mistake as it is now."""
 
 import msgspec
+import pytest
 
 from benchmarks.fuzz_time_tables import BEGIN, END, PAGE, render, replaced
-from benchmarks.fuzz_time_trial import Trial, Wanted
+from benchmarks.fuzz_time_trial import Trial, Wanted, measured
 from benchmarks.processor_time import of_descendants
 from tests import children
+from tests.mutants.build import shipped
 from tests.mutants.for_fuzzing import FOR_FUZZING
+from tests.mutants.sdcc import needs_sdcc
 
 NAME = "takes a ninth step"
 
@@ -92,3 +95,11 @@ def test_the_processor_time_of_a_child_is_counted_while_it_lives():
         while of_descendants() <= before_s:
             assert busy.poll() is None
         busy.kill()
+
+
+@pytest.mark.slow
+@needs_sdcc
+def test_a_trial_of_firmware_without_a_mistake_finds_nothing_until_its_time_is_over():
+    trial = measured(Wanted("none", "none", "", "hypothesis", 1, 1.0, shipped().image.parent.name))
+    assert (trial.found_s, trial.checks, trial.unconfirmed) == (None, (), 0)
+    assert trial.executions > 0
