@@ -255,7 +255,7 @@ class Odd(ReferenceParameters, frozen=True, kw_only=True, tag="odd"):
     def trajectory(self, duration_s):
         if self.how == "not made":
             raise RuntimeError("no file of points")
-        return Path(self.how)
+        return Path(self.how) if self.how != "none" else None
 
 class Path:
     def __init__(self, how):
@@ -284,6 +284,7 @@ class Path:
         ("turns", "leaves the pitch: angle must be within"),
         ("fails", r"reference 'odd' failed at 2.002000 s: KeyError: 't_s' \("),
         ("not made", r"reference 'odd' cannot be made: RuntimeError: no file of points \("),
+        ("none", r"`trajectory` returned None \(.* return an object with the method `at`"),
     ],
 )
 def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(

@@ -187,6 +187,7 @@ def test_a_file_that_is_no_campaigns_part_is_refused(tmp_path, content):
         (b"\xff\xfe{}\n", "is no outcome of a run"),
         (b'{"run":"\xff"}\n', "is no outcome of a run"),
         (b'{"run":6}\n', "has an outcome of run 6"),
+        (b'{"run":-1}\n', "has an outcome of run -1"),
         (b'{"run":5,"figures":{"faults":"none"}}\n', "faults: runs 0 to 5 have a value that is no int64"),
     ],
 )

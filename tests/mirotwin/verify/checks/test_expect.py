@@ -152,6 +152,11 @@ def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(mir
     assert told == {"name": "tracks_within_cm", "kind": "safety", "verdict": "failed", "failures": 1}
 
 
+def test_the_digest_is_that_of_a_run_that_expects_nothing(mirotwin, short, finished, tmp_path):
+    mirotwin("run", short, "-q", "--seed", 5, "--no-figure", "--out", tmp_path / "run", *MET, *MISSED)
+    assert summary(tmp_path / "run")["digest"] == summary(finished)["digest"]
+
+
 def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(mirotwin, short, tmp_path):
     mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", *MISSED)
     code, out, err = mirotwin("replay", "-q", tmp_path / "run" / "run.mcap")
@@ -194,6 +199,15 @@ def test_an_unknown_check_is_refused_before_anything_runs(command, mirotwin, sho
     said = "there is no such check; did you mean inside_pitch? `mirotwin scenarios checks` "
     assert f"--expect inside_pich=true: {said}" in err
     assert not (tmp_path / "run").exists()
+
+
+@needs_sdcc
+def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished, tmp_path):
+    mirotwin("export", finished / "run.mcap", "--out", tmp_path / "sent.stream")
+    stream = ("replay", "-q", tmp_path / "sent.stream", "--expect", "failsafe_stop_ms=110")
+    wanted = "wanted both wheels told to stop 110 +- 0.5 ms after the last fresh frame, found left at 124.9"
+    assert wanted in mirotwin.ends(1, *stream, "--firmware", planted("stops 15 ms late").path)
+    mirotwin.succeeds(*stream)
 
 
 @pytest.mark.slow
