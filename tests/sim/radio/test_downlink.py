@@ -119,7 +119,7 @@ def test_a_keyed_carrier_is_noise_then_mark_then_data_then_noise():
 
 def test_latency_moves_the_errors_with_the_bits():
     heard = []
-    for latency in (0, 1234):
+    for latency in (0, 3210):  # more than a bit
         downlink, lines = band(clean(latency_ticks=latency, bit_error_rate=0.05, squelch=True), seed=5)
         downlink.send(50_000, bytes(range(20)))
         downlink.settle(700_000)
