@@ -111,6 +111,10 @@ TOO_SHORT = "every_s = 0.000105, length_s = 0.000105", "every_s = 0.0002, length
         ("slicer.settle_ms = 4", ".slicer.settle_ms: unknown key; use settle_s, in seconds"),
         ("bursts.good_to_bad = 0.1", ".bursts.bad_to_good: this key is missing; add it"),
         (
+            "bursts = { good_to_bad = -1e-9, bad_to_good = 0.5 }",
+            ".bursts.good_to_bad: -1e-09 is out of range; must be 0 to 1",
+        ),
+        (
             "bursts = { good_to_bad = 0.7, bad_to_good = 0.7 }",
             ".bursts.bad_to_good: 0.7 and good_to_bad 0.7 make more than 1; a state must last",
         ),
