@@ -11,19 +11,8 @@ def site(tmp_path_factory):
 
 
 def turning(site, out, *options):
-    done = run(
-        *(
-            site,
-            MIROTWIN,
-            "run",
-            EXAMPLES / "checks/turning.toml",
-            "-q",
-            "--no-figure",
-            "--out",
-            out,
-            *options,
-        )
-    )
+    command = (MIROTWIN, "run", EXAMPLES / "checks/turning.toml", "-q", "--no-figure", "--out", out)
+    done = run(site, *command, *options)
     return done.returncode, done.stderr
 
 
