@@ -8,6 +8,7 @@ import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
+from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
@@ -52,7 +53,13 @@ def finish(one):
 
 
 @pytest.mark.parametrize(
-    ("parameters", "estimator"), [(LeakyParameters(), None), (ByEar(), None), (Gains(), PredictParameters())]
+    ("parameters", "estimator"),
+    [
+        (LeakyParameters(), None),
+        (ByEar(), None),
+        (Gains(), PredictParameters()),
+        (Gains(), EkfTelemetryParameters()),
+    ],
 )
 @pytest.mark.parametrize("at_tick", [5_000, 1_000_003, 9_999_999, 10 * CONTROL_PERIOD_TICKS])
 def test_a_world_saved_anywhere_goes_on_with_the_memory_of_its_parts(parameters, estimator, at_tick):
