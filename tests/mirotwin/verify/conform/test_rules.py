@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from miro_protocol.frames import seal
 from miro_protocol.table import DOWNLINK, TELEMETRY
 from miro_protocol.transmission import Transmission
+from miro_robot.image import Symbols
 from miro_sim.world.world import World
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.orders import Order
@@ -66,6 +68,12 @@ def test_rules_are_numbered_in_order_have_a_name_each_and_say_must_and_where_the
         assert "MUST" in rule.text
         page, _, section = rule.source.partition(", ")
         assert f"# {section}\n" in (Path(__file__).parents[4] / page).read_text()
+
+
+@pytest.mark.parametrize("id", ["P18", "P29", "P44", "P48", "P49"])
+def test_a_rule_needs_no_symbols(id):
+    image = msgspec.structs.replace(own_image(), symbols=Symbols({}))
+    assert try_rule(find(id), image).verdict == "passed"
 
 
 @pytest.mark.parametrize("seed", range(1, 7))
