@@ -193,7 +193,8 @@ def test_a_program_that_does_not_begin_at_0_is_named_with_the_place_where_it_doe
     assert err.startswith(f"{program_at_8000}: --start: no symbol nowhere")
 
 
-def test_it_runs_from_there(mirotwin, program_at_8000):
+def test_it_runs_from_there_with_its_code_in_ram_alone(mirotwin, program_at_8000):
+    assert "does not fit 8192 bytes" in mirotwin.refuses("fw", "run", program_at_8000, "--start", "0x8000")
     assert mirotwin("fw", "run", program_at_8000, *XRAM, "--start", "0x8000")[:2] == (0, "A")
 
 

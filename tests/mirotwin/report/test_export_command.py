@@ -73,6 +73,11 @@ def test_a_stream_and_a_capture_become_each_other(mirotwin, export, tmp_path):
     assert export(tmp_path / "b.stream", "c.pcapng").read_bytes() == render(PACKETS)
 
 
+@pytest.mark.parametrize("name", ["run.pcapng", "run.stream", "fox.mcap"])
+def test_nothing_is_said_where_that_is_asked_for(mirotwin, finished, tmp_path, name):
+    assert mirotwin.succeeds("export", finished / "run.mcap", "--out", tmp_path / name, "-q") == ""
+
+
 def test_the_stream_of_a_recording_is_taken_by_replay(mirotwin, export, finished):
     stream = export(finished / "run.mcap", "run.stream")
     assert mirotwin.succeeds("replay", stream).splitlines()[-1].split()[1] == "6"

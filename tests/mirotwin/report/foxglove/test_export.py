@@ -205,7 +205,6 @@ def test_the_command_writes_the_file_and_says_what_is_in_it(mirotwin, recording,
     said = mirotwin.succeeds("export", given, "--out", out)
     assert said == f"{out}: 36 control periods and 72 camera frames for Foxglove\n"
     assert out.read_bytes() == exported(recording)[0]
-    assert mirotwin.succeeds("export", given, "--out", out, "--force", "-q") == ""
 
 
 @pytest.mark.parametrize(
