@@ -381,10 +381,10 @@ def test_a_state_of_8_clocks_counts_and_one_of_7_does_not(clocks, counted):
 
 def test_the_first_state_is_where_the_wheel_stands():
     encoder = Encoder(8)
-    encoder.set_phases(0, 1, 1)
+    encoder.set_phases(0, 1, 0)
     encoder.settle(1000)
     assert encoder.counts == 0
-    encoder.set_phases(1000, 0, 1)
+    encoder.set_phases(1000, 1, 1)
     encoder.settle(2000)
     assert encoder.counts == 1
 
