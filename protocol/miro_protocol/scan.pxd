@@ -12,7 +12,8 @@ cdef class Scanner:
     cdef int _size, _run_limit
     cdef long long _step, _spacing, _tolerance
     cdef public long long valid, rejected
-    cdef unsigned char _data[4160], _flaws[4160]
+    cdef unsigned char _data[4160]
+    cdef unsigned char _flaws[4160]
     cdef long long _ticks[4160]
     cdef int _count, _last_bad, _last_apart, _reason
     cdef long long _next_tick

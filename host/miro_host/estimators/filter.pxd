@@ -14,9 +14,11 @@ cdef class Filter:
     cdef readonly double position_m, heading_rad, wheel, rim_m_s, warp_m, warp_length_m, effect_s, period_s
     cdef public int known
     cdef public double at_s
-    cdef public double state[9], covariance[81]
+    cdef public double state[9]
+    cdef public double covariance[81]
     cdef readonly double left_m, right_m
-    cdef double column[9], lower[25]
+    cdef double column[9]
+    cdef double lower[25]
 
     cpdef drifts(self, double position_m, double heading_rad, double wheel, double rim_m_s)
     cpdef warps(self, double warp_m, double warp_length_m)

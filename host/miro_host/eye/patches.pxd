@@ -14,7 +14,10 @@ cdef class Patches:
     cdef readonly int least_area, most_area
     cdef readonly int count, left, top, expected
     cdef int index[170]
-    cdef double x_m[170], y_m[170], expect_x[4], expect_y[4]
+    cdef double x_m[170]
+    cdef double y_m[170]
+    cdef double expect_x[4]
+    cdef double expect_y[4]
     cdef readonly int out_pairs, out_team, out_identity, out_contested, out_team_area, out_identity_area
     cdef readonly double out_off_m, out_next_m, out_gap_m
 

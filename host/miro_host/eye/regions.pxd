@@ -7,9 +7,21 @@ cdef int _PIXELS
 cdef class Regions:
     cdef readonly int width, height, runs, count
     cdef bytes table
-    cdef int run_kind[4096], run_row[4096], run_start[4096], run_end[4096], parent[4096], label[4096]
-    cdef int kind[4096], area[4096], left[4096], top[4096], right[4096], bottom[4096], sum_u[4096]
-    cdef int sum_v[4096], touches[4096]
+    cdef int run_kind[4096]
+    cdef int run_row[4096]
+    cdef int run_start[4096]
+    cdef int run_end[4096]
+    cdef int parent[4096]
+    cdef int label[4096]
+    cdef int kind[4096]
+    cdef int area[4096]
+    cdef int left[4096]
+    cdef int top[4096]
+    cdef int right[4096]
+    cdef int bottom[4096]
+    cdef int sum_u[4096]
+    cdef int sum_v[4096]
+    cdef int touches[4096]
 
     cpdef int find(self, bytearray pixels, int width, int height) except -1
     cpdef object region(self, int index)

@@ -6,9 +6,14 @@ cdef int _MARGIN, _MOST, _SHIFT, _RIVALS
 
 @cython.final
 cdef class Weighing:
-    cdef int gain_cb[2], gain_cr[2], least[2]
-    cdef readonly int out_weight[2], out_u[2], out_v[2]
-    cdef int rival_u[64], rival_v[64]
+    cdef int gain_cb[2]
+    cdef int gain_cr[2]
+    cdef int least[2]
+    cdef readonly int out_weight[2]
+    cdef readonly int out_u[2]
+    cdef readonly int out_v[2]
+    cdef int rival_u[64]
+    cdef int rival_v[64]
     cdef int rivals
 
     cpdef tuple weights(self, int cb, int cr)

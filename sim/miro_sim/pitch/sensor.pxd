@@ -14,8 +14,15 @@ cdef class Sensor:
     cdef int scale
     cdef readonly int reach, side
     cdef bytes levels
-    cdef short taps[72], gamma[4096], luma_noise[4096], chroma_noise[4096], y[352], cb[352], cr[352]
-    cdef short soft_cb[352], soft_cr[352]
+    cdef short taps[72]
+    cdef short gamma[4096]
+    cdef short luma_noise[4096]
+    cdef short chroma_noise[4096]
+    cdef short y[352]
+    cdef short cb[352]
+    cdef short cr[352]
+    cdef short soft_cb[352]
+    cdef short soft_cr[352]
     cdef unsigned int words[448]
 
     @cython.locals(light=double)

@@ -9,7 +9,8 @@ cdef class Body:
     cdef readonly double left_m_rad, right_m_rad, track_m, friction_nm
     cdef readonly double mass_ll, mass_lr, mass_rr, inverse_ll, inverse_lr, inverse_rr
     cdef public double left_rad_s, right_rad_s, x_m, y_m, theta_rad
-    cdef readonly double turned_left_rad[16], turned_right_rad[16]
+    cdef readonly double turned_left_rad[16]
+    cdef readonly double turned_right_rad[16]
 
     @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
                    left_rub=double, right_rub=double)

@@ -18,7 +18,9 @@ cdef class Decay:
 cdef class Winding:
     cdef public double current_a
     cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
-    cdef double volt[6], ohm[6], tau[6]
+    cdef double volt[6]
+    cdef double ohm[6]
+    cdef double tau[6]
     cdef long long row[6]
     cdef readonly Decay decay
 
