@@ -20,12 +20,20 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording import channels, reader
-from mirotwin.recording.channels import IMAGE, PERIOD, ImageMessage, Topic, image_topic, topic_of
+from mirotwin.recording.channels import (
+    IMAGE,
+    PERIOD,
+    FaultMessage,
+    ImageMessage,
+    Topic,
+    image_topic,
+    topic_of,
+)
 from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.writer import McapWriter, Writable
-from mirotwin.report.foxglove import derived, messages
+from mirotwin.report.foxglove import derived, messages, notes
 from mirotwin.report.foxglove.derived import Derived, Said
 
 PREFIX = "foxglove."
@@ -42,6 +50,9 @@ def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
 @cache
 def _published(name: str) -> bytes:
     return (Path(__file__).parent / "schemas" / f"{name}.json").read_bytes()
+
+
+FAULT = "fault"
 
 
 class Converted(msgspec.Struct):
@@ -81,6 +92,7 @@ class _Conversion:
         self.writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self.result = Converted(len(periods), 0, told)
         self._images = msgspec.json.Decoder(ImageMessage)
+        self._faults = msgspec.json.Decoder(FaultMessage)
         self._schemas: dict[int, int] = {}  # theirs by number -> ours
         self._channels: dict[int, tuple[int, Topic | None]] = {}
         self._named: dict[str, int] = {}
@@ -134,6 +146,10 @@ class _Conversion:
             return
         if topic.channel == IMAGE:
             self._take_image(topic, record)
+        elif topic.channel == FAULT and topic.slot >= 0:
+            fault = self._faults.decode(record.data)
+            line = notes.of_fault(topic.network, topic.slot, fault.tick, fault.text)
+            self._add(Said(derived.LOG, fault.tick, line))
         elif topic.channel == PERIOD and self._next < len(self.periods):
             period = self.periods[self._next]
             self._next += 1

@@ -1,4 +1,4 @@
-"""From a run to Foxglove's messages: what control periods and frames become.
+"""From a run to Foxglove's messages: what control periods, frames and faults become.
 
 What stands still is said again each second, for viewers that jump.
 """
@@ -14,7 +14,7 @@ from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
-from mirotwin.report.foxglove import frames, pitch, robots
+from mirotwin.report.foxglove import frames, notes, pitch, robots
 from mirotwin.report.foxglove.messages import (
     CompressedImage,
     FrameTransforms,
@@ -66,6 +66,7 @@ class Derived:
                 points = robots.reference_points(robot, scenario.duration_s)
                 self._paths[network, robot.slot] = points
         self._trails: dict[RobotId, robots.Trail] = {}
+        self._notes: dict[RobotId, notes.RobotNotes] = {}
         self._count = 0
 
     def period(self, period: Period) -> Iterator[Said]:
@@ -82,9 +83,12 @@ class Derived:
             trails += trail.add(robot, period.index, at)
         yield Said(TRAILS, tick, SceneUpdate((), tuple(trails)))
         for robot in period.robots:
-            yield Said(
-                f"{PREFIX}{frames.robot_frame(robot.network, robot.slot)}/error", tick, _error(robot, tick)
-            )
+            place = robot.network, robot.slot
+            yield Said(f"{PREFIX}net{place[0]}/robot{place[1]}/error", tick, _error(robot, tick))
+            for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
+                yield Said(LOG, tick, line)
+        for action in period.actions:
+            yield Said(LOG, action.tick, notes.of_action(action))
 
     def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
         found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
@@ -130,3 +134,4 @@ PREFIX = "/foxglove/"
 TRANSFORMS = PREFIX + "transforms"
 SCENE = PREFIX + "scene"
 TRAILS = PREFIX + "trails"
+LOG = PREFIX + "log"

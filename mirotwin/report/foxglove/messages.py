@@ -144,3 +144,17 @@ class CameraCalibration(msgspec.Struct, frozen=True):
     intrinsic: tuple[float, ...] = msgspec.field(name="K")
     rectification: tuple[float, ...] = msgspec.field(name="R")
     projection: tuple[float, ...] = msgspec.field(name="P")
+
+
+INFO, WARNING, ERROR = 2, 3, 4
+
+
+class Log(msgspec.Struct, frozen=True):
+    """`level`: INFO, WARNING or ERROR. `name`: of whom it tells."""
+
+    timestamp: Timestamp
+    level: int
+    message: str
+    name: str
+    file: str = ""
+    line: int = 0

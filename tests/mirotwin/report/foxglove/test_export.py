@@ -3,6 +3,8 @@
 import base64
 import io
 import math
+from collections import Counter
+from itertools import pairwise
 
 import msgspec
 import pytest
@@ -11,6 +13,7 @@ from mcap.reader import make_reader
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, nanoseconds
 from mirotwin.recording import reader
+from mirotwin.recording.channels import ActionMessage
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.recorder import Recorder
 from tests.mirotwin import synthetic
@@ -148,6 +151,22 @@ def test_errors_are_truth_against_reference(shown):
     assert len(found) == 36
 
 
+def test_the_log_tells_of_lost_robots_and_frames(shown):
+    lines = [one.content for one in of(shown, "/foxglove/log")]
+    words = Counter(line["message"].lstrip("0123456789 ") for line in lines)
+    assert words["not measured: the robot or the frame was lost"] >= 3
+    assert words["measured again"] >= 3
+    assert words["damaged frames rejected"] + words["no frame arrived since the last exposure"] >= 3
+    begun = of(shown, "/net0/robot0/truth")
+    measured = {one.time_ns for one in of(shown, "/net0/robot0/measurement")}
+    lost = [one.time_ns not in measured for one in begun][1:]
+    begins = sum(now and not before for before, now in pairwise(lost))
+    told = [
+        line for line in lines if line["name"] == "net0/robot0" and line["message"].startswith("not measured")
+    ]
+    assert len(told) == begins > 0
+
+
 def recorded(count, add, scenario=""):
     """A recording of synthetic periods, whose scenario says nothing unless told."""
     source = reader.RunSource("none", scenario, 0, b":00000001FF\n", "0" * 64)
@@ -157,6 +176,32 @@ def recorded(count, add, scenario=""):
             recorder.write(period)
         add(recorder)
     return stream.getvalue()
+
+
+class Fault:
+    kind, tick, pc, symbol = 3, 5 * CONTROL_PERIOD_TICKS + 7, 0x123, "main"
+
+    def __str__(self):
+        return "writes to a busy LM629 at main+3"
+
+
+def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
+    shown = read(exported(recorded(3, lambda to: to.write_faults(0, 0, [Fault()])))[0])
+    (line,) = of(shown, "/foxglove/log")
+    assert line.time_ns == nanoseconds(Fault.tick)
+    assert (line.content["level"], line.content["name"]) == (4, "net0/robot0")
+    assert line.content["message"] == "firmware fault: writes to a busy LM629 at main+3"
+
+
+def test_what_was_done_to_a_robot_stands_in_the_log():
+    def add(recorder):
+        recorder.write(("/net0/actions", 800_800 * 3 + 5, ActionMessage(800_800 * 3 + 5, 0, "reset", 1)))
+        for period in list(synthetic.periods(4))[3:]:
+            recorder.write(period)
+
+    (line,) = of(read(exported(recorded(3, add))[0]), "/foxglove/log")
+    assert (line.content["message"], line.content["name"]) == ("reset: 1", "net0/robot0")
+    assert line.time_ns == nanoseconds(800_800 * 3 + 5)
 
 
 def test_a_recording_whose_scenario_cannot_be_read_is_shown_without_it_and_that_is_said():

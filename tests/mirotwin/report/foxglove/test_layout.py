@@ -12,6 +12,7 @@ PANELS = LAYOUT["configById"]
 CONFIGS = {
     "3D": layouts.ThreeDeeConfig,
     "Image": layouts.ImageConfig,
+    "RosOut": layouts.LogConfig,
     "RawMessages": layouts.RawMessagesConfig,
     "Plot": layouts.PlotConfig,
 }

@@ -10,7 +10,7 @@ from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
 from mirotwin.report.foxglove import convert
 
-NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration")
+NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
 FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
 
 

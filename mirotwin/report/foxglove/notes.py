@@ -1,0 +1,74 @@
+"""What is worth a line in a log: faults of the firmware, frames and robots that were lost, resets.
+
+A line is written when something begins and when it is over, not once a control period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from miro_protocol.actions import Action, RadioState, Reset
+from miro_sim.periods import RobotPeriod
+from mirotwin.report.foxglove.frames import robot_frame
+from mirotwin.report.foxglove.messages import ERROR, INFO, WARNING, Log, time_of
+
+COUNTER = 1 << 16
+"""The firmware's counters start over here."""
+
+
+class RobotNotes:
+    """Compares each control period of one robot with the one before."""
+
+    def __init__(self) -> None:
+        self._before: RobotPeriod | None = None
+        self._told = 0  # periods before this one in which the PC commanded, without a break
+        self._seen: bool | None = None
+
+    def add(self, robot: RobotPeriod, tick: int) -> Iterator[Log]:
+        """Lines about the control period that began at `tick`."""
+        at, name = time_of(tick), robot_frame(robot.network, robot.slot)
+        seen = robot.measurement is not None
+        if self._seen is not None and seen != self._seen:
+            words = "measured again" if seen else "not measured: the robot or the frame was lost"
+            yield Log(at, INFO if seen else WARNING, words, name)
+        if seen or self._seen is not None:  # nothing is measured before the first frame has arrived
+            self._seen = seen
+        yield from (Log(at, WARNING, words, name) for words in self._frames(robot))
+        self._told = self._told + 1 if robot.control is not None else 0
+        self._before = robot
+
+    def _frames(self, robot: RobotPeriod) -> Iterator[str]:
+        """What the firmware's counters say of the frames since the exposure before."""
+        before = self._before
+        if before is None:
+            return
+        rejected, stale = _more(before.rejected, robot.rejected), _more(before.stale, robot.stale)
+        if rejected:
+            yield f"{rejected} damaged frames rejected"
+        if stale:
+            yield f"{stale} valid frames were not fresh"
+        missing = robot.accepted is not None and not _more(before.accepted, robot.accepted)
+        if missing and self._told >= 2 and not rejected and not stale:
+            yield "no frame arrived since the last exposure"
+
+
+def _more(before: int | None, now: int | None) -> int:
+    """By how much a counter rose; a counter that is lower started again."""
+    if before is None or now is None or (now < before and before < COUNTER // 2):
+        return 0
+    return (now - before) % COUNTER
+
+
+def of_fault(network: int, slot: int, tick: int, text: str) -> Log:
+    """What the firmware did that it must not do."""
+    return Log(time_of(tick), ERROR, f"firmware fault: {text}", robot_frame(network, slot))
+
+
+def of_action(action: Action) -> Log:
+    """What was done to a robot, or to the radio of a network."""
+    at = time_of(action.tick)
+    if isinstance(action, RadioState):
+        return Log(at, INFO, f"radio: {action.state}", f"net{action.network}")
+    if isinstance(action, Reset):
+        return Log(at, INFO, f"reset: {action.level}", robot_frame(action.network, action.slot))
+    return Log(at, INFO, f"power: {action.on}", robot_frame(action.network, action.slot))
