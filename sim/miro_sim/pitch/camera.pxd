@@ -8,7 +8,9 @@ cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM
 cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _NEAR, _LOW_U, _HIGH_U, _LOW_V, _HIGH_V, _LIFT, _FAST_UM
 cdef long long _HALF_UM, _TOP_UM
 
+@cython.locals(place=double)
 cdef int _um(double metres) noexcept
+@cython.locals(below=double)
 cdef int _rounded(double x) noexcept
 
 
@@ -19,7 +21,8 @@ cdef class Camera:
     cdef readonly rays.Rays rays
     cdef scene.Scene scene
     cdef readonly sensor.Sensor sensor
-    cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, above, below, place, times
+    cdef int sets, field_sets, fields, side, black, span_first, span_end, first, samples, upper, lower, above, below
+    cdef int lanes, times, place
     cdef list stood, covers
     cdef long long changes, scene_changed
     cdef long long changed[10]
@@ -55,8 +58,8 @@ cdef class Camera:
     cdef int high_v[4]
     cdef unsigned char covered[16384]
     cdef long long total[16384]
-    cdef int u[64]
-    cdef int v[64]
+    cdef int u[16]
+    cdef int v[16]
     cdef int seen[128]
     cdef int height_um[128]
 
@@ -109,29 +112,38 @@ cdef class Camera:
     cdef inline int _within(self, int row, int column, int box) noexcept
     @cython.locals(across_u=bint, across_v=bint, within=int, first=int, lane='long long')
     cdef int _count_within(self, int row, int column, int at) noexcept
+    cdef inline int _count(self, bint across_u, bint across_v) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept
-    cdef inline int _count(self, bint across_u, bint across_v, bint across) noexcept
+    @cython.locals(lane='long long', above='long long', below='long long', a=int, b=int, c=int, d=int)
+    cdef inline void _lay(self, int* corners, int* at, int* by, int* right, int* bend) noexcept
     @cython.locals(at='int[4]', by='int[4]', right='int[4]', bend='int[4]', within='int[4]', upper=int, lower=int,
-                   above='long long', below='long long', lane='long long', least=int, most=int, a=int, b=int, c=int,
-                   d=int, down=int, first=int, last=int, _=int)
+                   lane='long long', least=int, most=int, a=int, b=int, c=int, d=int, down=int, above=int, below=int,
+                   _=int)
     cdef int _count_along(self, int* corners, int* low, int* high) noexcept
     cdef inline int _add(self, int* within) noexcept
-    @cython.locals(inside='int[4]', within='int[4]', fall_u='double[4]', fall_v='double[4]', most='double[4]',
-                   at='long long', lane='long long', u=int, v=int, inside_u=int, off=double)
-    cdef int _count_both(self, bint across) noexcept
-    @cython.locals(first='int[4]', at='int[4]', right='int[4]', down='int[4]', bend='int[4]', place='int[4]',
-                   above='long long', below='long long', row='long long', column='long long', lane='long long', a=int,
-                   b=int, c=int, d=int)
-    cdef void _spread(self, int* corners, int* samples) noexcept
+    @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
+                   right_v='int[4]', bend_v='int[4]', within='int[4]', upper=int, lower=int, lane='long long', low_u=int,
+                   high_u=int, low_v=int, high_v=int, u=int, v=int, down_u=int, down_v=int, above=int, below=int,
+                   _=int)
+    cdef int _count_both(self) noexcept
     @cython.locals(entered=int, first=int)
     cdef int _entered(self, int body, int row, int column, int on_top) noexcept
-    @cython.locals(least_u='long long', most_u='long long', least_v='long long', most_v='long long', u='long long',
-                   v='long long', beyond_u=int, beyond_v=int, across=int, gone=int, lane='long long', fall_u='long long',
-                   fall_v='long long', low_u='long long', high_u='long long', low_v='long long', high_v='long long',
-                   middle='long long', around='long long')
-    cdef int _enter(self, int place, int row, int column) noexcept
+    @cython.locals(least_u='int[4]', most_u='int[4]', least_v='int[4]', most_v='int[4]', outside='int[4]',
+                   across_u='int[4]', across_v='int[4]', off='double[4]', over='double[4]', gone=int, crossed_u=int, crossed_v=int, crossed=int, lane='long long', fall_u=int, fall_v=int, low_u=int, high_u=int,
+                   low_v=int, high_v=int, u=int, v=int, along_u=double, along_v=double, middle=double,
+                   around=double)
+    cdef int _enter(self, int place, int pixel) noexcept
+    @cython.locals(above='long long', below='long long', lane='long long', a=int, b=int, c=int, d=int)
+    cdef inline void _bound_corners(self, int* corners, int* least, int* most) noexcept
     @cython.locals(x=double, y=double, lane='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
+    @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
+                   right_v='int[4]', bend_v='int[4]', within='int[4]', fall_u='double[4]', fall_v='double[4]',
+                   most='double[4]', u='int[4]', v='int[4]', row=int, shown=int, lane='long long', one=int, other=int,
+                   across=double, inside=int, _=int)
+    cdef int _count_entering(self) noexcept
+    @cython.locals(a=int, b=int, c=int, d=int, column=int, p=int, at=int, by=int)
+    cdef inline void _spread(self, int* samples, int* corners) noexcept
     @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, number=int, at=int, first=int, open_paint=int, body=int, sample=int, paint=int,
                    height=int, ball=int, total='long long')
     cdef long long _samples(self, int row, int column) noexcept

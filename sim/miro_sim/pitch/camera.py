@@ -69,8 +69,8 @@ class Camera:
         *("corner_u", "corner_v", "line_least_u", "line_most_u", "line_least_v", "line_most_v"),
         *("least_u", "most_u", "least_v", "most_v"),
         *("stood", "changes", "changed", "scene_changed", "place", "covers"),
-        *("covered", "covered_first", "covered_end", "total", "first", "samples", "times"),
-        *("above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
+        *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
+        *("lanes", "times", "above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
         *("u", "v", "seen", "height_um"),
     )
 
@@ -124,13 +124,14 @@ class Camera:
         self.covered = [0] * 16384
         self.covered_first, self.covered_end = [0] * 4, [0] * 4
         self.total = [0] * 16384
-        self.first, self.samples = 0, 16 // settings.fields  # of a field
-        self.times = 1  # how often an instant that is worked out counts
+        self.first, self.samples = 0, 16
+        self.lanes = self.times = 1  # instants of a field that are worked out, and how often each one counts
+        self.upper, self.lower = -1, -1
         self.above, self.below = 0, 0
         self.fall_u, self.fall_v = [0] * 4, [0] * 4
         self.low_u, self.high_u = [0] * 4, [0] * 4
         self.low_v, self.high_v = [0] * 4, [0] * 4
-        self.u, self.v = [0] * 64, [0] * 64
+        self.u, self.v = [0] * 16, [0] * 16
         self.seen, self.height_um = [0] * 128, [0] * 128
 
     def __repr__(self) -> str:
@@ -367,11 +368,13 @@ class Camera:
                 self.line_least_u[column + lane] = self.line_least_v[column + lane] = _LIFT
                 self.line_most_u[column + lane] = self.line_most_v[column + lane] = -_LIFT
         still = self.drift_um[body] == _ROUNDED_UM
+        self.lanes = 1 if still else self.field_sets
         self.times = self.field_sets if still else 1
-        for number in range(0, self.sets, self.times):
-            at = self.instants[number]
-            line = 4 * ((at >> 2) * _FIELD + bounds) + (at & 3)
-            self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
+        for number in range(self.sets):
+            if number % self.times == 0:
+                at = self.instants[number]
+                line = 4 * ((at >> 2) * _FIELD + bounds) + (at & 3)
+                self._turn_corners(body * _SETS + at, row * _CORNERS, line, bounds, left, right)
 
     def _turn_corners(self, place: int, corner: int, line: int, bounds: int, left: int, right: int) -> None:
         """The same at one instant. In doubles, which hold these products exactly."""
@@ -487,8 +490,12 @@ class Camera:
         packed = self.scene.packed
         team = self._within(row, column, _TEAM)
         identity = self._within(row, column, _IDENTITY) if team < on_top else 0
-        total = team * packed[self.team_paint[body]] + identity * packed[self.identity_paint[body]]
-        return total + (on_top - team - identity) * packed[self.black]
+        total = (on_top - team - identity) * packed[self.black]
+        if team:
+            total += team * packed[self.team_paint[body]]
+        if identity:
+            total += identity * packed[self.identity_paint[body]]
+        return total
 
     def _within(self, row: int, column: int, box: int) -> int:
         """How many samples of all instants lie in a rectangle."""
@@ -509,36 +516,47 @@ class Camera:
         within = 0
         for first in range(0, 4 * self.fields, 4):
             self._turn(row, column, first)
-            within += self._count(across_u, across_v, False)
+            within += self._count(across_u, across_v)
         return within
 
     def _turn(self, row: int, column: int, at: int) -> None:
-        """Turns to a pixel at an instant: where its corners are, and the samples of its field."""
+        """Turns to a pixel at an instant: where its corners are, and its samples: 16, or the 8 of its field."""
         self.above = 4 * ((at >> 2) * _FIELD + (row & 1) * _LINE + column) + (at & 3)
         self.below = 4 * ((at >> 2) * _FIELD + (~row & 1) * _LINE + column) + (at & 3)
-        self.first = 8 * (at >> 2)
+        if self.fields == 2:
+            self.first, self.samples = 8 * (at >> 2), 8
+            self.upper, self.lower = (at >> 2) - 1, 0 - (at >> 2)
 
-    def _count(self, across_u: int, across_v: int, across: int) -> int:
-        """How many samples at the instants of a field lie in its rectangles; along which axes edges are crossed.
+    def _lay(
+        self, corners: list[int], at: list[int], by: list[int], right: list[int], bend: list[int]
+    ) -> None:
+        """How the samples of a pixel lie along one axis at each instant of a field, times 64.
 
-        `across`: the rays of samples may also pass beside the robot's square.
+        The one of the first row and column lies at `at` + `by`, each further row 2 `by` on. In the next column `at` is
+        `right` more, `by` is `bend` more.
         """
+        above, below = self.above, self.below
+        for lane in range(4):
+            a, b = corners[above + lane], corners[above + lane + 4] - corners[above + lane]
+            c, d = corners[below + lane] - a, corners[below + lane + 4] - corners[below + lane] - b
+            at[lane] = 64 * a + 8 * b
+            by[lane] = 8 * c + d
+            right[lane] = 16 * b
+            bend[lane] = 2 * d
+
+    def _count(self, across_u: int, across_v: int) -> int:
+        """How many samples at the instants of a field lie in its rectangles; along which axes edges are crossed."""
         if not across_v:
             return self._count_along(self.corner_u, self.low_u, self.high_u)
         if not across_u:
             return self._count_along(self.corner_v, self.low_v, self.high_v)
-        return self._count_both(across)
+        return self._count_both()
 
     def _count_along(self, corners: list[int], low: list[int], high: list[int]) -> int:
-        """The same along one axis, times 64."""
-        above, below = self.above, self.below
-        upper, lower = -(self.first == 0), -(self.first + self.samples == 16)
+        """The same along one axis."""
         at, by, right, bend, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
-        for lane in range(4):
-            a, b = corners[above + lane], corners[above + lane + 4] - corners[above + lane]
-            c, d = corners[below + lane] - a, corners[below + lane + 4] - corners[below + lane] - b
-            at[lane], by[lane] = 64 * a + 8 * b, 8 * c + d
-            right[lane], bend[lane] = 16 * b, 2 * d
+        self._lay(corners, at, by, right, bend)
+        upper, lower = self.upper, self.lower
         for _ in range(4):
             for lane in range(4):
                 least, most = 64 * low[lane] + 63, 64 * high[lane] + 63
@@ -547,59 +565,47 @@ class Camera:
                 b = a + down
                 c = b + down
                 d = c + down
-                first = (a > least) - (a > most) + (b > least) - (b > most)
-                last = (c > least) - (c > most) + (d > least) - (d > most)
-                within[lane] += (first & upper) + (last & lower)
+                above = (a > least) - (a > most) + (b > least) - (b > most)
+                below = (c > least) - (c > most) + (d > least) - (d > most)
+                within[lane] += (above & upper) + (below & lower)
                 at[lane] += right[lane]
                 by[lane] += bend[lane]
         return self._add(within)
 
     def _add(self, within: list[int]) -> int:
         """What is counted at the instants of a field."""
-        return within[0] * self.times if self.times == self.field_sets else within[0] + within[1] + within[2]
+        return within[0] + within[1] + within[2] if self.lanes == 3 else within[0] * self.times
 
-    def _count_both(self, across: int) -> int:
+    def _count_both(self) -> int:
         """The same along both axes."""
-        self._spread(self.corner_u, self.u)
-        self._spread(self.corner_v, self.v)
-        inside, within = [0] * 4, [0] * 4
-        fall_u, fall_v, most = [0.0] * 4, [0.0] * 4, [0.0] * 4
-        for lane in range(4):
-            fall_u[lane], fall_v[lane] = self.fall_u[lane], self.fall_v[lane]
-            most[lane] = _HALF_UM * (abs(fall_u[lane]) + abs(fall_v[lane]))
-        for at in range(4 * self.first, 4 * (self.first + self.samples), 4):
+        at_u, by_u, right_u, bend_u = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        at_v, by_v, right_v, bend_v, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._lay(self.corner_u, at_u, by_u, right_u, bend_u)
+        self._lay(self.corner_v, at_v, by_v, right_v, bend_v)
+        upper, lower = self.upper, self.lower
+        for _ in range(4):
             for lane in range(4):
-                u, v = self.u[at + lane], self.v[at + lane]
-                inside_u = (u > self.low_u[lane]) - (u > self.high_u[lane])
-                inside[lane] = inside_u & ((v > self.low_v[lane]) - (v > self.high_v[lane]))
-            if across:
-                for lane in range(4):
-                    off = self.u[at + lane] * fall_v[lane] - self.v[at + lane] * fall_u[lane]
-                    inside[lane] &= (-most[lane] <= off) & (off <= most[lane])
+                low_u, high_u = 64 * self.low_u[lane] + 63, 64 * self.high_u[lane] + 63
+                low_v, high_v = 64 * self.low_v[lane] + 63, 64 * self.high_v[lane] + 63
+                u, v = at_u[lane] + by_u[lane], at_v[lane] + by_v[lane]
+                down_u, down_v = by_u[lane] + by_u[lane], by_v[lane] + by_v[lane]
+                above = ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                above += ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                below = ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                u += down_u
+                v += down_v
+                below += ((u > low_u) - (u > high_u)) & ((v > low_v) - (v > high_v))
+                within[lane] += (above & upper) + (below & lower)
             for lane in range(4):
-                within[lane] += inside[lane]
+                at_u[lane] += right_u[lane]
+                by_u[lane] += bend_u[lane]
+                at_v[lane] += right_v[lane]
+                by_v[lane] += bend_v[lane]
         return self._add(within)
-
-    def _spread(self, corners: list[int], samples: list[int]) -> None:
-        """Where the samples of a pixel lie along one axis, at each instant of a field: as `rays.between`."""
-        above, below = self.above, self.below
-        first, at, right, down, bend, place = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
-        for lane in range(4):
-            a, b = corners[above + lane], corners[above + lane + 4] - corners[above + lane]
-            c, d = corners[below + lane] - a, corners[below + lane + 4] - corners[below + lane] - b
-            first[lane] = a
-            at[lane] = 8 * (b + c) + d
-            right[lane], down[lane], bend[lane] = 16 * b + 2 * d, 16 * c + 2 * d, 4 * d
-        for row in range(0, 64, 16):
-            for lane in range(4):
-                place[lane] = at[lane]
-            for column in range(row, row + 16, 4):
-                for lane in range(4):
-                    samples[column + lane] = first[lane] + (place[lane] >> 6)
-                    place[lane] += right[lane]
-            for lane in range(4):
-                at[lane] += down[lane]
-                right[lane] += bend[lane]
 
     def _entered(self, body: int, row: int, column: int, on_top: int) -> int:
         """How many samples of all instants see any of a robot, `on_top` of them its top."""
@@ -610,33 +616,52 @@ class Camera:
         entered = 0
         for first in range(0, 4 * self.fields, 4):
             self._turn(row, column, first)
-            entered += self._enter(body * _SETS + first, row, column)
+            entered += self._enter(body * _SETS + first, row * _WIDTH + column)
         return entered
 
-    def _enter(self, place: int, row: int, column: int) -> int:
+    def _enter(self, place: int, pixel: int) -> int:
         """How many samples at the instants of a field see any of a robot: as `rays.enters`."""
-        self._fall(place, row * _WIDTH + column)
-        least_u, most_u = self.least_u[column], self.most_u[column]
-        least_v, most_v = self.least_v[column], self.most_v[column]
-        u, v = (least_u + most_u) >> 1, (least_v + most_v) >> 1
-        beyond_u = beyond_v = across = gone = 0
-        for lane in range(self.field_sets // self.times):
+        least_u, most_u, least_v, most_v = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._bound_corners(self.corner_u, least_u, most_u)
+        self._bound_corners(self.corner_v, least_v, most_v)
+        self._fall(place, pixel)
+        outside, across_u, across_v, off, over = [0] * 4, [0] * 4, [0] * 4, [0.0] * 4, [0.0] * 4
+        for lane in range(4):
             fall_u, fall_v = self.fall_u[lane], self.fall_v[lane]
             low_u, high_u = -_HALF_UM - 1 - max(fall_u, 0), _HALF_UM - min(fall_u, 0)
             low_v, high_v = -_HALF_UM - 1 - max(fall_v, 0), _HALF_UM - min(fall_v, 0)
             self.low_u[lane], self.high_u[lane] = low_u, high_u
             self.low_v[lane], self.high_v[lane] = low_v, high_v
-            beyond_u |= (least_u <= low_u) | (most_u > high_u)
-            beyond_v |= (least_v <= low_v) | (most_v > high_v)
-            middle = abs(u * fall_v - v * fall_u) - _HALF_UM * (abs(fall_u) + abs(fall_v))
-            around = (most_u - u) * abs(fall_v) + (most_v - v) * abs(fall_u)
-            across |= middle + around > 0
-            gone += middle > around
-        if gone * self.times == self.field_sets:
+            outside[lane] = (most_u[lane] <= low_u) | (least_u[lane] > high_u)
+            outside[lane] |= (most_v[lane] <= low_v) | (least_v[lane] > high_v)
+            across_u[lane] = (least_u[lane] <= low_u) | (most_u[lane] > high_u)
+            across_v[lane] = (least_v[lane] <= low_v) | (most_v[lane] > high_v)
+        for lane in range(4):
+            u, v = (least_u[lane] + most_u[lane]) >> 1, (least_v[lane] + most_v[lane]) >> 1
+            along_u, along_v = self.fall_u[lane], self.fall_v[lane]
+            middle = abs(u * along_v - v * along_u) - _HALF_UM * (abs(along_u) + abs(along_v))
+            around = (most_u[lane] - u) * abs(along_v) + (most_v[lane] - v) * abs(along_u)
+            off[lane], over[lane] = middle - around, middle + around
+        gone = crossed_u = crossed_v = crossed = 0
+        for lane in range(self.lanes):
+            gone += outside[lane] | (off[lane] > 0.0)
+            crossed |= over[lane] > 0.0
+            crossed_u |= across_u[lane]
+            crossed_v |= across_v[lane]
+        if gone == self.lanes:
             return 0
-        if not beyond_u | beyond_v | across:
-            return self.samples * self.field_sets
-        return self._count(beyond_u | across, beyond_v | across, across)
+        if crossed:
+            return self._count_entering()
+        return self._count(crossed_u, crossed_v) if crossed_u | crossed_v else self.samples * self.field_sets
+
+    def _bound_corners(self, corners: list[int], least: list[int], most: list[int]) -> None:
+        """Between which bounds a pixel's corners lie along one axis, at each instant of a field."""
+        above, below = self.above, self.below
+        for lane in range(4):
+            a, b = corners[above + lane], corners[above + lane + 4]
+            c, d = corners[below + lane], corners[below + lane + 4]
+            least[lane] = min(min(a, b), min(c, d))
+            most[lane] = max(max(a, b), max(c, d))
 
     def _fall(self, place: int, pixel: int) -> None:
         """How far rays fall in a robot's axes, at an instant and the next ones of its field."""
@@ -647,6 +672,51 @@ class Camera:
         for lane in range(4):
             self.fall_u[lane] -= _LIFT
             self.fall_v[lane] -= _LIFT
+
+    def _count_entering(self) -> int:
+        """How many samples see any of a robot, one by one."""
+        at_u, by_u, right_u, bend_u = [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        at_v, by_v, right_v, bend_v, within = [0] * 4, [0] * 4, [0] * 4, [0] * 4, [0] * 4
+        self._lay(self.corner_u, at_u, by_u, right_u, bend_u)
+        self._lay(self.corner_v, at_v, by_v, right_v, bend_v)
+        fall_u, fall_v, most = [0.0] * 4, [0.0] * 4, [0.0] * 4
+        for lane in range(4):
+            fall_u[lane], fall_v[lane] = self.fall_u[lane], self.fall_v[lane]
+            most[lane] = _HALF_UM * (abs(fall_u[lane]) + abs(fall_v[lane]))
+        u, v = [0] * 4, [0] * 4
+        for _ in range(4):
+            for lane in range(4):
+                u[lane], v[lane] = at_u[lane] + by_u[lane], at_v[lane] + by_v[lane]
+            for row in range(4):
+                shown = self.upper if row < 2 else self.lower
+                for lane in range(4):
+                    one, other = u[lane] >> 6, v[lane] >> 6
+                    inside = (one > self.low_u[lane]) & (one <= self.high_u[lane])
+                    inside &= (other > self.low_v[lane]) & (other <= self.high_v[lane])
+                    across = one * fall_v[lane] - other * fall_u[lane]
+                    within[lane] += inside & (-most[lane] <= across) & (across <= most[lane]) & shown
+                for lane in range(4):
+                    u[lane] += 2 * by_u[lane]
+                    v[lane] += 2 * by_v[lane]
+            for lane in range(4):
+                at_u[lane] += right_u[lane]
+                by_u[lane] += bend_u[lane]
+                at_v[lane] += right_v[lane]
+                by_v[lane] += bend_v[lane]
+        return self._add(within)
+
+    def _spread(self, samples: list[int], corners: list[int]) -> None:
+        """How far samples lie from a pixel's first corner: as `rays.between`; those of the other field lie far away."""
+        a = corners[self.above]
+        b, c, d = corners[self.above + 4] - a, corners[self.below] - a, corners[self.below + 4] - a
+        for column in range(4):
+            p = 2 * column + 1
+            at = 8 * p * b
+            by = 8 * c + p * (d - b - c)
+            samples[column] = (at + by) >> 6
+            samples[4 + column] = (at + 3 * by) >> 6
+            samples[8 + column] = (at + 5 * by) >> 6
+            samples[12 + column] = (at + 7 * by) >> 6
 
     # ---- several robots, or much in the background
 
@@ -687,10 +757,10 @@ class Camera:
         """What the samples of an instant see of one robot, where it is higher than what they have seen."""
         self._fall(body * _SETS + at, pixel)
         fall_u, fall_v = self.fall_u[0], self.fall_v[0]
-        self._spread(self.corner_u, self.u)
-        self._spread(self.corner_v, self.v)
+        self._spread(self.u, self.corner_u)
+        self._spread(self.v, self.corner_v)
         for sample in range(self.first, self.first + self.samples):
-            u, v = self.u[4 * sample], self.v[4 * sample]
+            u, v = self.corner_u[self.above] + self.u[sample], self.corner_v[self.above] + self.v[sample]
             index = 16 * at + sample
             if self.height_um[index] == _TOP_UM:
                 continue
