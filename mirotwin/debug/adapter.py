@@ -19,7 +19,7 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
 from miro_robot.mcs51.opcodes import BITS, LENGTH, SFRS, disassemble
 from mirotwin.debug.console import VERBS, Console, shown_value
-from mirotwin.debug.debugger import Breakpoint, Debugger
+from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Value, children, content, expression
 from mirotwin.debug.subject import launched, open_subject
 from mirotwin.debug.symbols import SIZES, Moment
@@ -123,11 +123,16 @@ class Adapter:
             if given.get("stopOnEntry", True) is False:
                 self._go("continue", False)
             else:
-                if why == "begin":
-                    self.its.step("into")  # to the first line of C: an editor shows nothing of what is before
-                self._stopped(why, "\n".join(said))
+                self._stopped(self._at_first_line(why), "\n".join(said))
 
         self.begin = begin
+
+    def _at_first_line(self, why: str) -> str:
+        """Goes on from reset to the first line of C: an editor shows nothing of what is before. Why it stopped."""
+        if why != "begin" or self.its.timeline.tick or not self.its.symbols.line_begins:
+            return why
+        found = self.its.step("into")
+        return why if found == STEPPED else found
 
     def use(self, debugger: Debugger) -> None:
         """From now on it answers for this one."""

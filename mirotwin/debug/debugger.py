@@ -149,6 +149,7 @@ class Debugger:
         return self._pushed(written, cpu) or written.are_written(cpu)
 
     def _pushed(self, written: Bytes, cpu: Cpu) -> bool:
+        """Whether the hardware has just called a routine, and the return address that it pushed lies there."""
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
         return bool(entered) and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
 

@@ -6,7 +6,10 @@ import socket
 import pytest
 
 from tests import children
+from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.debug.runs import robot_run
 from tests.mirotwin.program import COMMAND
+from tests.robot.mcs51.asm import assemble
 
 NO_MESSAGE = "mirotwin: error: --dap: the client sends no message of the protocol"
 
@@ -258,6 +261,24 @@ def test_an_editor_begins_at_the_first_line_of_c(adapter):
     client.begin(subject="fig6")
     first = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]
     assert (first["name"], first["source"]["name"]) == ("main", "main.c")
+
+
+def test_an_editor_begins_at_reset_where_the_image_has_no_lines(adapter, tmp_path):
+    _, client = adapter
+    image = hex_file(tmp_path / "bare.ihx", assemble("NOP\nNOP\nSJMP $"))
+    client.begin(subject=str(image))
+    assert client.ask("evaluate", expression="PC")["body"]["result"] == "0"
+
+
+def test_an_editor_begins_where_a_saved_world_stands(adapter, tmp_path):
+    _, client = adapter
+    world = robot_run().world
+    world.run_to(1_200_000)
+    saved = tmp_path / "at.world"
+    saved.write_bytes(world.save())
+    client.begin(subject="fig6", seed=7, resume=str(saved))
+    found = client.ask("evaluate", expression="cycle")["body"]["result"]
+    assert found.split()[0] == str(world.robot().board.cpu.cycles)
 
 
 def test_an_editor_opens_the_files_of_the_folder_that_is_named_first(adapter, tmp_path):
