@@ -37,8 +37,8 @@ _refuse_if_stale(__name__, __source_sha256__)
 
 DIRECTIVES = {
     "language_level": 3,
-    "annotation_typing": False,  # C types come from the .pxd alone,
-    "infer_types": True,  # and of locals that it does not name, from what is assigned to them
+    "annotation_typing": False,  # C types come from the .pxd
+    "infer_types": True,  # ... and those of locals that it does not name from what is assigned to them
     "boundscheck": False,
     "wraparound": False,
     "initializedcheck": False,

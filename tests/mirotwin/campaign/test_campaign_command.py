@@ -175,7 +175,7 @@ def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
     workers = children_of(process.pid)
     process.kill()
     process.communicate()
-    until(lambda: not any(map(runs, workers)))  # they have nobody left to work for
+    until(lambda: not any(map(runs, workers)))  # they end when their parent does
     left = part.read_bytes().count(b"\n") - 1
     assert 3 <= left < 40
     out = mirotwin.succeeds("campaign", "short.toml", "--jobs", 1)

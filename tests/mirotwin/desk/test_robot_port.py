@@ -1,4 +1,4 @@
-"""Ports that vanish, block, speak nonsense or are somebody else's, and what may be sent to a robot that can hurt."""
+"""Ports that vanish, block, deliver garbage or are in use, and what may be sent to a robot that can hurt."""
 
 import errno
 import os

@@ -179,8 +179,8 @@ def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
     assert "lies at other addresses" in found.notes[0]
     state = next(one for one in found.variables if one.name == "_state")
     assert (state.one, state.other) == (2, 1)  # stopped, driving
-    writer, nobody = state.writers
-    assert nobody is None
+    writer, other = state.writers
+    assert other is None
     assert writer.symbol.startswith("_motion_stop")
     assert writer.source == "state = STATE_STOPPED;"
     assert writer.line.startswith("motion.c:")
@@ -211,7 +211,7 @@ def test_without_a_compiler_a_patched_constant_is_found_too():
 
 
 def test_data_that_no_instruction_lies_in_is_found_by_its_effect():
-    """A nibble of the CRC table in code memory: read by MOVC, executed by nobody."""
+    """A nibble of the CRC table in code memory: read by MOVC, never executed."""
     own = own_image()
     table = own.symbols.names["_crc_nibble_low"].address
     found = apart(with_byte(own, table + 5, own.code[table + 5] ^ 1))
