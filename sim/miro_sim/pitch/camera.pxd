@@ -151,5 +151,5 @@ cdef class Camera:
                    height='long long')
     cdef void _see(self, int body, int at, int pixel) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
-    @cython.locals(at=int, inside_u=bint)
+    @cython.locals(at=int)
     cdef inline bint _lies_in(self, int box, long long u, long long v) noexcept

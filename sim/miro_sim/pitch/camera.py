@@ -240,7 +240,8 @@ class Camera:
         drift = 0
         for number in range(self.sets):
             place = body * _SETS + self.instants[number]
-            way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
+            way = abs(self.x[place] - self.x[middle])
+            way += abs(self.y[place] - self.y[middle])  # in two steps: 32 bits may not hold the sum
             turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
             drift = max(drift, way + way // 4 + (length * turn >> 15))
         self.drift_um[body] = drift + _ROUNDED_UM
@@ -782,8 +783,7 @@ class Camera:
     def _lies_in(self, box: int, u: int, v: int) -> bool:
         """Whether a place lies in a rectangle."""
         at = 4 * box
-        inside_u = self.edges[at] < u <= self.edges[at + 1]
-        return inside_u and self.edges[at + 2] < v <= self.edges[at + 3]
+        return self.edges[at] < u <= self.edges[at + 1] and self.edges[at + 2] < v <= self.edges[at + 3]
 
 
 def _um(metres: float) -> int:
