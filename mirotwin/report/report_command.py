@@ -28,7 +28,7 @@ from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, 
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
-from mirotwin.verify.cases.artifacts import CASES, REPORT
+from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
 from mirotwin.verify.cases.case import is_bare_case, tables_of
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.expect import expectations_of
@@ -84,9 +84,7 @@ def report(options: ReportOptions) -> int:
         remedy = f"`mirotwin campaign page {subject}` makes its page"
         raise BadInput(subject, "", "holds the results of a campaign", remedy)
     checked_sources(options.sources)
-    made = page_of(options)
-    check_size(made, subject, SMALLER)
-    return write_page(place, made, options.quiet)
+    return write_page(place, page_of(options), options.quiet)
 
 
 def is_campaign(subject: str) -> bool:
@@ -97,8 +95,10 @@ def is_campaign(subject: str) -> bool:
         return file.read(len(PARQUET)) == PARQUET
 
 
-def page_of(wanted: ReportOptions) -> bytes:
-    """The page; of robots at a port, it shows them beside their twin. Raises BadInput, and OSError as `open` does."""
+def page_of(wanted: ReportOptions, name: str = "") -> bytes:
+    """The page, of the failed test `name`, else of a folder's name; of robots at a port, it shows them beside their
+    twin. Raises BadInput, and OSError as `open` does.
+    """
     window(wanted.from_time, wanted.to_time)
     file = _file_of(wanted.subject)
     if is_bare_case(file):
@@ -106,14 +106,17 @@ def page_of(wanted: ReportOptions) -> bytes:
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
     job = load_job(file, wanted.firmware)
     if job.origin:
-        return port_page(job, wanted.quiet)
-    return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job))
+        page = port_page(job, wanted.quiet)
+    else:
+        page = run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name))
+    check_size(page, wanted.subject, SMALLER)
+    return page
 
 
-def page_of_failure(folder: str) -> bytes:
-    """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
+def leave_page(folder: Path, name: str = "") -> None:
+    """Writes the page of what the test `name` left in `folder`. Raises BadInput, also where Bokeh is missing."""
     require_bokeh()
-    return page_of(ReportOptions(subject=folder, quiet=True))
+    (folder / PAGE).write_bytes(page_of(ReportOptions(subject=str(folder), quiet=True), name))
 
 
 def _file_of(subject: str) -> str:
@@ -173,7 +176,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
     )
 
 
-def _of_case(wanted: ReportOptions, job: Job) -> Material:
+def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     file, image = job.file, job.runs_on
     _, to_tick = window(wanted.from_time, wanted.to_time)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
@@ -186,7 +189,7 @@ def _of_case(wanted: ReportOptions, job: Job) -> Material:
         about=msgspec.structs.replace(
             about,
             report=text,
-            name=Path(file).absolute().parent.name if text else "",
+            name=(name or Path(file).absolute().parent.name) if text else "",
             verdict="failed" if text and not again.failures else "",
         ),
         scenario=job.scenario,

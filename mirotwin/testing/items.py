@@ -10,29 +10,21 @@ import os
 import re
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import msgspec
 import pytest
-import tomli_w
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
-from miro_sim.world.world import World
-from mirotwin.report.page.bokeh_page import has_bokeh
-from mirotwin.report.page.document import MOST_BYTES
-from mirotwin.report.page.reproduction import reproduce
-from mirotwin.report.page.run_page import Material, PageHeader, run_page
-from mirotwin.shell.debug_files import source_folders
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed, at
-from mirotwin.verify.cases.artifacts import PAGE, case_lines, clear, leave, report_line
-from mirotwin.verify.cases.case import case_of_checks, case_text, tables_of
+from mirotwin.verify.cases.artifacts import case_lines, clear, leave, report_line
+from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.cases.rerun import case_of_expect
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.rig_options import marker_options, rig_options
 
@@ -124,9 +116,11 @@ def tell(
     report.sections.append(("mirotwin", text))
     if folder is not None:
         leave_test(folder, rig, failures, text, case)
-        page = page_of(rig, item.nodeid, error, text, lines) if pages else None
-        if page is not None:
-            (folder / PAGE).write_bytes(page)
+        if pages and not rig.written:
+            from mirotwin.report.report_command import leave_page  # loads readers of recordings
+
+            with suppress(ValueError):  # a report of a failure does not fail, nor where Bokeh is missing
+                leave_page(folder, item.nodeid)
 
 
 def let_go(item: pytest.Item) -> None:
@@ -204,51 +198,3 @@ def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, c
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
     leave(folder, text + "\n", case, sent, rig.options.image, others)
-
-
-def page_of(
-    rig: Rig, name: str, caught: BaseException | None, text: str, again: Sequence[str]
-) -> bytes | None:
-    """The page of the run, made again from its input. `text`: the story of the failure, `again`: commands.
-
-    None where Bokeh is not installed, where the test wrote into a robot's memory, and where the run cannot be made
-    again: a report of a failure does not fail.
-    """
-    if rig.written or not has_bokeh():
-        return None
-    try:
-        page = run_page(_material(rig, name, caught, text, again))
-    except ValueError:  # what its own parts raise, too
-        return None
-    return page if len(page) <= MOST_BYTES else None
-
-
-def _material(rig: Rig, name: str, caught: BaseException | None, text: str, again: Sequence[str]) -> Material:
-    options = rig.options
-    scenario = options.scenario
-    expected = dict(options.expected)
-    if isinstance(caught, WaitFailed) and caught.expect is not None:
-        waited = msgspec.structs.replace(scenario, expect=dict(caught.expect))
-        for place, checks in expectations_of(waited, scenario.name).items():
-            known = [check.name for check in expected.get(place, ())]
-            expected[place] = [*expected.get(place, ()), *(one for one in checks if one.name not in known)]
-    world = World(scenario, options.seed, options.image, rig.trace.script())
-    done = reproduce(world, rig.tick, expected)
-    return Material(
-        about=PageHeader(
-            kind="failed test",
-            file=name,
-            name=name,
-            seed=options.seed,
-            firmware=options.image.path.name,
-            firmware_sha256=options.image.sha256 or "",
-            report=text,
-            again=again,
-            verdict="failed",
-        ),
-        scenario=scenario,
-        scenario_text=tomli_w.dumps(tables_of(scenario)),
-        periods=done.periods,
-        again=done,
-        sources=source_folders(options.image),
-    )

@@ -32,7 +32,7 @@ from mirotwin.shell.program import (
     show_line,
     tell_notes,
 )
-from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_lines, report_line
+from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
@@ -225,8 +225,10 @@ def test(options: TestOptions) -> int:
         left_out |= dict.fromkeys(outcome.left_out)
         _show(outcome, options.quiet, again)
         if options.pages and outcome.left:
+            from mirotwin.report.report_command import leave_page  # loads the pages' library
+
             with told_when_full(options.artifacts, "--artifacts"):
-                _page(outcome.left)
+                leave_page(Path(outcome.left))
     if junit is not None:
         _write_junit(junit, outcomes, times_s, lines)
     code = _summary(outcomes)
@@ -234,12 +236,6 @@ def test(options: TestOptions) -> int:
         what = f"no case is judged by {sorted(cases.unused)[0]}"
         raise BadInput("", "--check", what, "leave it out, or name the one that the cases have in [expect]")
     return code
-
-
-def _page(folder: str) -> None:
-    from mirotwin.report.report_command import page_of_failure  # loads the pages' library
-
-    (Path(folder) / PAGE).write_bytes(page_of_failure(folder))
 
 
 def _show(outcome: Outcome, quiet: bool, again: str) -> None:

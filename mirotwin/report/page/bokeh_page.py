@@ -23,12 +23,8 @@ _MODEL_ID = re.compile(rb'"id":"p([0-9]+)"')
 
 def require_bokeh() -> None:
     """Raises BadInput where Bokeh is not installed; does not load it."""
-    if not has_bokeh():
+    if find_spec("bokeh") is None:
         raise BadInput("", "bokeh", "is not installed", "pip install 'mirotwin[report]'")
-
-
-def has_bokeh() -> bool:
-    return find_spec("bokeh") is not None
 
 
 def javascript() -> str:
