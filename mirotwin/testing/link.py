@@ -6,24 +6,24 @@ that a wait for something else (`world`, `robot`) takes nothing away from it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
-from miro_protocol.frames import ContentError, Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
-from miro_sim.periods import Period
-from miro_sim.world.conditions import Answer, Condition, Heard
+from miro_sim.world.conditions import Answer, Condition, Heard, answer_of
 from miro_sim.world.events import Cursor, Event
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
-from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
+from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.frame_sender import FrameSender
 
+T = TypeVar("T")
 _CHARACTERS_KEPT = 4096
 Velocities = Mapping[int, tuple[int, int]]
 """(left, right) by slot, in 1/256 count per LM629 sample."""
@@ -47,9 +47,9 @@ class Link(FrameSender):
         """(tick, answer) of all that were heard."""
         self._waits = Waits(world)
         self._cursor = Cursor(world.networks[network].log)
-        self._open: list[tuple[int, TelemetryFrame]] = []
+        self._open: list[TelemetryFrame] = []
         self._characters: list[Event] = []
-        world.observers.append(self._look)
+        world.observers.append(lambda period: self._gather())
 
     # Sending
 
@@ -146,53 +146,70 @@ class Link(FrameSender):
             names = ", ".join(TelemetryFrame.__struct_fields__)
             raise BadInput("", "link.expect", f"telemetry has no field {wrong[0]!r}", f"it has {names}")
         filters = ", ".join(f"{name}={value}" for name, value in fields.items())
-        what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"
-        deadline = _Deadline(self, what, within, _answer_with(self.network, fields))
-        while True:
-            self._gather()
-            for place, (_, answer) in enumerate(self._open):
+
+        def taken() -> TelemetryFrame | None:
+            for place, answer in enumerate(self._open):
                 if all(getattr(answer, name) == value for name, value in fields.items()):
-                    del self._open[place]
-                    return answer
-            deadline.wait()
+                    return self._open.pop(place)
+            return None
+
+        what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"
+        return self._until(taken, _answer_with(self.network, fields), within, what)
 
     @shown_where_it_was_called
     def expect_bytes(self, pattern: bytes, *, within: int) -> int:
         """Waits until the PC has heard `pattern`, and returns the tick; what stood before it is taken too."""
+
+        def taken() -> int | None:
+            place = bytes(event.value for event in self._characters).find(pattern)
+            if place < 0:
+                return None
+            end = place + len(pattern)
+            tick = self._characters[end - 1].tick
+            del self._characters[:end]
+            return tick
+
         what = f"{pattern.hex(' ')} not heard within {within / 24_000:g} ms"
-        deadline = _Deadline(self, what, within, Heard(network=self.network), judged=False)
+        return self._until(taken, Heard(network=self.network), within, what, judged=False)
+
+    def _until(
+        self,
+        taken: Callable[[], T | None],
+        condition: Condition,
+        within: int,
+        what: str,
+        judged: bool = True,
+    ) -> T:
+        """What `taken` gives now, or after an event of this condition. Raises WaitFailed when the time is over."""
+        begun_tick, left = self.world.tick, within
+        seen: list[Event] = []
         while True:
             self._gather()
-            place = bytes(event.value for event in self._characters).find(pattern)
-            if place >= 0:
-                end = place + len(pattern)
-                tick = self._characters[end - 1].tick
-                del self._characters[:end]
-                return tick
-            deadline.wait()
+            if (found := taken()) is not None:
+                return found
+            try:
+                seen.append(self._waits.until([condition], left))
+            except WaitExpired as expired:
+                raise WaitFailed.of(expired, self.world, what, begun_tick, seen, judged) from None
+            left = max(0, begun_tick + within - self.world.tick)
 
     @shown_where_it_was_called
     def expect_silence(self, for_ticks: int) -> None:
         """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
-        begun = self.world.tick
+        begun_tick = self.world.tick
+        end_tick = begun_tick + for_ticks
         what = f"silence for {for_ticks / 24_000:g} ms"
-        while True:
+        silence = Heard(network=self.network)
+        event = None
+        while event is None or event.tick <= begun_tick:
             try:
-                rest = max(0, begun + for_ticks - self.world.tick)
-                event = self._waits.until([Heard(network=self.network)], rest)
-            except WaitExpired as error:
-                if error.tick < begun + for_ticks:
-                    raise WaitFailed(
-                        f"{what}: {why_ended(self.world)}", begun, error.tick, error.seen
-                    ) from None
+                event = self._waits.until([silence], max(0, end_tick - self.world.tick))
+            except WaitExpired as expired:
+                if expired.tick < end_tick:
+                    raise WaitFailed.of(expired, self.world, what, begun_tick, judged=False) from None
                 return
-            if event.tick > begun:
-                silence = Heard(network=self.network)
-                expect = expect_of("never_happens", silence, begun, begun + for_ticks)
-                raise WaitFailed(f"{what}: broken", begun, event.tick, [event], expect)
-
-    def _look(self, period: Period) -> None:
-        self._gather()
+        expect = expect_of("never_happens", silence, begun_tick, end_tick)
+        raise WaitFailed(f"{what}: broken", begun_tick, event.tick, [event], expect)
 
     def _gather(self) -> None:
         """Reads what the PC has heard by now."""
@@ -203,17 +220,11 @@ class Link(FrameSender):
             cursor.next = serial + 1
             if event.what == "heard":
                 self._characters.append(event)
-            elif event.what == "answer" and event.frame is not None:
-                self._take(event.tick, event.frame)
+            elif event.frame is not None and event.value >= 0 and (answer := answer_of(event.frame)):
+                # of the others the CRC is good, but no correct robot says this: the checks tell
+                self.answers.append((event.tick, answer))
+                self._open.append(answer)
         del self._characters[:-_CHARACTERS_KEPT]
-
-    def _take(self, tick: int, frame: Any) -> None:
-        try:
-            answer = frame.message(self.robots)
-        except ContentError:  # its CRC is good, but no correct robot says this: the checks tell
-            return
-        self.answers.append((tick, answer))
-        self._open.append((tick, answer))
 
     def __repr__(self) -> str:
         return f"Link(net{self.network}, seq={self.seq}, {len(self.answers)} answers, {len(self._open)} not taken)"
@@ -226,30 +237,3 @@ def _answer_with(network: int, fields: Mapping[str, int]) -> Answer:
     for flag in Flags if flags is not None else ():
         wanted[str(flag.name).lower()] = bool(flags & flag)
     return Answer(network=network, **wanted)
-
-
-class _Deadline:
-    """The end of one wait of a link, which may go on several times."""
-
-    def __init__(self, link: Link, what: str, within: int, condition: Condition, judged: bool = True) -> None:
-        if within < 0:
-            raise ValueError(f"within {within}: give a number of ticks that is not negative, ms(40)")
-        self.link = link
-        self.what = what
-        self.condition = condition
-        self.judged = judged
-        self.begun = link.world.tick
-        self.end = self.begun + within
-        self.seen: list[Event] = []
-
-    def wait(self) -> None:
-        """On to the next event. Raises WaitFailed when the time is over."""
-        world, waits = self.link.world, self.link._waits
-        try:
-            self.seen.append(waits.until([self.condition], max(0, self.end - world.tick)))
-        except WaitExpired as error:
-            seen = sorted([*self.seen, *error.seen], key=lambda event: event.tick)
-            seen = [event for event in seen if event.tick >= self.begun]
-            what = self.what if error.tick >= self.end else f"{self.what}: {why_ended(world)}"
-            expect = expect_of("happens", self.condition, self.begun, error.tick) if self.judged else None
-            raise WaitFailed(what, self.begun, error.tick, seen, expect) from None

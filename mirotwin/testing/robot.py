@@ -8,18 +8,19 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import ms
+from miro_host.wheels import Wheels
 from miro_robot.faults import FirmwareFault
 from miro_robot.inspect.values import read_value, write_value
 from miro_robot.lm629.buffers import FORWARD, STOP_ABRUPTLY, STOP_SMOOTHLY, VELOCITY_MODE
 from miro_robot.lm629.buffers import MOTOR_OFF as OFF_WORD
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.signals import MOTOR_OFF
-from miro_sim.world.conditions import Reached, When
+from miro_sim.world.conditions import Condition, Reached, When
 from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.shell.firmware_image import is_up
-from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
+from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called
 
 RESET_TICKS = ms(1)
 """An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""
@@ -77,10 +78,9 @@ class RobotUnderTest:
     @property
     def wheels(self) -> WheelStates:
         """What the wheels do now, and what they were told."""
-        board, spec = self._robot.board, self._robot.spec
-        v_m_s, w_rad_s = self._robot.drive.velocity_at(self.world.tick)
-        half_m_s = 0.5 * spec.drive.chassis.track_m * w_rad_s
-        return WheelStates(_wheel(board.left, v_m_s - half_m_s), _wheel(board.right, v_m_s + half_m_s))
+        board, chassis = self._robot.board, self._robot.spec.drive.chassis
+        left, right = Wheels(track_m=chassis.track_m).split(*self._robot.drive.velocity_at(self.world.tick))
+        return WheelStates(_wheel(board.left, left), _wheel(board.right, right))
 
     @property
     def pose(self) -> tuple[float, float, float]:
@@ -113,19 +113,16 @@ class RobotUnderTest:
         """
         if isinstance(place, str):
             self._check_symbol(place)
-        begun = self.world.tick
         symbol, address = (place, None) if isinstance(place, str) else (None, place)
         condition = Reached(symbol=symbol, address=address, network=self.network, slot=self.slot)
+        return self._until(condition, within, f"{place} was not reached")
+
+    def _until(self, condition: Condition, within: int | None, what: str) -> Event:
         try:
             return self._waits.until([condition], within)
-        except WaitExpired as error:
-            limit = (
-                f": {why_ended(self.world)}"
-                if self.world.finished
-                else f" within {(within or 0) / 24_000:g} ms"
-            )
-            seen = [event for event in error.seen if event.tick >= begun]
-            raise WaitFailed(f"{place} was not reached{limit}", begun, error.tick, seen) from None
+        except WaitExpired as expired:
+            limit = "" if within is None else f" within {within / 24_000:g} ms"
+            raise WaitFailed.of(expired, self.world, f"{what}{limit}") from None
 
     # Its switches
 
@@ -147,13 +144,8 @@ class RobotUnderTest:
     @shown_where_it_was_called
     def wait_until_up(self, within: int = UP_TICKS) -> int:
         """Runs on until the firmware has turned its serial receiver on, and returns the tick. Raises WaitFailed."""
-        begun = self.world.tick
         up = When(predicate=lambda robot: is_up(robot.board.cpu), network=self.network, slot=self.slot)
-        try:
-            return self._waits.until([up], within).tick
-        except WaitExpired as error:
-            what = f"the firmware has not turned its serial receiver on within {within / 24_000:g} ms"
-            raise WaitFailed(what, begun, error.tick, error.seen) from None
+        return self._until(up, within, "the firmware has not turned its serial receiver on").tick
 
     def _check_symbol(self, name: str) -> None:
         symbols = self.world.image.symbols

@@ -46,15 +46,29 @@ class WaitFailed(AssertionError):
         super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
 
     @classmethod
-    def of(cls, expired: WaitExpired, world: World) -> WaitFailed:
-        """In words, a wait of the world that a test has not caught."""
-        wanted = " or ".join(map(str, expired.conditions))
-        seen = [event for event in expired.seen if event.tick >= expired.begun_tick]
+    def of(
+        cls,
+        expired: WaitExpired,
+        world: World,
+        what: str = "",
+        begun_tick: int | None = None,
+        before: Sequence[Event] = (),
+        judged: bool = True,
+    ) -> WaitFailed:
+        """In words, a wait of the world that ran out. `what`: that did not come, else the conditions themselves.
+
+        `begun_tick`: where it began, if it went on several times; `before`: what was seen until the last one. `judged`:
+        a check can say the same.
+        """
+        begun_tick = expired.begun_tick if begun_tick is None else begun_tick
+        what = what or f"no {' or '.join(map(str, expired.conditions))}"
         why = f": {why_ended(world)}" if world.finished else ""
+        seen = [event for event in (*before, *expired.seen) if event.tick >= begun_tick]
+        seen.sort(key=lambda event: event.tick)
         expect = None
-        if len(expired.conditions) == 1:
-            expect = expect_of("happens", expired.conditions[0], expired.begun_tick, expired.tick)
-        return cls(f"no {wanted}{why}", expired.begun_tick, expired.tick, seen, expect)
+        if judged and len(expired.conditions) == 1:
+            expect = expect_of("happens", expired.conditions[0], begun_tick, expired.tick)
+        return cls(f"{what}{why}", begun_tick, expired.tick, seen, expect)
 
 
 def why_ended(world: World) -> str:
