@@ -21,14 +21,12 @@ from mirotwin.shell.outputs import RECORDING, whole_file
 from mirotwin.verify.cases.artifacts import clear
 from mirotwin.verify.steps.keys import (
     CheckStep,
-    HoldStep,
-    NeverStep,
+    ConditionStep,
     PauseStep,
     SaveStep,
     Send,
     Step,
     StreamStep,
-    WaitStep,
 )
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import steps_of
@@ -38,8 +36,7 @@ if TYPE_CHECKING:
     from miro_sim.world.world import World
 
 NOTED = "not observable on a port"
-_CAN_FAIL = (WaitStep, NeverStep)
-_PASSED_OVER = (*_CAN_FAIL, HoldStep, CheckStep, SaveStep)
+_PASSED_OVER = (ConditionStep, CheckStep, SaveStep)
 
 
 def unseen(step: Step) -> str:
@@ -91,7 +88,7 @@ def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], fo
         player.play()
         tick = port.tick
     lines = () if player.failure is None else (f"step failed: {player.failure}",)
-    judged = any(isinstance(step, _CAN_FAIL) for step in player.steps[: player.done])
+    judged = any(isinstance(step, ConditionStep) for step in player.steps[: player.done])
     return Outcome(
         path=path,
         verdict="failed" if lines else "passed" if judged else "not observable",

@@ -15,27 +15,25 @@ from msgspec import Meta
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_host.wheels import TICKS_PER_S, TICKS_PER_SAMPLE, UNITS_PER_COUNT, Wheels, nearest
-from miro_protocol.frames import ServiceFrame
+from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
-from miro_sim.world.conditions import Condition, Network, Slot, SpeedMS, WheelSpeeds
+from miro_sim.world.conditions import Edge, Network, Reached, Recorded, Slot, SpeedMS, WheelSpeeds
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 
 if TYPE_CHECKING:
     from miro_sim.scenario.keys import NetworkSpec as ScenarioNetwork
-    from mirotwin.verify.steps.player import Player
+    from mirotwin.verify.steps.player import Host, Player
 
 
-CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
+CHARACTER = re.compile(r"[0-9a-fA-F]{2}!?")
 MOST_ACCELERATION_M_S2 = 16_000.0
 FilterWord = Annotated[int, Meta(ge=0, le=0x7FFF)]
 Pair = tuple[SpeedMS, SpeedMS]
-
-
 FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
 LONGEST_MS = 86_400_000.0
 PauseMs = Annotated[float, Meta(gt=0.0, le=LONGEST_MS)]
 WithinMs = Annotated[float, Meta(ge=0.0, le=LONGEST_MS)]
-Verb = Literal["wait_for", "expect"]
+Awaited = Recorded | WheelSpeeds | Edge | Reached
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -53,20 +51,16 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def problem(self, network: ScenarioNetwork) -> str:
         """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
-        slot = getattr(self, "slot", None)
-        return "" if slot is None else absent(slot, network)
+        return absent(getattr(self, "slot", None), network)
 
     def do(self, player: Player) -> None:
         """Does it, and lets time pass as far as it says."""
         raise NotImplementedError
 
+    @property
     def lasts_ticks(self) -> int:
         """How long it takes at least."""
-        return 0
-
-    def needs_ticks(self) -> int:
-        """How long it may take, by what it says."""
-        return self.lasts_ticks()
+        return ms_ticks(getattr(self, "for_ms", 0.0))
 
     def said(self) -> str:
         """What it is, in a few words."""
@@ -78,37 +72,34 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         return f"step {self.number}{note}: {self.said()}"
 
 
-class Send(Step, frozen=True, kw_only=True, tag_field="send", omit_defaults=True):
+class OfNetwork(Step, frozen=True, kw_only=True):
+    """Base of those that name their network."""
+
+    network_: Network | None = msgspec.field(default=0, name="network")
+
+
+class OfRobot(OfNetwork, frozen=True, kw_only=True):
+    """Base of those for the robot in `slot` (left out: the network's first)."""
+
+    slot: Slot | None = None
+
+
+class Send(OfNetwork, frozen=True, kw_only=True, tag_field="send", omit_defaults=True):
     """`send`: the host of `network` sends a frame or characters, once, as soon as the transmitter is free."""
 
     VERB = "send"
 
-    network_: Network = msgspec.field(default=0, name="network")
-
     def said(self) -> str:
         return f"send {self.__struct_config__.tag}"
-
-    def problem(self, network: ScenarioNetwork) -> str:
-        slot = getattr(self, "slot", None)
-        return "" if slot is None else beyond(slot, network.robots)
-
-    def do(self, player: Player) -> None:
-        player.hosts[self.network].send(self)
-
-
-def beyond(slot: int, robots: int) -> str:
-    """What is wrong with a slot that a network of so many does not have, or the empty string."""
-    if slot < robots:
-        return ""
-    return f"slot: {slot} does not exist on a network of {robots} robots; use 0 to {robots - 1}"
 
 
 class SendFrame(Send, frozen=True, kw_only=True):
     """Base of frames. `seq`: left out, the next one that is fresh. `wrong_bits`: bits that are sent wrong, counted from
     the first of HDR in the order in which they are sent; `bad_stop`: characters whose stop bit is space, counted from
-    the first of the preamble.
+    the first of the preamble. `slot`: left out, the network's first robot.
     """
 
+    slot: Slot | None = None
     seq: Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)] | None = None
     wrong_bits: tuple[int, ...] = ()
     bad_stop: tuple[int, ...] = ()
@@ -128,17 +119,28 @@ class SendFrame(Send, frozen=True, kw_only=True):
                 what = f"bad_stop: {list(self.bad_stop)} are not characters of the frame in their order"
                 return f"{what}; use 0 to {form.wire_size - 1}"
             before = place
-        return super().problem(network)
+        return beyond(self.slot, network.robots)
+
+    def do(self, player: Player) -> None:
+        host, slot = player.hosts[self.network], player.slot(self.slot, self.network)
+        frame = self.frame(host, slot, self.next_seq(host, slot) if self.seq is None else self.seq)
+        host.put(frame, bad_stop=self.bad_stop, wrong_bits=self.wrong_bits)
+
+    def next_seq(self, host: Host, slot: int) -> int:
+        return host.next_seq()
+
+    def frame(self, host: Host, slot: int, seq: int) -> TeamFrame | ServiceFrame:
+        """What `host` sends to the robot in `slot`, with this number."""
+        raise NotImplementedError
 
 
 class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
     """Velocities. A wheel that is not given keeps what it was told last; at first that is 0.
 
-    `left_m_s`, `right_m_s`: of the robot in `slot` (left out: the network's first); or `team_m_s`: of all slots. `ask`:
-    a frame of type 3, to which robot (seq mod N) answers.
+    `left_m_s`, `right_m_s`: of the robot in `slot`; or `team_m_s`: of all slots. `ask`: a frame of type 3, to which
+    robot (seq mod N) answers.
     """
 
-    slot: Slot | None = None
     left_m_s: SpeedMS | None = None
     right_m_s: SpeedMS | None = None
     team_m_s: tuple[Pair, ...] | None = None
@@ -153,35 +155,36 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
             return "team_m_s: tells all slots; leave out slot, left_m_s and right_m_s"
         return super().problem(network)
 
+    def frame(self, host: Host, slot: int, seq: int) -> TeamFrame:
+        host.command(slot, self.left_m_s, self.right_m_s)
+        for at, (left, right) in enumerate(self.team_m_s or ()):
+            host.command(at, left, right)
+        return host.team(self.ask, seq)
+
 
 class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
     """A team frame of type 3 whose number asks the robot in `slot` to answer; all velocities as they were told last."""
-
-    slot: Slot | None = None
 
     def problem(self, network: ScenarioNetwork) -> str:
         if None not in (self.seq, self.slot) and self.seq % network.robots != self.slot:  # type: ignore[operator]
             return f"seq: {self.seq} does not ask robot {self.slot}; leave it out"
         return super().problem(network)
 
+    def next_seq(self, host: Host, slot: int) -> int:
+        return host.asking_seq(slot)
 
-class SendService(SendFrame, frozen=True, kw_only=True):
-    """Base of service frames, to the robot in `slot` (left out: the network's first)."""
-
-    slot: Slot | None = None
-
-    def frame(self, seq: int, slot: int) -> ServiceFrame:
-        raise NotImplementedError
+    def frame(self, host: Host, slot: int, seq: int) -> TeamFrame:
+        return host.team(True, seq)
 
 
-class SendPing(SendService, frozen=True, kw_only=True, tag="ping"):
+class SendPing(SendFrame, frozen=True, kw_only=True, tag="ping"):
     """Sets nothing, and counts as fresh."""
 
-    def frame(self, seq: int, slot: int) -> ServiceFrame:
+    def frame(self, host: Host, slot: int, seq: int) -> ServiceFrame:
         return ServiceFrame.ping(seq, slot)
 
 
-class SendFilter(SendService, frozen=True, kw_only=True, tag="filter"):
+class SendFilter(SendFrame, frozen=True, kw_only=True, tag="filter"):
     """The words of the LM629's filter, for both wheels."""
 
     kp: FilterWord
@@ -189,16 +192,16 @@ class SendFilter(SendService, frozen=True, kw_only=True, tag="filter"):
     kd: FilterWord
     il: FilterWord
 
-    def frame(self, seq: int, slot: int) -> ServiceFrame:
+    def frame(self, host: Host, slot: int, seq: int) -> ServiceFrame:
         return ServiceFrame.filter(seq, slot, self.kp, self.ki, self.kd, self.il)
 
 
-class SendAcceleration(SendService, frozen=True, kw_only=True, tag="acceleration"):
+class SendAcceleration(SendFrame, frozen=True, kw_only=True, tag="acceleration"):
     """The acceleration of both wheels."""
 
     acceleration_m_s2: Annotated[float, Meta(ge=0.001, le=MOST_ACCELERATION_M_S2)]
 
-    def frame(self, seq: int, slot: int) -> ServiceFrame:
+    def frame(self, host: Host, slot: int, seq: int) -> ServiceFrame:
         return ServiceFrame(seq, slot, Opcode.ACCELERATION, (acceleration_units(self.acceleration_m_s2),))
 
 
@@ -227,6 +230,10 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
         bad = tuple(at for at, word in enumerate(words) if word.endswith("!"))
         return bytes(int(word[:2], 16) for word in words), bad
 
+    def do(self, player: Player) -> None:
+        data, bad_stop = self.characters()
+        player.world.inject(data, self.network, bad_stop=bad_stop)
+
 
 SENDS: dict[str, type[Send]] = {
     str(struct.__struct_config__.tag): struct
@@ -234,7 +241,7 @@ SENDS: dict[str, type[Send]] = {
 }
 
 
-class StreamStep(Step, frozen=True, kw_only=True):
+class StreamStep(OfRobot, frozen=True, kw_only=True):
     """`stream = "on"`: from now on team frames go out by themselves, as a station's do, with the velocities told last.
 
     `every_ms`: left out, a camera period (33.367). `frames`: so many, and then no more. `slot`, `left_m_s`,
@@ -244,10 +251,8 @@ class StreamStep(Step, frozen=True, kw_only=True):
     VERB = "stream"
 
     stream: Literal["on", "off"]
-    network_: Network = msgspec.field(default=0, name="network")
     every_ms: PauseMs | None = None
     frames: Annotated[int, Meta(ge=1, le=1_000_000)] | None = None
-    slot: Slot | None = None
     left_m_s: SpeedMS | None = None
     right_m_s: SpeedMS | None = None
     ask: bool = True
@@ -264,11 +269,11 @@ class StreamStep(Step, frozen=True, kw_only=True):
         shortest_ticks = DOWNLINK[network.robots].wire_size * HOST_CHARACTER_TICKS
         if self.every_ticks < shortest_ticks:
             return f"every_ms: {self.every_ms:g} is too short; a frame takes {in_ms(shortest_ticks)}"
-        return "" if self.slot is None else beyond(self.slot, network.robots)
+        return beyond(self.slot, network.robots)
 
     def do(self, player: Player) -> None:
         host = player.hosts[self.network]
-        host.stream = None
+        host.end()
         if self.stream == "on":
             host.command(player.slot(self.slot, self.network), self.left_m_s, self.right_m_s)
             host.begin(self.every_ticks, self.frames, self.ask)
@@ -277,15 +282,18 @@ class StreamStep(Step, frozen=True, kw_only=True):
 class ConditionStep(Step, frozen=True, kw_only=True):
     """Base of those that look for events."""
 
-    condition: Condition
+    verb: str
+    condition: Awaited
 
     @property
     def network(self) -> int:
         return self.condition.network
 
+    def said(self) -> str:
+        return f"{self.verb} {self.condition.what}"
+
     def problem(self, network: ScenarioNetwork) -> str:
-        slot = getattr(self.condition, "slot", None)
-        return "" if slot is None else absent(slot, network)
+        return absent(getattr(self.condition, "slot", None), network)
 
 
 class WaitStep(ConditionStep, frozen=True, kw_only=True):
@@ -294,54 +302,28 @@ class WaitStep(ConditionStep, frozen=True, kw_only=True):
     What happened since the last wait counts, unless `from_now`. `within_ms`, from now on: left out, to the run's end.
     """
 
-    verb: Verb
     within_ms: WithinMs | None = None
     from_now: bool = False
-
-    def needs_ticks(self) -> int:
-        return 0 if self.within_ms is None else ms_ticks(self.within_ms)
-
-    def said(self) -> str:
-        return f"{self.verb} {self.condition.what}"
 
     def do(self, player: Player) -> None:
         kind = self.condition.any_of_its_kind() if self.verb == "expect" else self.condition
         player.wait_for(self.condition, kind, self.within_ms, self.from_now)
 
 
-class NeverStep(ConditionStep, frozen=True, kw_only=True):
-    """`never`: no event that fits, for so long from now on. `silence_for_ms` is this for a character at the PC."""
-
-    VERB = "never"
-
-    for_ms: PauseMs
-
-    def lasts_ticks(self) -> int:
-        return ms_ticks(self.for_ms)
-
-    def said(self) -> str:
-        return f"never {self.condition.what}"
-
-    def do(self, player: Player) -> None:
-        player.never(self.condition, self.for_ms)
-
-
 class HoldStep(ConditionStep, frozen=True, kw_only=True):
-    """`hold = "wheels"`: they turn as fast as this, for so long from now on."""
+    """For so long from now on, `never`: no event that fits; `hold = "wheels"`: they turn as fast as this."""
 
-    VERB = "hold"
-
-    condition: WheelSpeeds
     for_ms: PauseMs
 
-    def lasts_ticks(self) -> int:
-        return ms_ticks(self.for_ms)
-
-    def said(self) -> str:
-        return "hold wheels"
-
     def do(self, player: Player) -> None:
-        player.hold(self.condition, self.for_ms)
+        player.hold(self.condition, self.for_ms, self.verb != "hold")
+
+
+class SilenceStep(HoldStep, frozen=True, kw_only=True):
+    """`silence_for_ms`: never a character at the PC."""
+
+    verb: str = "never"
+    for_ms: PauseMs = msgspec.field(name="silence_for_ms")
 
 
 class PauseStep(Step, frozen=True, kw_only=True):
@@ -351,6 +333,7 @@ class PauseStep(Step, frozen=True, kw_only=True):
 
     pause_ms: PauseMs
 
+    @property
     def lasts_ticks(self) -> int:
         return ms_ticks(self.pause_ms)
 
@@ -358,14 +341,13 @@ class PauseStep(Step, frozen=True, kw_only=True):
         player.pause(self.pause_ms)
 
 
-class CheckStep(Step, frozen=True, kw_only=True):
+class CheckStep(OfRobot, frozen=True, kw_only=True):
     """`check`: checks as in `[expect]`, judged from now on, for the robots of `network`, or for that in `slot`."""
 
     VERB = "check"
 
     check: dict[str, Any]
     network_: Network | None = msgspec.field(default=None, name="network")
-    slot: Slot | None = None
     checks: tuple[Check, ...] = ()
 
     def said(self) -> str:
@@ -380,39 +362,34 @@ class CheckStep(Step, frozen=True, kw_only=True):
         player.begin_checks(self.checks, self.network_, self.slot)
 
 
-class RadioStep(Step, frozen=True, kw_only=True):
+class RadioStep(OfNetwork, frozen=True, kw_only=True):
     """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver hears noise)."""
 
     VERB = "radio"
 
     radio: Literal["up", "down", "noise"]
-    network_: Network = msgspec.field(default=0, name="network")
 
     def do(self, player: Player) -> None:
         player.world.set_radio(self.radio, self.network)
 
 
-class ResetStep(Step, frozen=True, kw_only=True):
+class ResetStep(OfRobot, frozen=True, kw_only=True):
     """`reset`: the level of a robot's reset pin; 1 holds its processor in reset."""
 
     VERB = "reset"
 
     reset: Literal[0, 1]
-    network_: Network = msgspec.field(default=0, name="network")
-    slot: Slot | None = None
 
     def do(self, player: Player) -> None:
         player.world.set_reset(self.reset, self.network, player.slot(self.slot, self.network))
 
 
-class PowerStep(Step, frozen=True, kw_only=True):
+class PowerStep(OfRobot, frozen=True, kw_only=True):
     """`power`: a robot is switched off, or on."""
 
     VERB = "power"
 
     power: Literal["on", "off"]
-    network_: Network = msgspec.field(default=0, name="network")
-    slot: Slot | None = None
 
     def do(self, player: Player) -> None:
         level = int(self.power == "on")
@@ -442,11 +419,27 @@ PLAIN: dict[str, type[Step]] = {
     for struct in (StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep)
 }
 """Those whose table is read as it stands."""
-VERBS = ("send", "wait_for", "expect", "never", "silence_for_ms", "hold", *PLAIN)
+LOOKING: dict[str, type[ConditionStep]] = {
+    "wait_for": WaitStep,
+    "expect": WaitStep,
+    "never": HoldStep,
+    "silence_for_ms": SilenceStep,
+    "hold": HoldStep,
+}
+"""Those whose table holds the keys of a condition, too."""
+VERBS = ("send", *LOOKING, *PLAIN)
 
 
-def absent(slot: int, network: ScenarioNetwork) -> str:
+def beyond(slot: int | None, robots: int) -> str:
+    """What is wrong with a slot that a network of so many does not have, or the empty string."""
+    if slot is None or slot < robots:
+        return ""
+    return f"slot: {slot} does not exist on a network of {robots} robots; use 0 to {robots - 1}"
+
+
+def absent(slot: int | None, network: ScenarioNetwork) -> str:
+    """The same for a slot without a robot."""
     slots = sorted(robot.slot for robot in network.robot)
-    if slot in slots:
+    if slot is None or slot in slots:
         return ""
     return f"slot: there is no robot in slot {slot}; there is {', '.join(map(str, slots))}"

@@ -15,13 +15,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Protocol
 
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_host.wheels import Wheels
-from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.conditions import Answer, Condition, Reached, WheelSpeeds, When, answer_fields, speeds_of
@@ -31,50 +29,22 @@ from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.frame_sender import FrameSender
-from mirotwin.verify.steps.keys import Send, SendBytes, SendFrame, SendPoll, SendService, SendTeam, Step
+from mirotwin.verify.steps.keys import Step
 
 WHEELS = Wheels()
 
 
-class Stream(msgspec.Struct):
-    """Team frames to come: the next one's first start bit is due at `due_tick`; `left` of them, None: no end."""
-
-    due_tick: int
-    every_ticks: int
-    lead_ticks: int
-    ask: bool
-    left: int | None
-
-
 class Host(FrameSender):
-    """That of one network; its first frame has number 1."""
+    """That of one network; its first frame has number 1.
+
+    Of its stream of team frames, the next one's first start bit is due at `due_tick`, which is announced `lead_ticks`
+    before; so many frames are `left`, None: no end.
+    """
 
     def __init__(self, world: World, network: int) -> None:
         super().__init__(world, network, 0)
         self.first_slot = min(robot.slot for robot in world.scenario.networks[network].robot)
-        self.stream: Stream | None = None
-
-    def send(self, what: Send) -> None:
-        """Puts it on the air as soon as the transmitter is free. Raises ValueError for what cannot be sent."""
-        if isinstance(what, SendBytes):
-            data, bad_stop = what.characters()
-            self.world.inject(data, self.network, bad_stop=bad_stop)
-            return
-        assert isinstance(what, SendFrame)
-        self.put(self._frame(what), bad_stop=what.bad_stop, wrong_bits=what.wrong_bits)
-
-    def _frame(self, what: SendFrame) -> TeamFrame | ServiceFrame:
-        slot = getattr(what, "slot", None)
-        slot = self.first_slot if slot is None else slot
-        if isinstance(what, SendService):
-            return what.frame(self.next_seq() if what.seq is None else what.seq, slot)
-        if isinstance(what, SendPoll):
-            return self.team(True, self.asking_seq(slot) if what.seq is None else what.seq)
-        assert isinstance(what, SendTeam)
-        self.command(slot, what.left_m_s, what.right_m_s)
-        for at, (left, right) in enumerate(what.team_m_s or ()):
-            self.command(at, left, right)
-        return self.team(what.ask, what.seq)
+        self.end()
 
     def command(self, slot: int, left_m_s: float | None, right_m_s: float | None) -> None:
         """New velocities of one robot; None: as before."""
@@ -87,34 +57,29 @@ class Host(FrameSender):
 
     def begin(self, every_ticks: int, frames: int | None, ask: bool) -> None:
         """Frames from now on, with the velocities that were sent or commanded last."""
-        now = self.world.tick
-        due_tick = self.world.earliest_tick(self.network)
-        self.stream = Stream(due_tick, every_ticks, due_tick - now, ask, frames)
+        self.due_tick = self.world.earliest_tick(self.network)
+        self.lead_ticks = self.due_tick - self.world.tick
+        self.every_ticks, self.ask, self.left = every_ticks, ask, frames
         self.top_up()
+
+    def end(self) -> None:
+        """No more frames."""
+        self.due_tick, self.lead_ticks = NEVER_TICK, 0
 
     @property
     def next_tick(self) -> int:
         """When the next frame of the stream has to be announced."""
-        return NEVER_TICK if self.stream is None else self.stream.due_tick - self.stream.lead_ticks
+        return self.due_tick - self.lead_ticks
 
     def top_up(self) -> None:
         """Announces the frames that are due."""
-        while self.stream is not None and self.next_tick <= self.world.tick:
-            stream = self.stream
-            self.put(self.team(stream.ask))
-            stream.due_tick += stream.every_ticks
-            if stream.left is not None:
-                stream.left -= 1
-                if not stream.left:
-                    self.stream = None
-
-
-class Playable(Protocol):
-    """A step, as a player needs it."""
-
-    @property
-    def number(self) -> int: ...
-    def do(self, player: Player) -> None: ...
+        while self.next_tick <= self.world.tick:
+            self.put(self.team(self.ask))
+            self.due_tick += self.every_ticks
+            if self.left is not None:
+                self.left -= 1
+                if not self.left:
+                    self.end()
 
 
 class StepFailure(msgspec.Struct, frozen=True):
@@ -142,7 +107,7 @@ class _Failed(Exception):
 class Player:
     """`done`: so many steps were. `saved`: by name, what `save` steps kept. `checks`: those that steps began."""
 
-    def __init__(self, world: World, steps: Sequence[Playable], origin: str = "") -> None:
+    def __init__(self, world: World, steps: Sequence[Step], origin: str = "") -> None:
         self.world = world
         self.steps = list(steps)
         self.origin = origin
@@ -201,19 +166,15 @@ class Player:
         if kind != wanted and not wanted.met_by(event):
             raise _Failed(event.tick, said, self._other(wanted, event))
 
-    def never(self, condition: Condition, for_ms: float) -> None:
-        """So long from now on, in which the condition must not become true."""
-        self._without(condition, for_ms, f"no {condition}", condition)
-
-    def hold(self, speeds: WheelSpeeds, for_ms: float) -> None:
-        """So long from now on, in which the wheels have to turn so fast."""
-        other = When(
-            network=speeds.network, slot=speeds.slot, predicate=lambda robot: not speeds.predicate(robot)
-        )
-        self._without(other, for_ms, f"{speeds}", speeds)
-
-    def _without(self, forbidden: Condition, for_ms: float, said: str, condition: Condition) -> None:
-        world = self.world
+    def hold(self, condition: Condition, for_ms: float, never: bool) -> None:
+        """So long from now on, in which the wheels have to turn so fast, or the condition must `never` become true."""
+        world, forbidden, said = self.world, condition, f"no {condition}"
+        if isinstance(condition, WheelSpeeds) and not never:
+            holds = condition.predicate
+            forbidden = When(
+                network=condition.network, slot=condition.slot, predicate=lambda robot: not holds(robot)
+            )
+            said = f"{condition}"
         self._forget()
         until_tick = world.tick + ms_ticks(for_ms)
         event = self._next(forbidden, until_tick, [])

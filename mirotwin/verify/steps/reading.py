@@ -9,39 +9,30 @@ note = "drives off"                    for people
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn, TypeVar
 
 import msgspec
 
 from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, use_one_of, value_error
 from miro_sim.scenario.keys import Scenario
-from miro_sim.world.conditions import CONDITIONS, Heard, WheelSpeeds
+from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table, expectations_of
-from mirotwin.verify.checks.interface import in_ms
+from mirotwin.verify.checks.interface import in_ms, ms_ticks
 from mirotwin.verify.steps.keys import (
+    LOOKING,
     PLAIN,
     SENDS,
     VERBS,
     CheckStep,
-    HoldStep,
-    NeverStep,
-    PauseMs,
     SaveStep,
+    SilenceStep,
     Step,
-    WaitStep,
-    WithinMs,
 )
 
 S = TypeVar("S", bound=msgspec.Struct)
-_NO_KEYS = ("number", "checks")
+_NO_KEYS = ("number", "checks", "verb", "condition")
 _TIMES = {"within_ms": "wait_for and expect", "from_now": "wait_for and expect", "for_ms": "never and hold"}
-_TIMES_OF = {
-    "wait_for": ("within_ms", "from_now"),
-    "expect": ("within_ms", "from_now"),
-    "never": ("for_ms",),
-    "hold": ("for_ms",),
-}
 
 
 def steps_of(scenario: Scenario, origin: str) -> list[Step]:
@@ -57,14 +48,6 @@ def everything(scenario: Scenario, origin: str) -> None:
     steps_of(scenario, origin)
 
 
-def problem(step: Step, scenario: Scenario) -> str:
-    """Why this step cannot be done in this scenario, as `key: what; remedy`, or the empty string."""
-    networks = scenario.networks
-    if step.network >= len(networks):
-        return f"network: there is no network {step.network}; {use_one_of(map(str, range(len(networks))))}"
-    return step.problem(networks[step.network])
-
-
 def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
     """Raises ScenarioError for what the steps together make impossible.
 
@@ -75,12 +58,12 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
     saved: dict[str, int] = {}
     for step in steps:
         place = f"step {step.number}"
-        last = begins + step.needs_ticks()
+        last = begins + max(step.lasts_ticks, ms_ticks(getattr(step, "within_ms", None) or 0.0))
         if begins >= end or last > end:
             goes = f" and goes on to {in_ms(last)}" if last > begins else ""
             what = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
             raise ScenarioError(origin, place, what, "give a longer duration_s, or shorter times")
-        begins += step.lasts_ticks()
+        begins += step.lasts_ticks
         if isinstance(step, SaveStep):
             if step.save in saved:
                 what = f"step {saved[step.save]} saves {step.save}, too"
@@ -108,58 +91,39 @@ class _Table:
             self.refuse(
                 "", f"has both {verbs[0]} and {verbs[1]}", "one action or one wait a step: make two of it"
             )
-        step = self._step(verbs[0])
-        what, _, remedy = problem(step, self.scenario).partition("; ")
+        step, networks = self._step(verbs[0]), self.scenario.networks
+        if step.network >= len(networks):
+            known = use_one_of(map(str, range(len(networks))))
+            self.refuse("network", f"there is no network {step.network}", known)
+        what, _, remedy = step.problem(networks[step.network]).partition("; ")
         if what:
             key, _, rest = what.partition(": ")
             self.refuse(key if rest else "", rest or what, remedy)
         return step
 
     def _step(self, verb: str) -> Step:
-        if verb in PLAIN:
-            struct = PLAIN[verb]
-            self.refuse_unknown([key for key in struct.__struct_encode_fields__ if key not in _NO_KEYS])
-            plain = self.made(struct, {**self.table, "number": self.index + 1})
-            return self.with_checks(plain) if isinstance(plain, CheckStep) else plain
-        note: str = self.taken("note", str, "")
-        common: dict[str, Any] = {"number": self.index + 1, "note": note}
-        if verb == "send":
-            return self.rest(self.choice(verb, SENDS), verb, common, **common)
-        if verb == "silence_for_ms":
-            for_ms = self.taken(verb, PauseMs)
-            return NeverStep(condition=self.rest(Heard, verb, hidden=("byte",)), for_ms=for_ms, **common)
-        kind = self.choice(verb, {"wheels": WheelSpeeds} if verb == "hold" else CONDITIONS)
-        if verb in ("never", "hold"):
-            self.need_for_ms()
-            for_ms = self.taken("for_ms", PauseMs)
-            what = self.rest(kind, verb)
-            if isinstance(what, WheelSpeeds) and verb == "hold":
-                return HoldStep(condition=what, for_ms=for_ms, **common)
-            return NeverStep(condition=what, for_ms=for_ms, **common)
-        within_ms = self.taken("within_ms", WithinMs, None)
-        from_now = self.taken("from_now", bool, False)
-        what = self.rest(kind, verb)
-        return WaitStep(verb=verb, condition=what, within_ms=within_ms, from_now=from_now, **common)  # type: ignore[arg-type]
+        struct = PLAIN.get(verb) or LOOKING.get(verb) or self.choice(verb, SENDS)
+        own = [key for key in struct.__struct_encode_fields__ if key not in _NO_KEYS]
+        given: dict[str, Any] = {"number": self.index + 1}
+        kinds: dict[str, type[Condition]] = {"wheels": WheelSpeeds} if verb == "hold" else CONDITIONS
+        kind, inner = None, list[str]()  # of the condition: its struct, its keys
+        if struct is SilenceStep:
+            inner = ["network"]
+            given["condition"] = {"event": "heard"}
+        elif verb in LOOKING:
+            kind = self.choice(verb, kinds)
+            inner = list(kind.__struct_encode_fields__)
+            given |= {"verb": verb, "condition": {"event": self.table[verb]}}
+        elif verb == "send":
+            given["send"] = self.table["send"]
+        self.refuse_unknown(verb, [*inner, *own])
+        given |= {key: value for key, value in self.table.items() if key in own}
+        if inner:
+            given["condition"] |= {key: value for key, value in self.table.items() if key in inner}
+        step = self.made(given, struct, kind or struct)
+        return self.with_checks(step) if isinstance(step, CheckStep) else step
 
     # Keys
-
-    def taken(self, key: str, type_: Any, default: Any = ...) -> Any:
-        """The value of a key that is no key of the condition or frame, taken out of the table."""
-        if default is not ... and key not in self.table:
-            return default
-        try:
-            return msgspec.convert(self.table.pop(key), type_)
-        except msgspec.ValidationError as error:
-            self.refuse_value(f"{error} - at `$.{key}`")
-
-    def need_for_ms(self) -> None:
-        if "for_ms" in self.table:
-            return
-        for key in self.table:
-            remedy = remedy_for_key(key, ["for_ms"])
-            if key in _TIMES or remedy.startswith("use "):
-                self.refuse(key, "unknown key", "use for_ms, in milliseconds")
-        self.refuse("for_ms", "this key is missing", "add it")
 
     def choice(self, verb: str, choices: Mapping[str, type[S]]) -> type[S]:
         """What the verb's value names."""
@@ -172,27 +136,28 @@ class _Table:
         what = f"{value!r} is not one of the choices"
         self.refuse(verb, what, use_one_of(choices))
 
-    def rest(self, struct: type[S], verb: str, hidden: Iterable[str] = (), **more: Any) -> S:
-        """The struct of the keys that are left, and `more`; `verb` named it."""
-        self.table.pop(verb, None)
-        known = [key for key in struct.__struct_encode_fields__ if key not in hidden]
-        self.refuse_unknown([*known, *_TIMES_OF.get(verb, ()), "note"])
-        config = struct.__struct_config__
-        return self.made(struct, {**self.table, str(config.tag_field): config.tag, **more})
-
-    def refuse_unknown(self, known: Sequence[str]) -> None:
+    def refuse_unknown(self, verb: str, known: Sequence[str]) -> None:
         for key in self.table:
-            if key not in known:
+            if key != verb and key not in known:
                 remedy = remedy_for_key(key, list(known))
                 if key in _TIMES and not remedy.startswith("use "):
-                    remedy = f"it belongs to {_TIMES[key]}"
+                    missing = "for_ms" in known and "for_ms" not in self.table
+                    remedy = "use for_ms, in milliseconds" if missing else f"it belongs to {_TIMES[key]}"
                 self.refuse(key, "unknown key", remedy)
 
-    def made(self, struct: type[S], given: Mapping[str, Any]) -> S:
+    def made(self, given: Mapping[str, Any], struct: type[S], kind: type[msgspec.Struct]) -> S:
+        """The step; what msgspec finds in it, or in its condition of this `kind`, is told in the scenario's words."""
         try:
             return msgspec.convert(dict(given), struct)
         except msgspec.ValidationError as error:
-            self.refuse_value(f"{error}", struct)
+            what, _, path = f"{error}".partition(" - at `$")
+            path = path.rstrip("`").removeprefix(".condition")
+            raw = {"step": [dict(table) for table in self.scenario.step]}
+            found = value_error(self.origin, raw, f"{what} - at `$.step[{self.index}]{path}`")
+            place = re.sub(r"^step\[\d+\]\.?", "", f"{found.place}")
+            self.refuse(
+                place, found.what, found.remedy or choices_of(struct, place) or choices_of(kind, place)
+            )
 
     def with_checks(self, step: CheckStep) -> CheckStep:
         """The checks of a step's table, in the words of `[expect]`."""
@@ -207,11 +172,3 @@ class _Table:
     def refuse(self, key: str, what: str, remedy: str = "") -> NoReturn:
         place = f"step {self.index + 1}"
         raise ScenarioError(self.origin, f"{place}.{key}" if key else place, what, remedy)
-
-    def refuse_value(self, message: str, struct: type[msgspec.Struct] = Step) -> NoReturn:
-        """What msgspec found in a `struct`: its place, value and limits in the words of the scenario."""
-        what, _, path = message.partition(" - at `$")
-        raw = {"step": [dict(table) for table in self.scenario.step]}
-        found = value_error(self.origin, raw, f"{what} - at `$.step[{self.index}]{path.rstrip('`')}`")
-        place = re.sub(r"^step\[\d+\]\.?", "", f"{found.place}")
-        self.refuse(place, found.what, found.remedy or choices_of(struct, place))

@@ -25,7 +25,7 @@ from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import failure_lines
-from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
+from mirotwin.verify.steps.keys import ConditionStep, WaitStep
 from mirotwin.verify.steps.player import Player, check_symbols
 from mirotwin.verify.steps.reading import everything, steps_of
 
@@ -173,9 +173,7 @@ def case_of_step(player: Player, trace: Trace) -> str | None:
     if failure is None or failure.tick <= failure.begun_tick:
         return None
     step = player.steps[failure.number - 1]
-    if isinstance(step, HoldStep) or not isinstance(step, WaitStep | NeverStep):
-        return None
-    if isinstance(step, WaitStep) and not failure.timed_out:
+    if not isinstance(step, ConditionStep) or (isinstance(step, WaitStep) and not failure.timed_out):
         return None
     name = "happens" if isinstance(step, WaitStep) else "never_happens"
     until_tick = max(failure.tick, player.world.tick)

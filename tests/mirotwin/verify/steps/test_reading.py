@@ -14,7 +14,7 @@ from mirotwin.verify.steps.keys import (
     PLAIN,
     SENDS,
     VERBS,
-    NeverStep,
+    HoldStep,
     PauseStep,
     SendBytes,
     SendTeam,
@@ -123,7 +123,7 @@ def test_steps_know_their_number_and_note():
     )
     assert first == SendTeam(number=1, note="off", left_m_s=1.0)
     assert f"{first}" == "step 1 (off): send team"
-    assert isinstance(second, NeverStep)
+    assert isinstance(second, HoldStep)
     assert (second.number, second.for_ms, second.condition.what) == (2, 3.0, "heard")
     assert third == WaitStep(number=3, verb="wait_for", condition=Command(name="STT"))
 
