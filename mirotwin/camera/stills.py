@@ -17,7 +17,7 @@ from miro_exact.clock import CAMERA_FRAME_TICKS
 from miro_exact.inputs import check_regular
 from mirotwin.camera import picture
 from mirotwin.camera.picture import SUFFIXES, Picture
-from mirotwin.recording.channels import ImageMessage, image_topic
+from mirotwin.recording.channels import IMAGE, ImageMessage, topic_name
 from mirotwin.recording.container import BrokenOff
 from mirotwin.recording.messages import Messages
 
@@ -65,7 +65,7 @@ def _of_recording(path: Path, network: int, tell: Callable[[str], None]) -> Iter
                 if place.network == network:
                     found = True
                     data = picture.parse(
-                        message.data, f"{path}", f"{image_topic(network)} at tick {message.tick}"
+                        message.data, f"{path}", f"{topic_name(IMAGE, network)} at tick {message.tick}"
                     )
                     yield Still(f"tick {message.tick}", message.tick, data)
         except BrokenOff as error:

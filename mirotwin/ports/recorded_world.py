@@ -15,7 +15,6 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, live_scenario
 from miro_sim.world.world import World
 from mirotwin.ports.url import UrlOptions
-from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.rerun.pacing import Every
 from mirotwin.shell.firmware_image import load_firmware
@@ -71,8 +70,7 @@ class RecordedWorld:
         if self.world.in_period and not self.world.stopped:
             self.world.run_to(self.world.period_end)
         try:
-            for network, slot, faults in runner.faults_by_robot(self.world):
-                self._recorder.write_faults(network, slot, faults)
+            self._recorder.write_faults(self.world.robots)
             self._recorder.flush()
         except OSError as error:
             self._break_off(error)

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import astuple
 
 from miro_exact.clock import nanoseconds
 from miro_host.eye.track import Sighting
@@ -39,20 +40,9 @@ class Topic(NamedTuple):
     slot: int = -1
 
 
-def robot_topic(network: int, slot: int, channel: str) -> str:
-    return f"/net{network}/robot{slot}/{channel}"
-
-
-def wire_topic(network: int) -> str:
-    return f"/net{network}/{WIRE}"
-
-
-def actions_topic(network: int) -> str:
-    return f"/net{network}/{ACTIONS}"
-
-
-def image_topic(network: int) -> str:
-    return f"/net{network}/{IMAGE}"
+def topic_name(channel: str, network: int, slot: int = -1) -> str:
+    """The topic of a channel of a network, or of the robot in a slot of it."""
+    return f"/net{network}/{channel}" if slot < 0 else f"/net{network}/robot{slot}/{channel}"
 
 
 def topic_of(topic: str) -> Topic | None:
@@ -146,27 +136,19 @@ class PostureMessage(msgspec.Struct, frozen=True, gc=False):
     theta_rad: float
 
 
-class MeasurementMessage(msgspec.Struct, frozen=True, gc=False):
+class MeasurementMessage(PostureMessage, frozen=True, gc=False):
     """`measurement`: a posture as the PC gets it at `tick`, of the picture that was exposed at `exposed_tick`.
 
     `confidence` from 0 to 1 is the tracker's; both are null where a camera without pictures made the measurement.
     """
 
-    tick: int
-    x_m: float
-    y_m: float
-    theta_rad: float
     exposed_tick: int | None = None
     confidence: float | None = None
 
 
-class TruthMessage(msgspec.Struct, frozen=True, gc=False):
+class TruthMessage(PostureMessage, frozen=True, gc=False):
     """`truth`: posture (heading unwrapped) and velocity of the robot."""
 
-    tick: int
-    x_m: float
-    y_m: float
-    theta_rad: float
     v_m_s: float
     w_rad_s: float
 
@@ -356,43 +338,37 @@ def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
     """The record of one robot from its messages by channel. Raises KeyError when one is missing."""
     truth, firmware, lm629, pwm = found["truth"], found.get("firmware"), found["lm629"], found["pwm"]
     reference, seen, control = found["reference"], found.get("measurement"), found.get("control")
+    accepted, rejected, stale = (None, None, None) if firmware is None else astuple(firmware)[1:]
     return RobotPeriod(
-        network=network,
-        slot=slot,
-        reference=_posture(reference),
-        truth=_posture(truth),
-        v_m_s=truth.v_m_s,
-        w_rad_s=truth.w_rad_s,
-        measurement=None if seen is None else _measurement(seen),
-        control=None if control is None else Control(*msgspec.structs.astuple(control)[1:]),
-        accepted=None if firmware is None else firmware.accepted,
-        rejected=None if firmware is None else firmware.rejected,
-        stale=None if firmware is None else firmware.stale,
-        left=_axis(lm629.left, pwm.left),
-        right=_axis(lm629.right, pwm.right),
+        network,
+        slot,
+        _posture(reference),
+        _posture(truth),
+        truth.v_m_s,
+        truth.w_rad_s,
+        None if seen is None else _measurement(seen),
+        None if control is None else Control(*astuple(control)[1:]),
+        accepted,
+        rejected,
+        stale,
+        _axis(lm629.left, pwm.left),
+        _axis(lm629.right, pwm.right),
     )
 
 
 def _measurement(message: MeasurementMessage) -> Posture:
     if message.exposed_tick is None or message.confidence is None:
-        return Posture(message.x_m, message.y_m, message.theta_rad)
+        return _posture(message)
     return Sighting(message.x_m, message.y_m, message.theta_rad, message.exposed_tick, message.confidence)
 
 
-def _posture(message: PostureMessage | TruthMessage) -> Posture:
+def _posture(message: PostureMessage) -> Posture:
     return Posture(message.x_m, message.y_m, message.theta_rad)
 
 
 def _axis(registers: RegistersMessage, duty: DutyMessage) -> Axis:
-    return Axis(
-        desired_position=registers.desired_position,
-        real_position=registers.real_position,
-        desired_velocity=registers.desired_velocity,
-        status=registers.status,
-        pwm_sign=duty.sign,
-        pwm_magnitude=duty.magnitude,
-        commands=tuple((one.tick, one.opcode, one.data) for one in registers.commands),
-    )
+    *values, commands = astuple(registers)
+    return Axis(*(*values, *astuple(duty), tuple(map(astuple, commands))))
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import seconds
-from mirotwin.recording.channels import PERIOD, robot_topic
+from mirotwin.recording.channels import PERIOD, topic_name
 
 WORDS = ("recorded", "replayed")
 """What the two sides of a replay are called; `mirotwin diff` calls them by its arguments."""
@@ -37,9 +37,7 @@ class Difference(msgspec.Struct, frozen=True):
     def topic(self) -> str:
         if self.network < 0:
             return f"{PERIOD} {self.channel}"
-        if self.slot < 0:
-            return f"/net{self.network}/{self.channel}"
-        return robot_topic(self.network, self.slot, self.channel)
+        return topic_name(self.channel, self.network, self.slot)
 
     def values(self) -> tuple[str, str]:
         """Both as people read them."""

@@ -7,23 +7,23 @@ log time is the tick in nanoseconds, rounded down.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_robot.faults import FirmwareFault
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels
-from mirotwin.recording.channels import ControlMessage, TheoryMessage, image_message
+from mirotwin.recording.channels import ControlMessage, FaultMessage, TheoryMessage, image_message
 from mirotwin.recording.rows import Message, Rows
-from mirotwin.recording.writer import McapWriter, Writable
+from mirotwin.recording.writer import McapWriter
 
 if TYPE_CHECKING:
+    from miro_sim.world.robot import Robot
     from miro_sim.world.world import World
 
 METADATA = "mirotwin"
@@ -88,7 +88,7 @@ class Recorder:
 
     def __init__(
         self,
-        stream: Writable,
+        stream: BinaryIO,
         source: RunSource,
         undisturbed: AbstractContextManager[object] | None = None,
     ) -> None:
@@ -151,29 +151,29 @@ class Recorder:
             with self._undisturbed:
                 self._write_waiting()
 
-    def write_theories(self, found: Iterable[tuple[int, int, TheoryMessage]]) -> None:
-        """Adds what the theory says of robots (network, slot) in the control period that was written last."""
-        for network, slot, message in found:
-            self._waiting.append((channels.robot_topic(network, slot, "theory"), message.tick, message))
+    def add(self, channel: str, network: int, slot: int, message: Any) -> None:
+        """Adds a message of a robot; `slot` -1: of a whole network."""
+        self.write((channels.topic_name(channel, network, slot), message.tick, message))
 
     def _write_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
         self._rows.write_all(waiting)
 
-    def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
-        """Adds one LM629 sample of a robot (full recordings)."""
-        self.write((channels.robot_topic(network, slot, "samples"), sample.tick, sample))
+    def write_theories(self, found: Iterable[tuple[int, int, TheoryMessage]]) -> None:
+        """Adds what the theory says of robots (network, slot) in the control period that was written last."""
+        for network, slot, message in found:
+            self.add("theory", network, slot, message)
 
-    def write_faults(self, network: int, slot: int, faults: Sequence[FirmwareFault]) -> None:
-        """Adds a robot's firmware faults."""
-        topic = channels.robot_topic(network, slot, "fault")
-        for fault in faults:
-            message = channels.FaultMessage(fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault))
-            self.write((topic, fault.tick, message))
+    def write_faults(self, robots: Iterable[Robot]) -> None:
+        """Adds what the firmware of these robots did that it must not do."""
+        for robot in robots:
+            for fault in robot.board.faults:
+                values = fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
+                self.add("fault", robot.network, robot.slot, FaultMessage(*values))
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
         """Adds a frame of a network's camera, after all that was added before."""
-        self.write((channels.image_topic(network), tick, image_message(network, tick, png)))
+        self.add(channels.IMAGE, network, -1, image_message(network, tick, png))
 
     def _add_channel(self, topic: str, message: msgspec.Struct) -> int:
         """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""

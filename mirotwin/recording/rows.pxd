@@ -3,40 +3,24 @@ cimport cython
 
 cdef int _MESSAGE, _HEAD, _BEFORE_LENGTH
 cdef bytes _EMPTY_HEAD, _EMPTY_ENTRY
-cdef unsigned int _CRC_32, _ONE, _BYTE
-
-
-cdef class Index:
-    cdef readonly long long channel
-    cdef readonly bytearray row
-
-    @cython.locals(begin=Py_ssize_t)
-    cdef add(self, unsigned long long time_ns, unsigned long long offset)
 
 
 cdef class Chunk:
     cdef Py_ssize_t limit
     cdef object full, encode_into
     cdef readonly bytearray data
-    cdef readonly Py_ssize_t stored
     cdef readonly dict indexes
     cdef readonly unsigned long long first_ns, last_ns
 
     cpdef begin(self)
-    cpdef is_stored(self)
     cpdef add_record(self, bytes record)
-    @cython.locals(begin=Py_ssize_t, index=Index)
+    @cython.locals(begin=Py_ssize_t, entry=Py_ssize_t, index=bytearray)
     cpdef add(self, channel, unsigned long long time_ns, message)
     cdef _end(self)
 
 
 cdef void _put_head(unsigned char *out, Py_ssize_t begin, Py_ssize_t size, long long channel, unsigned long long time_ns) noexcept
 cdef void _put(unsigned char *out, Py_ssize_t place, unsigned long long value) noexcept
-
-@cython.locals(factor='unsigned int', power='unsigned int')
-cpdef unsigned int joined_crc(unsigned int first, unsigned int second, Py_ssize_t size) noexcept
-@cython.locals(product='unsigned int', place=int)
-cdef unsigned int _times(unsigned int one, unsigned int other) noexcept
 
 
 cdef class Rows:

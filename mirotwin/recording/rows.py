@@ -14,7 +14,9 @@ from msgspec.structs import astuple
 from miro_host.eye.track import Sighting
 from miro_sim.periods import Axis, Period, RobotPeriod
 from mirotwin.recording.channels import (
+    ACTIONS,
     PERIOD,
+    WIRE,
     CommandMessage,
     ControlMessage,
     DutyMessage,
@@ -28,9 +30,7 @@ from mirotwin.recording.channels import (
     TruthMessage,
     WireMessage,
     action_message,
-    actions_topic,
-    robot_topic,
-    wire_topic,
+    topic_name,
 )
 
 Message = tuple[str, int, msgspec.Struct]
@@ -42,28 +42,10 @@ _HEAD = 31  # bytes: opcode, length, channel, sequence, log time, publish time
 _BEFORE_LENGTH = 9
 _EMPTY_HEAD = bytes(_HEAD)
 _EMPTY_ENTRY = bytes(16)  # of an index: time, offset
-_CRC_32 = 0xEDB88320  # polynomials have the highest power in the lowest bit
-_ONE = 1 << 31
-_BYTE = 1 << 23  # x^8
-
-
-class Index:
-    """Times and offsets of the messages that a channel has in a chunk, in one row as it stands in a file."""
-
-    def __init__(self, channel: int) -> None:
-        self.channel = channel
-        self.row = bytearray()
-
-    def add(self, time_ns: int, offset: int) -> None:
-        """Adds a message."""
-        begin = len(self.row)
-        self.row += _EMPTY_ENTRY
-        _put(self.row, begin, time_ns)
-        _put(self.row, begin + 8, offset)
 
 
 class Chunk:
-    """The records of a chunk under way, of which `data` are those that are not in the file yet.
+    """The records of a chunk under way. `indexes`: by channel, times and offsets of its messages as in a file.
 
     `full` is called with the record that makes the chunk longer than `limit`, to write it and begin another one.
     """
@@ -77,15 +59,10 @@ class Chunk:
 
     def begin(self) -> None:
         """Begins another chunk."""
-        self.stored = 0  # bytes of the records in the file
-        self.indexes: dict[int, Index] = {}  # by channel
+        self.data.clear()
+        self.indexes: dict[int, bytearray] = {}
         self.first_ns = LAST_NS
         self.last_ns = 0
-
-    def is_stored(self) -> None:
-        """All records are in the file."""
-        self.stored += len(self.data)
-        self.data.clear()
 
     def add_record(self, record: bytes) -> None:
         """Adds a record that is no message."""
@@ -101,17 +78,20 @@ class Chunk:
         except BaseException:
             del self.data[begin:]
             raise
+        _put_head(self.data, begin, len(self.data) - begin - _BEFORE_LENGTH, channel, time_ns)
         index = self.indexes.get(channel)
         if index is None:
-            index = self.indexes[channel] = Index(channel)
-        _put_head(self.data, begin, len(self.data) - begin - _BEFORE_LENGTH, index.channel, time_ns)
-        index.add(time_ns, self.stored + begin)
+            index = self.indexes[channel] = bytearray()
+        entry = len(index)
+        index += _EMPTY_ENTRY
+        _put(index, entry, time_ns)
+        _put(index, entry + 8, begin)
         self.first_ns = min(self.first_ns, time_ns)
         self.last_ns = max(self.last_ns, time_ns)
         self._end()
 
     def _end(self) -> None:
-        if self.stored + len(self.data) > self.limit:
+        if len(self.data) > self.limit:
             self.full()
 
 
@@ -136,41 +116,13 @@ def _put(out: bytearray, place: int, value: int) -> None:
     out[place + 7] = value >> 56 & 0xFF
 
 
-def joined_crc(first: int, second: int, size: int) -> int:
-    """The CRC-32 of two pieces of data in a row, from that of each. `size`: bytes of the second one.
-
-    A byte of 0 multiplies what was before by x^8, and so on: as `crc32_combine` of zlib does it.
-    """
-    factor, power = _ONE, _BYTE
-    while size:
-        if size & 1:
-            factor = _times(factor, power)
-        power = _times(power, power)
-        size >>= 1
-    return _times(factor, first) ^ second
-
-
-def _times(one: int, other: int) -> int:
-    """The product of two polynomials modulo the one of CRC-32."""
-    product = 0
-    for place in range(31, -1, -1):
-        if one >> place & 1:
-            product ^= other
-        other = other >> 1 ^ (_CRC_32 if other & 1 else 0)
-    return product
-
-
 class Rows:
     """Writes messages into a chunk.
 
     `add_channel` makes a channel of a topic, from its first message and the names of a law's inner values.
     """
 
-    def __init__(
-        self,
-        chunk: Chunk,
-        add_channel: Callable[[str, msgspec.Struct], int],
-    ) -> None:
+    def __init__(self, chunk: Chunk, add_channel: Callable[[str, msgspec.Struct], int]) -> None:
         self.chunk = chunk
         self.add_channel = add_channel
         self.channels: dict[str, int] = {}  # by topic
@@ -191,10 +143,9 @@ class Rows:
             self._robot(robot, tick, time_ns)
         for sent in period.wire:
             message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-            self._add(_wire_topic(sent.network), sent.tick * 125 // 3, message)
+            self._add(_topic(WIRE, sent.network), sent.tick * 125 // 3, message)
         for action in period.actions:
-            topic = actions_topic(action.network)
-            self._add(topic, action.tick * 125 // 3, action_message(action))
+            self._add(_topic(ACTIONS, action.network), action.tick * 125 // 3, action_message(action))
         self._add(PERIOD, time_ns, PeriodMessage(tick, period.index, period.digest))
 
     def _robot(self, robot: RobotPeriod, tick: int, time_ns: int) -> None:
@@ -238,7 +189,7 @@ def _duty(axis: Axis) -> DutyMessage:
 def _robot_topics(network: int, slot: int) -> list[str]:
     """Of the messages that a robot has in each period, in their order."""
     names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
-    return [robot_topic(network, slot, name) for name in names]
+    return [topic_name(name, network, slot) for name in names]
 
 
-_wire_topic = cache(wire_topic)
+_topic = cache(topic_name)

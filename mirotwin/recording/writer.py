@@ -11,13 +11,13 @@ flushing changes no byte of a finished file.
 from __future__ import annotations
 
 import struct
-from typing import Protocol
+from typing import BinaryIO
 from zlib import crc32
 
 import msgspec
 from mcap.opcode import Opcode
 
-from mirotwin.recording.rows import Chunk, joined_crc
+from mirotwin.recording.rows import Chunk
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 20
@@ -31,22 +31,14 @@ _ENTRY = 16  # bytes: time, offset
 _CRC = 4  # bytes
 
 
-class Writable(Protocol):
-    """A file that can be patched; `write` may take less than it is given, as a raw file's does."""
-
-    def write(self, data: bytes | memoryview, /) -> int: ...
-    def seek(self, place: int, /) -> int: ...
-    def flush(self) -> None: ...
-
-
 class McapWriter:
-    """A file under way. `stream` is empty and seekable; the caller closes it.
+    """A file under way. `stream` is empty and seekable, and may be a raw file; the caller closes it.
 
     Attachments and metadata come before the first message, or end the chunk that is open. After an OSError (a full
     disk) nothing more is written: what there is can be read.
     """
 
-    def __init__(self, stream: Writable, profile: str, library: str) -> None:
+    def __init__(self, stream: BinaryIO, profile: str, library: str) -> None:
         self._stream = stream
         self._end = 0  # of the file, without the open chunk
         self._checksum = 0  # of all up to there
@@ -59,7 +51,7 @@ class McapWriter:
         self._counts: dict[int, int] = {}  # messages by channel
         self._times: list[int] = []  # of the first and last message of each chunk
         self.chunk = Chunk(CHUNK_SIZE, self._end_chunk)
-        self._chunk_checksum = 0  # of what is in the file
+        self._stored = 0  # bytes of its records that are in the file
         self._put(MAGIC + _record(Opcode.HEADER, _text(profile), _text(library)))
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
@@ -143,15 +135,15 @@ class McapWriter:
         if not self.chunk.indexes:
             return
         head, chunk = self._store_chunk(), self.chunk
-        start, size = self._end, chunk.stored
+        start, size = self._end, self._stored
         self._end = start + len(head) + size
-        self._checksum = joined_crc(crc32(head, self._checksum), self._chunk_checksum, size)
-        index_start, offsets, rows = self._end, {}, bytearray()
+        self._checksum = crc32(chunk.data, crc32(head, self._checksum))
+        offsets, rows = {}, bytearray()
         for channel, index in chunk.indexes.items():
-            offsets[channel] = index_start + len(rows)
-            entries = len(index.row)
+            offsets[channel] = self._end + len(rows)
+            entries = len(index)
             rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + entries, channel, entries)
-            rows += index.row
+            rows += index
             self._counts[channel] = self._counts.get(channel, 0) + entries // _ENTRY
         self._put(rows)
         self._times += (chunk.first_ns, chunk.last_ns)
@@ -159,28 +151,25 @@ class McapWriter:
         sizes = struct.pack("<QIQQ", len(rows), 0, size, size)  # 0: no name of a compression
         self._chunks.append(_record(Opcode.CHUNK_INDEX, place, _by_channel(offsets), sizes))
         chunk.begin()
-        self._chunk_checksum = 0
+        self._stored = 0
 
     def _store_chunk(self) -> bytes:
         """Writes the new records of the open chunk, then the head that takes them in; returns the head."""
-        stored, new = self.chunk.stored, bytes(self.chunk.data)
+        data, stored = self.chunk.data, self._stored
         if not stored:  # its head first, of an empty chunk: what follows never stands in half a chunk
-            self._write(self._end, self._chunk_head(0, 0))
-        checksum = crc32(new, self._chunk_checksum)
-        head = self._chunk_head(stored + len(new), checksum)
-        if new:
-            self._write(self._end + len(head) + stored, new)
+            self._write(self._end, self._chunk_head(b""))
+        head = self._chunk_head(data)
+        if len(data) > stored:
+            self._write(self._end + len(head) + stored, data[stored:])
             self._stream.flush()
             self._write(self._end, head)
             self._stream.flush()
-        self.chunk.is_stored()
-        self._chunk_checksum = checksum
+        self._stored = len(data)
         return head
 
-    def _chunk_head(self, size: int, checksum: int) -> bytes:
-        length = _BEFORE_DATA + size
-        times = self.chunk.first_ns, self.chunk.last_ns
-        return _CHUNK.pack(Opcode.CHUNK, length, *times, size, checksum, 0, size)
+    def _chunk_head(self, data: bytes | bytearray) -> bytes:
+        size, times = len(data), (self.chunk.first_ns, self.chunk.last_ns)
+        return _CHUNK.pack(Opcode.CHUNK, _BEFORE_DATA + size, *times, size, crc32(data), 0, size)
 
     def _put(self, data: bytes | bytearray) -> None:
         """Appends to the file, outside of chunks."""

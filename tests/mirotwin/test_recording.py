@@ -270,8 +270,8 @@ def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch
 
 def test_every_channel_has_a_message_type_and_foreign_topics_have_none():
     for name, kind in channels.ROBOT_CHANNELS.items():
-        assert message_type_of(channels.robot_topic(1, 2, name)) is kind
-    assert message_type_of(channels.wire_topic(7)) is channels.WireMessage
+        assert message_type_of(channels.topic_name(name, 1, 2)) is kind
+    assert message_type_of(channels.topic_name(channels.WIRE, 7)) is channels.WireMessage
     assert message_type_of("/camera") is None
     assert message_type_of("/net0/robot0/unknown") is None
 
@@ -279,7 +279,7 @@ def test_every_channel_has_a_message_type_and_foreign_topics_have_none():
 def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods():
     stream = io.BytesIO()
     with Recorder(stream, SOURCE) as recorder:
-        recorder.write_sample(0, 0, channels.SampleMessage(8192, 1, 2, 3, -4, 5, 6, 7, 8))
+        recorder.add("samples", 0, 0, channels.SampleMessage(8192, 1, 2, 3, -4, 5, 6, 7, 8))
         for period in periods(2):
             recorder.write(period)
     assert parse(stream.getvalue(), "run.mcap").periods == tuple(periods(2))

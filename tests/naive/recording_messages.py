@@ -11,12 +11,12 @@ def messages(period):
     found = []
     for robot in period.robots:
         for name, message in of_robot(robot, period.tick):
-            found.append((ch.robot_topic(robot.network, robot.slot, name), period.tick, message))
+            found.append((ch.topic_name(name, robot.network, robot.slot), period.tick, message))
     for sent in period.wire:
         message = ch.WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-        found.append((ch.wire_topic(sent.network), sent.tick, message))
+        found.append((ch.topic_name(ch.WIRE, sent.network), sent.tick, message))
     for action in period.actions:
-        found.append((ch.actions_topic(action.network), action.tick, ch.action_message(action)))
+        found.append((ch.topic_name(ch.ACTIONS, action.network), action.tick, ch.action_message(action)))
     found.append((ch.PERIOD, period.tick, ch.PeriodMessage(period.tick, period.index, period.digest)))
     return [(topic, tick, msgspec.json.encode(message)) for topic, tick, message in found]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO
 
 import msgspec
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
@@ -26,13 +27,13 @@ from mirotwin.recording.channels import (
     FaultMessage,
     ImageMessage,
     Topic,
-    image_topic,
+    topic_name,
     topic_of,
 )
 from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
-from mirotwin.recording.writer import McapWriter, Writable
+from mirotwin.recording.writer import McapWriter
 from mirotwin.report.foxglove import derived, messages, notes
 from mirotwin.report.foxglove.derived import Derived, Said
 
@@ -63,7 +64,7 @@ class Converted(msgspec.Struct):
     notes: list[str]
 
 
-def convert(data: bytes, path: str, stream: Writable) -> Converted:
+def convert(data: bytes, path: str, stream: BinaryIO) -> Converted:
     """Writes the recording `data` with Foxglove's topics. `path` names it in errors. Raises BadInput."""
     recording = reader.parse(data, path)
     told = [recording.broken_off] if recording.broken_off else []
@@ -83,7 +84,7 @@ class _Conversion:
         path: str,
         periods: tuple[Period, ...],
         derive: Derived,
-        stream: Writable,
+        stream: BinaryIO,
         told: list[str],
     ) -> None:
         self.path = path
@@ -160,7 +161,7 @@ class _Conversion:
         try:
             found = self._images.decode(record.data)
         except (msgspec.DecodeError, ValueError) as error:
-            where = f"{image_topic(topic.network)} at {record.log_time} ns"
+            where = f"{topic_name(IMAGE, topic.network)} at {record.log_time} ns"
             raise RecordingError(self.path, where, brief(error), AGAIN) from None
         self.result.images += 1
         self._add(derived.image(topic.network, found.tick, found.data))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.events import Damaged, Reason, Received
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
@@ -172,7 +172,7 @@ def noisy_recording(seed):
     world = World(load("fig6", ("network.radio.bit_error_rate=5e-3",)).scenario, seed, image())
     stream = BytesIO()
     with Recorder(stream, RunSource("x", "", seed, b"", "")) as recorder:
-        runner.run(world, recorder, False, lambda period: period.index == 150)
+        runner.run(world, recorder, move=lambda: world.run_to(151 * CONTROL_PERIOD_TICKS))
     answers = [event.frame for _, event in world.networks[0].log.since(0) if event.what == "answer"]
     return stream.getvalue(), [(answer.start_tick, answer.body) for answer in answers if answer is not None]
 

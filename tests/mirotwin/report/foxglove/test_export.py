@@ -5,6 +5,7 @@ import io
 import math
 from collections import Counter
 from itertools import pairwise
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -186,7 +187,8 @@ class Fault:
 
 
 def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
-    shown = read(exported(recorded(3, lambda to: to.write_faults(0, 0, [Fault()])))[0])
+    robot = SimpleNamespace(network=0, slot=0, board=SimpleNamespace(faults=[Fault()]))
+    shown = read(exported(recorded(3, lambda to: to.write_faults([robot])))[0])
     (line,) = of(shown, "/foxglove/log")
     assert line.time_ns == nanoseconds(Fault.tick)
     assert (line.content["level"], line.content["name"]) == (4, "net0/robot0")
