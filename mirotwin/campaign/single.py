@@ -100,9 +100,7 @@ def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorde
         if recorder is not None:
             recorder.write_theories(tracks.theories())
 
-    runner.run(world, recorder, on_period=keep, move=None if player is None else player.play)
-    if player is not None:
-        player.finish()
+    runner.run(world, recorder, on_period=keep, move=None if player is None else player.run)
 
 
 def _verdicts(judges: Iterable[Checks]) -> dict[str, str]:

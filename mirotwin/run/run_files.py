@@ -204,16 +204,11 @@ class RunFiles:
     def _own_way(self) -> Callable[[], None] | None:
         """How the world moves where it is not just stepped."""
         if self.player is not None:
-            return self._play
+            return self.player.run
         if self.session is not None:
             return self.session.run
         stops = self.stops
         return partial(stops.move, self.world, self.folder) if stops else None
-
-    def _play(self) -> None:
-        assert self.player is not None
-        self.player.play()
-        self.player.finish()
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick

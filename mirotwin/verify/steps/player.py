@@ -117,6 +117,11 @@ class Player:
         self.saved: dict[str, bytes] = {}
         self.checks: list[Checks] = []
 
+    def run(self) -> None:
+        """The whole run: `play`, then `finish`."""
+        self.play()
+        self.finish()
+
     def play(self) -> None:
         """Does the steps. Raises ScenarioError for one that the file cannot have meant."""
         for step in self.steps[self.done :]:

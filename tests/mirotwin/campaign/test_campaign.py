@@ -16,6 +16,7 @@ from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
+from mirotwin.verify.steps.running import run_test
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
@@ -242,7 +243,8 @@ def test_steps_of_a_scenario_are_done_and_one_that_fails_is_told(tmp_path, withi
     assert row["verdict"] == verdict, row["failure"] + row["error"]
     assert row["failure"].startswith("step: ") == (verdict == "failed")
     assert row["check.inside_pitch"] == ("passed" if verdict == "passed" else None)
-    assert row["digest"]
+    whole = run_test(str(tmp_path / "one.scenario.toml"), load_hex(image_path()))
+    assert row["digest"] == whole.digest  # of the whole run, beyond the last step
 
 
 def test_without_pyarrow_the_remedy_is_a_line(monkeypatch, tmp_path):
