@@ -1,7 +1,3 @@
-# C layout of miro_host.integrator.
-cimport cython
-
-
 cpdef double clamp(double x, double limit) noexcept
 cdef double _near(double before, double wanted, double most) noexcept
 
@@ -11,7 +7,6 @@ cdef class Integrator:
     cdef readonly double period_s
     cdef public double v_m_s, w_rad_s
 
-    @cython.locals(v_dot=double, w_dot=double)
     cpdef step(self, double v_dot_m_s2, double w_dot_rad_s2)
     cpdef go_to(self, double v_m_s, double w_rad_s)
 
@@ -20,6 +15,5 @@ cdef class AdamsBashforth(Integrator):
     cdef public double last_v_dot, last_w_dot
     cdef public int begun
 
-    @cython.locals(v_dot=double, w_dot=double)
     cpdef step(self, double v_dot_m_s2, double w_dot_rad_s2)
     cpdef go_to(self, double v_m_s, double w_rad_s)

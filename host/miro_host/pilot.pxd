@@ -1,4 +1,3 @@
-# C layout of miro_host.pilot.
 cimport cython
 from miro_host.integrator cimport Integrator
 
@@ -12,7 +11,7 @@ cdef class Pilot:
     cdef public list numbers
     cdef readonly double reference_lead_s, dead_s, units_per_m_s
 
-    @cython.locals(z=Integrator, units=double, v_m_s=double, w_rad_s=double, at_s=double)
+    @cython.locals(at_s=double)
     cpdef update(self, measured, double t_s, telemetry=*)
     cpdef reference_at(self, double t_s)
     cdef _estimate(self, given)

@@ -1,4 +1,3 @@
-# C layout of miro_host.station.
 cimport cython
 
 cdef int _SEQ_MODULUS, _XOR_OUT
@@ -15,5 +14,5 @@ cdef class Station:
     cdef unsigned short _table[256]
 
     cpdef bytes frame(self, commands)
-    @cython.locals(end=int, place=int, word=int, register='unsigned int')
+    @cython.locals(word=int, register='unsigned int')
     cdef bint _fill(self, commands) except -1

@@ -1,4 +1,3 @@
-# C layout of miro_host.telemetry_receiver.
 cimport cython
 from miro_protocol.scan cimport Scanner
 

@@ -1,4 +1,3 @@
-# C layout of miro_host.vision.
 cimport cython
 from libc cimport math
 from miro_exact cimport dmath
@@ -17,6 +16,6 @@ cdef class Vision:
     cdef readonly object errors, under_way
     cdef readonly int delay_frames
 
-    @cython.locals(first='long long', x_m=double, y_m=double, theta_rad=double)
+    @cython.locals(x_m=double, y_m=double, theta_rad=double)
     cpdef expose(self, tuple true, Stream noise, long long frame)
     cpdef frame(self, true, tuple normals)

@@ -1,4 +1,3 @@
-# C types of miro_host.wheels.
 cimport cython
 
 cdef double _PER_TURN
@@ -6,9 +5,8 @@ cdef double _PER_TURN
 cpdef nearest(double x)
 cdef double _units_per_m_s(double radius_m) except? -1.0
 cdef (double, double) _limited(double left, double right, double limit_m_s)
-@cython.locals(units=double, step=int)
+@cython.locals(step=int)
 cdef _counts(double speed_m_s, double limit_m_s, double units_per_m_s, int word_bits)
-@cython.locals(half=double)
 cdef _words(
     double v_m_s, double w_rad_s, double left_factor, double right_factor,
     double track_m, double limit_m_s, double radius_m, int word_bits

@@ -12,7 +12,6 @@ cdef class SilenceRule:
     cpdef long long earliest_tick(self) noexcept
     cpdef long long latest_tick(self) noexcept
     cpdef void received(self, long long tick) noexcept
-    @cython.locals(latest='long long', begun='long long')
     cpdef long long deadline(self) noexcept
     cpdef bint is_over(self, long long tick) noexcept
     cpdef bint is_judged(self, long long tick) noexcept
@@ -27,7 +26,6 @@ cdef class DrivingRule:
     cpdef void fresh(self, long long tick) noexcept
     cpdef bint may_move(self, long long tick) noexcept
     cpdef team(self, long long tick, int left, int right)
-    @cython.locals(place=int)
     cpdef told(self, int left, int right)
     cpdef missed(self, long long tick)
 
@@ -50,7 +48,5 @@ cdef class AnswerRule:
     cpdef void question(self, long long tick, int seq) noexcept
     cpdef bint character(self) noexcept
     cpdef bint in_turn(self, int seq) noexcept
-    @cython.locals(late='long long')
     cpdef long long late(self, long long tick, int seq) noexcept
-    @cython.locals(deadline='long long')
     cpdef long long missed(self, long long tick) noexcept

@@ -21,33 +21,23 @@ cdef class Scanner:
     cdef unsigned char body[64]
 
     cpdef begin(self)
-    @cython.locals(place=int, sync=int, found=int)
     cpdef bint take(self, int byte, bint bad_stop, long long tick) except -1
     cdef void _clear(self) noexcept
     cpdef int body_at(self, int place) noexcept
 
-    @cython.locals(tick='long long', flaws=int, place=Py_ssize_t, length=Py_ssize_t, found=int, view='const unsigned char[::1]')
+    @cython.locals(tick='long long', view='const unsigned char[::1]')
     cpdef list feed(self, data, start_tick=*)
-    @cython.locals(tick='long long', found=int)
+    @cython.locals(tick='long long')
     cpdef list feed_symbols(self, symbols)
-    @cython.locals(tick='long long', place=Py_ssize_t, length=Py_ssize_t, found=int, 
-                   bytes_view='const unsigned char[::1]', stop_view='const unsigned char[::1]', tick_view='const long long[::1]')
+    @cython.locals(bytes_view='const unsigned char[::1]', stop_view='const unsigned char[::1]',
+                   tick_view='const long long[::1]')
     cpdef list feed_columns(self, data, bad_stop, ticks)
-    @cython.locals(place=int)
-    cpdef int after_load(self) except -1
-    @cython.locals(spacing='long long')
     cdef bint _is_apart(self, long long tick) noexcept
-    @cython.locals(flaws=int)
     cdef int _put_symbol(self, int byte, bint bad_stop, long long tick) noexcept
-    @cython.locals(place=int)
     cdef inline void _keep(self, int byte, int flaws, long long tick) noexcept
-    @cython.locals(start=int, reason=int)
     cdef inline int _put(self, int byte, int flaws, long long tick) noexcept
-    @cython.locals(place=int, byte='unsigned int', register='unsigned int')
+    @cython.locals(byte='unsigned int', register='unsigned int')
     cdef int _test(self, int start) noexcept
-    @cython.locals(sync=int, start=int, end=int, place=int, body=bytearray)
     cdef _give_out(self, int found, list events)
-    @cython.locals(start=int, expected=int)
     cdef int _lead_start(self, int sync) noexcept
-    @cython.locals(place=int)
     cdef _give_out_damaged(self, int length, list events)

@@ -1,4 +1,3 @@
-# C types of miro_host.estimators.filter.
 cimport cython
 from miro_exact cimport dmath
 from miro_host.estimators.motion cimport Motion
@@ -20,41 +19,33 @@ cdef class Filter:
     cdef double column[9]
     cdef double lower[25]
 
-    cpdef drifts(self, double position_m, double heading_rad, double wheel, double rim_m_s)
-    cpdef warps(self, double warp_m, double warp_length_m)
-    @cython.locals(index=int, i=int, j=int)
-    cpdef after_load(self)
-    @cython.locals(i=int, j=int)
     cpdef check_positive(self)
-    @cython.locals(lower='double *', i=int, j=int, k=int)
+    @cython.locals(lower='double *')
     cdef int factorise(self, int size) except -1
-    @cython.locals(total=double, index=int)
+    @cython.locals(total=double)
     cpdef bint finite(self)
     cpdef command(self, double left_m_s, double right_m_s, double effect_s, double period_s)
-    @cython.locals(index=int)
     cpdef start(self, double x_m, double y_m, double theta_rad, double at_s, double position_m2, double heading_rad2)
-    @cython.locals(other=int)
     cpdef forget(self, int index, double variance)
-    @cython.locals(motion=Motion)
     cpdef run(self, double to_s)
-    @cython.locals(motion=Motion, time_s=double, middle=double, p='double *', n=int, i=int, j=int)
+    @cython.locals(p='double *')
     cpdef predict(self, double to_s)
     cpdef loosen(self, double position_m2, double heading_rad2)
-    @cython.locals(p='double *', column='double *', i=int, j=int)
+    @cython.locals(p='double *', column='double *')
     cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
-    @cython.locals(kept=double, p='double *', index=int, other=int)
+    @cython.locals(p='double *')
     cdef int warp_on(self, double way_m) noexcept
-    @cython.locals(p='double *', lower='double *', i=int, j=int)
+    @cython.locals(p='double *', lower='double *')
     cpdef decompose(self, double position_m2, double heading_rad2)
-    @cython.locals(lower='double *', a=double, b=double)
+    @cython.locals(lower='double *')
     cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,
                            double heading_rad2) except? -7.5
     @cython.locals(p='double *')
     cpdef double along_m2(self, double cos, double sin, double position_m2) except? -7.5
     @cython.locals(warp=cython.bint)
     cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
-    @cython.locals(innovation=double, believed=cython.bint)
+    @cython.locals(believed=cython.bint)
     cpdef bint count(self, int extra, double extra_m, double variance, double gate)
-    @cython.locals(p='double *', column='double *', n=int, i=int, j=int)
+    @cython.locals(p='double *', column='double *')
     cdef int correct(self, int one, int other, double innovation, double variance) except -1
     cdef int tidy(self) except -1

@@ -1,4 +1,3 @@
-# C types of miro_host.estimators.motion.
 cimport cython
 from miro_exact cimport dmath
 
@@ -16,16 +15,11 @@ cdef class Motion:
     cdef readonly double x_by_theta, x_by_left, x_by_right, y_by_theta, y_by_left, y_by_right
     cdef readonly double theta_by_left, theta_by_right
 
-    @cython.locals(index=int)
     cpdef remember(self, double left_m_s, double right_m_s, double period_s)
     cdef double speed(self, double start_m_s, double to_m_s, double time_s) noexcept
     cpdef begin(self, double x_m, double y_m, double theta_rad)
     @cython.locals(index=int)
     cpdef run(self, double from_s, double to_s, double effect_s, double period_s, double left_factor,
               double right_factor)
-    @cython.locals(left_start=double, left_to=double, right_start=double, right_to=double, left_s=double,
-                   right_s=double, first_s=double, second_s=double, from_s=double, to_s=double, half_s=double,
-                   left=double, right=double, doubt_s=double, cut=int)
     cdef int hold(self, int index, double begin_s, double end_s, double left_factor, double right_factor) except -1
-    @cython.locals(length=double)
     cdef int arc(self, double left_m, double right_m, double left_factor, double right_factor) except -1

@@ -6,5 +6,4 @@ cdef class Grabber:
     cdef readonly Py_ssize_t robots, delay_frames
     cdef readonly list under_way
 
-    @cython.locals(under_way=list)
     cpdef tuple take(self, tuple frame)

@@ -21,23 +21,16 @@ cdef class Patches:
     cdef readonly int out_pairs, out_team, out_identity, out_contested, out_team_area, out_identity_area
     cdef readonly double out_off_m, out_next_m, out_gap_m
 
-    @cython.locals(region=int)
     cpdef int look(self, bytearray pixels, int left, int top, int width, int height) except -1
     cdef void place(self, int region) except *
-    @cython.locals(area=int)
     cdef bint is_patch(self, int region) noexcept
     cpdef expect_nothing(self)
-    @cython.locals(at=int)
     cpdef expect(self, double team_x, double team_y, double identity_x, double identity_y)
-    @cython.locals(one=int, other=int)
     cpdef int choose(self, int team, int identity) except -1
-    @cython.locals(region=int)
     cdef bint is_whole(self, int patch, int kind) noexcept
-    @cython.locals(dx=double, dy=double)
     cdef bint fits(self, int one, int other) noexcept
-    @cython.locals(off=double)
     cdef void take(self, int one, int other) noexcept
-    @cython.locals(least=double, at=int, tx=double, ty=double, ix=double, iy=double, off=double)
+    @cython.locals(least=double, off=double)
     cdef double off_m(self, int team, int identity) noexcept
-    @cython.locals(of_team=bint, found=int, other=int)
+    @cython.locals(of_team=bint)
     cdef int partners(self, int patch) noexcept

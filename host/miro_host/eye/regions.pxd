@@ -26,16 +26,12 @@ cdef class Regions:
     cpdef int find(self, bytearray pixels, int width, int height) except -1
     cpdef object region(self, int index)
     cpdef (double, double) centroid(self, int index)
-    @cython.locals(data='unsigned char *', table='unsigned char *', width='long long',
-                   at='long long', runs='long long', row=int, column='long long', before=int, kind=int)
+    @cython.locals(data='unsigned char *', table='unsigned char *', width='long long', at='long long',
+                   runs='long long', column='long long', before=int, kind=int)
     cdef void find_runs(self, bytearray pixels) noexcept
-    @cython.locals(above=int, run=int, row=int, other=int)
     cdef void merge(self) noexcept
     cdef void join(self, int one, int other) noexcept
     cdef int root(self, int run) noexcept
-    @cython.locals(run=int, root=int)
     cdef void collect(self) noexcept
-    @cython.locals(index=int)
     cdef void begin(self, int run) noexcept
-    @cython.locals(start=int, end=int, row=int)
     cdef void add(self, int index, int run) noexcept

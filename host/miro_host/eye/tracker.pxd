@@ -34,22 +34,19 @@ cdef class Tracker:
     cdef readonly Regions regions
     cdef public object notes
 
-    @cython.locals(pairs=list, sightings=list, slot=int, pair=Pair, track=Track)
+    @cython.locals(pair=Pair, track=Track)
     cpdef list track(self, frame, long long tick)
-    @cython.locals(track=Track, x_m=double, y_m=double, theta_rad=double, u=double, v=double, pair=Pair)
+    @cython.locals(track=Track, x_m=double, y_m=double, theta_rad=double)
     cdef Pair _followed(self, frame, long long tick, int slot)
-    @cython.locals(whole_width=int, whole_height=int, width=int, height=int, left=int, top=int, pixels=bytearray)
+    @cython.locals(whole_width=int, whole_height=int, width=int, height=int)
     cpdef bytearray _look(self, frame, double u, double v, int size, int slot)
-    @cython.locals(team_x=double, team_y=double, identity_x=double)
     cpdef _expect(self, double x_m, double y_m, double theta_rad)
-    @cython.locals(patches=Patches, track=Track)
+    @cython.locals(track=Track)
     cpdef Pair _chosen(self, bytearray pixels, long long tick, int slot)
-    @cython.locals(slot=int, other=int, pair=Pair, rival=Pair)
+    @cython.locals(pair=Pair, rival=Pair)
     cdef _part(self, list pairs)
-    @cython.locals(patches=Patches, u=double, v=double, identity_u=double, identity_v=double, x_m=double, y_m=double)
     cdef Pair _pair(self, bytearray pixels, long long tick, int slot)
-    @cython.locals(patches=Patches, regions=Regions, weighing=Weighing, team=int, identity=int, team_u=double,
-                   team_v=double, identity_u=double, identity_v=double, left=int, top=int)
+    @cython.locals(weighing=Weighing, team_u=double, team_v=double, identity_u=double, identity_v=double)
     cdef (double, double, double, double) _centroids(self, bytearray pixels, int slot)
 
 

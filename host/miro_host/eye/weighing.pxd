@@ -17,14 +17,10 @@ cdef class Weighing:
     cdef int rivals
 
     cpdef tuple weights(self, int cb, int cr)
-    @cython.locals(weight=int)
     cdef int weight(self, int which, int cb, int cr) noexcept
-    @cython.locals(index=int)
     cpdef centroids(self, bytearray pixels, Regions regions, int team, int identity, int rival_area)
     cdef void place(self, int rival, Regions regions, int index) noexcept
-    @cython.locals(total=int, total_u=int, total_v=int, own_u=int, own_v=int, left=int, right=int, top=int, bottom=int,
-                   data='unsigned char *', row=int, column=int, at=int, weight=int, u=int, v=int)
+    @cython.locals(data='unsigned char *')
     cdef void weigh(self, int which, bytearray pixels, Regions regions, int index) noexcept
-    @cython.locals(rival=int, along=int, down=int)
     cdef bint nearest(self, int u, int v, int own) noexcept
     cpdef (double, double) centroid(self, int which)

@@ -8,9 +8,7 @@ cdef int _SETS, _OUT, _SURE, _UNSURE, _MIXED, _WIDTH, _HEIGHT, _CORNERS, _FAR_UM
 cdef int _TOP, _TEAM, _IDENTITY, _REACH, _BASE, _NEAR, _LOW_U, _HIGH_U, _LOW_V, _HIGH_V, _LIFT, _FAST_UM
 cdef long long _HALF_UM, _TOP_UM
 
-@cython.locals(place=double)
 cdef int _um(double metres) noexcept
-@cython.locals(below=double)
 cdef int _rounded(double x) noexcept
 
 
@@ -63,50 +61,40 @@ cdef class Camera:
     cdef int seen[128]
     cdef int height_um[128]
 
-    @cython.locals(stood=tuple, body=int, number=int, place=int, after_s=double, way_m=double, sine=double, cosine=double,
-                   least_u=int, most_u=int, least_v=int, most_v=int)
+    @cython.locals(stood=tuple)
     cpdef robot(self, int team, int identity, double x_m, double y_m, double theta_rad, double v_m_s=*, double w_rad_s=*)
-    @cython.locals(cosine='long long', sine='long long', drop='long long', x='long long', y='long long')
+    @cython.locals(cosine='long long', sine='long long')
     cdef void _stand(self, int place) noexcept
-    @cython.locals(camera='long long', drop='long long', margin='long long')
     cdef void _surround(self, int at, long long least, long long most) noexcept
-    @cython.locals(middle=int, reach=int, length='long long', number=int, place=int, way='long long', turn='long long',
-                   drift='long long')
+    @cython.locals(reach=int, length='long long', way='long long', turn='long long', drift='long long')
     cdef void _bound(self, int body) noexcept
-    @cython.locals(is_any=bint, out=bytearray)
+    @cython.locals(is_any=bint)
     cpdef bytearray window(self, long long left, long long top, long long width, long long height)
-    @cython.locals(first=int, end=int, band=int, above=int, below=int, row=int)
+    @cython.locals(first=int, band=int, above=int, below=int, row=int)
     cdef _draw(self, int left, int top, int width, int height, bytearray out)
-    @cython.locals(column=int)
     cdef void _put_robots(self, int row, int at) noexcept
-    @cython.locals(width=int, height=int, at=int, pixel=int, most='long long', body=int, near=int, newest='long long',
-                   place=int, cover=tuple)
+    @cython.locals(at=int, pixel=int, near=int, place=int, cover=tuple)
     cdef void _cover(self, int top, int bottom, int first, int end) except *
-    @cython.locals(at=int, row=int, left=int, right=int, column=int, place=int)
     cdef void _cover_with(self, int body, int top, int bottom, int first, int end) noexcept
-    @cython.locals(step=int, left=int, right=int, beside='long long')
+    @cython.locals(step=int, left=int, right=int)
     cdef void _find_span(self, int body, int row, int first, int end) noexcept
-    @cython.locals(place=int, reach=int, x='long long', y='long long', u='long long', v='long long',
-                   beside_u='long long', beside_v='long long')
+    @cython.locals(reach=int, x='long long', y='long long')
     cdef inline long long _beside(self, int body, int pixel) noexcept
-    @cython.locals(bounds=int, still=bint, column='long long', lane='long long', number=int, at=int, line=int)
+    @cython.locals(bounds=int, still=bint, column='long long', lane='long long', line=int)
     cdef void _find_corners(self, int body, int row, int left, int right) noexcept
-    @cython.locals(rays=rays.Rays, x='double[4]', y='double[4]', u='int[4]', v='int[4]',
-                   cosine=double, sine=double, shift_u=double, shift_v=double, column='long long', lane='long long',
-                   at='long long')
+    @cython.locals(x='double[4]', y='double[4]', u='int[4]', v='int[4]', lane='long long')
     cdef void _turn_corners(self, int place, long long corner, long long line, long long bounds, long long left,
                             long long right) noexcept
-    @cython.locals(column='long long', lane='long long', at='long long', one=int, other=int)
+    @cython.locals(lane='long long')
     cdef void _bound_pixels(self, long long left, long long right) noexcept
     @cython.locals(inside_u=bint)
     cdef inline bint _inside(self, int column, int at) noexcept
     @cython.locals(beside=bint)
     cdef inline bint _outside(self, int column, int at) noexcept
-    @cython.locals(whole=bint, total='long long')
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
-    @cython.locals(scene=scene.Scene, whole=int, pixel=int, behind=int, on_top=int, entered=int, total='long long')
+    @cython.locals(whole=int)
     cdef long long _alone(self, int body, int row, int column) noexcept
-    @cython.locals(packed='long long *', team=int, identity=int, total='long long')
+    @cython.locals(packed='long long *', identity=int)
     cdef long long _paint_top(self, int body, int row, int column, int on_top) noexcept
     @cython.locals(at=int)
     cdef inline int _within(self, int row, int column, int box) noexcept
@@ -114,41 +102,37 @@ cdef class Camera:
     cdef int _count_within(self, int row, int column, int at) noexcept
     cdef inline int _count(self, bint across_u, bint across_v) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept
-    @cython.locals(lane='long long', above='long long', below='long long', a=int, b=int, c=int, d=int)
+    @cython.locals(lane='long long', above='long long', below='long long')
     cdef inline void _lay(self, int* corners, int* at, int* by, int* right, int* bend) noexcept
-    @cython.locals(at='int[4]', by='int[4]', right='int[4]', bend='int[4]', within='int[4]', upper=int, lower=int,
-                   lane='long long', least=int, most=int, a=int, b=int, c=int, d=int, down=int, above=int, below=int,
-                   _=int)
+    @cython.locals(at='int[4]', by='int[4]', right='int[4]', bend='int[4]', within='int[4]', lane='long long',
+                   least=int, most=int, above=int, below=int, _=int)
     cdef int _count_along(self, int* corners, int* low, int* high) noexcept
     cdef inline int _add(self, int* within) noexcept
     @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
-                   right_v='int[4]', bend_v='int[4]', within='int[4]', upper=int, lower=int, lane='long long', low_u=int,
-                   high_u=int, low_v=int, high_v=int, u=int, v=int, down_u=int, down_v=int, above=int, below=int,
-                   _=int)
+                   right_v='int[4]', bend_v='int[4]', within='int[4]', lane='long long', low_u=int, high_u=int,
+                   low_v=int, high_v=int, above=int, below=int, _=int)
     cdef int _count_both(self) noexcept
     @cython.locals(entered=int, first=int)
     cdef int _entered(self, int body, int row, int column, int on_top) noexcept
     @cython.locals(least_u='int[4]', most_u='int[4]', least_v='int[4]', most_v='int[4]', outside='int[4]',
-                   across_u='int[4]', across_v='int[4]', off='double[4]', over='double[4]', gone=int, crossed_u=int, crossed_v=int, crossed=int, lane='long long', fall_u=int, fall_v=int, low_u=int, high_u=int,
-                   low_v=int, high_v=int, u=int, v=int, along_u=double, along_v=double, middle=double,
-                   around=double)
+                   across_u='int[4]', across_v='int[4]', off='double[4]', over='double[4]', gone=int, crossed_u=int,
+                   crossed_v=int, crossed=int, lane='long long', low_u=int, high_u=int, low_v=int, high_v=int, u=int,
+                   v=int, along_u=double, along_v=double, middle=double, around=double)
     cdef int _enter(self, int place, int pixel) noexcept
-    @cython.locals(above='long long', below='long long', lane='long long', a=int, b=int, c=int, d=int)
+    @cython.locals(above='long long', below='long long', lane='long long')
     cdef inline void _bound_corners(self, int* corners, int* least, int* most) noexcept
-    @cython.locals(x=double, y=double, lane='long long')
+    @cython.locals(lane='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
     @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
                    right_v='int[4]', bend_v='int[4]', within='int[4]', fall_u='double[4]', fall_v='double[4]',
-                   most='double[4]', u='int[4]', v='int[4]', row=int, shown=int, lane='long long', one=int, other=int,
-                   across=double, inside=int, _=int)
+                   most='double[4]', u='int[4]', v='int[4]', row=int, lane='long long', one=int, other=int, inside=int,
+                   _=int)
     cdef int _count_entering(self) noexcept
-    @cython.locals(a=int, b=int, c=int, d=int, column=int, p=int, at=int, by=int)
+    @cython.locals(column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int* corners) noexcept
-    @cython.locals(pixel=int, scene=scene.Scene, behind=int, ball_seen=bint, number=int, at=int, first=int, open_paint=int, body=int, sample=int, paint=int,
-                   height=int, ball=int, total='long long')
+    @cython.locals(at=int, first=int, open_paint=int, sample=int, paint=int)
     cdef long long _samples(self, int row, int column) noexcept
-    @cython.locals(fall_u='long long', fall_v='long long', sample=int, u='long long', v='long long', index=int,
-                   height='long long')
+    @cython.locals(fall_u='long long', fall_v='long long', u='long long', v='long long', index=int)
     cdef void _see(self, int body, int at, int pixel) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
     @cython.locals(at=int)

@@ -6,7 +6,7 @@ cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH, _PAD
 cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
 cdef long long _CIRCLE_UM, _AREA_HALF_UM, _AREA_DEPTH_UM, _BALL_UM
 
-@cython.locals(values='short[16]', at='long long', lane='long long')
+@cython.locals(values='short[16]', lane='long long')
 cdef void _copy(short[::1] kept, long long pixel, short* line, long long column, long long count) noexcept
 
 
@@ -22,34 +22,24 @@ cdef class Scene:
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
     cdef readonly bint has_ball
 
-    @cython.locals(rays=rays.Rays, far='long long', top='long long', end='long long')
     cdef bint _near_ball(self, int pixel) noexcept
     @cython.locals(paint=int)
     cdef bint shows_ball(self, int pixel) noexcept
-    @cython.locals(x='long long', y='long long', lost='long long')
     cdef inline long long _light(self, int pixel) noexcept
-    @cython.locals(known_first=int, known_end=int, pixel=int)
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
-    @cython.locals(column=int, pixel=int)
     cdef void _light_up(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef inline int behind(self, int pixel) noexcept
-    @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
+    @cython.locals(first=int, sample=int)
     cdef void look(self, int pixel) noexcept
-    @cython.locals(x='long long', y='long long', ring=int)
     cdef int sample(self, int pixel, int sample) noexcept
-    @cython.locals(ring=int)
     cdef int ball_above(self, int pixel, int sample, long long height) noexcept
-    @cython.locals(slopes='int[::1]', a=int, c=int)
+    @cython.locals(slopes='int[::1]')
     cdef long long _slope_x(self, int pixel, int sample) noexcept
-    @cython.locals(slopes='int[::1]', a=int, c=int)
+    @cython.locals(slopes='int[::1]')
     cdef long long _slope_y(self, int pixel, int sample) noexcept
-    @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', along='long long',
-                   stretch='long long', distance='long long', rim='long long')
     cdef int _ring(self, long long slope_x, long long slope_y, long long above) noexcept
-    @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', on_wall=bint)
+    @cython.locals(on_wall=bint)
     cdef int paint_of(self, long long slope_x, long long slope_y) noexcept
-    @cython.locals(rays=rays.Rays, spread='long long', x='long long', y='long long', far='long long')
     cdef int _sure(self, int pixel) noexcept
     cdef bint _inside(self, long long x, long long y, long long more) noexcept
-    @cython.locals(half='long long', square='long long', inner='long long', outer='long long', depth='long long')
     cdef bint _on_line(self, long long x, long long y, long long more) noexcept

@@ -27,25 +27,20 @@ cdef class Sensor:
 
     @cython.locals(light=double)
     cpdef begin(self, long long frame, long long tick, int samples)
-    @cython.locals(twice_hz='long long', turns=double, phase=double, sine_end=double, sine_begin=double, cosine=double,
-                   mean=double)
+    @cython.locals(twice_hz='long long', turns=double, mean=double)
     cdef double _lamps(self, long long tick) except? -1.0
-    @cython.locals(red=int, green=int, blue=int)
     cdef void put(self, int column, long long total, long long light) noexcept
-    @cython.locals(value='long long')
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(first='long long', blocks=int)
+    @cython.locals(blocks=int)
     cdef void write(self, int row, int left, int width, bytearray out, int at) except *
-    @cython.locals(levels='const unsigned char *', words='unsigned int *', block='long long', column='long long',
-                   last='unsigned int', word='unsigned int', part=int)
+    @cython.locals(levels='const unsigned char *', words='unsigned int *', part=int)
     cdef void _quantise(self, long long first, long long end, long long blocks, unsigned char* out,
                         long long at) noexcept
-    @cython.locals(y='unsigned char', cb='unsigned char', cr='unsigned char')
     cdef inline void _write_pixel(self, const unsigned char* levels, long long column, unsigned int word,
                                   unsigned int last, unsigned char* out, long long at) noexcept
-    @cython.locals(first='long long', lane='long long', step='long long', sums='int[8]', bend=short)
+    @cython.locals(lane='long long', step='long long', sums='int[8]', bend=short)
     cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
-    @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
+    @cython.locals(word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept
     @cython.locals(column=int, after=int, before=int)
     cdef void _move(self, short* values, int first, int last, long long by) noexcept

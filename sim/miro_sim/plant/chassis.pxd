@@ -1,4 +1,3 @@
-# C layout of miro_sim.plant.chassis.
 cimport cython
 from miro_exact cimport dmath
 
@@ -12,14 +11,10 @@ cdef class Body:
     cdef readonly double turned_left_rad[16]
     cdef readonly double turned_right_rad[16]
 
-    @cython.locals(half_s=double, old_left=double, old_right=double, left=double, right=double, most=double,
-                   left_rub=double, right_rub=double)
     cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
     @cython.final
-    @cython.locals(left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double left, double right, double most) noexcept
-    @cython.locals(x_m=double, y_m=double, theta_rad=double, step=int)
     cdef int _roll(self, int steps) except -1
-    @cython.locals(v=double, w=double, time_s=double, half=double)
+    @cython.locals(v=double, w=double, half=double)
     cpdef tuple pose_after(self, long long ticks)
     cpdef tuple velocity(self)

@@ -1,4 +1,3 @@
-# C layout of miro_sim.plant.disturbance.
 cimport cython
 from miro_exact cimport dmath
 from miro_exact.rng cimport Stream
@@ -13,5 +12,4 @@ cdef class DisturbingForce:
     cdef readonly bint is_on, varies
     cdef readonly double force_n, torque_nm
 
-    @cython.locals(force=double, torque=double, share=double, sine=double, period=cython.longlong)
     cpdef void at(self, long long tick) except *

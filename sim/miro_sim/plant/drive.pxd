@@ -1,4 +1,3 @@
-# C layout of miro_sim.plant.drive.
 cimport cython
 from miro_exact cimport dmath
 from miro_robot.lm629.chip cimport Lm629
@@ -25,17 +24,13 @@ cdef class Winding:
     cdef readonly Decay decay
 
     cdef inline bint rests(self) noexcept
-    @cython.locals(longest=int)
-    cpdef int after_load(self) except -1
     cpdef void set_bridge(self, int enable, int forward) noexcept
     cdef inline void _ask(self, int wanted) noexcept
     cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
-    @cython.locals(wait=int)
     cdef inline double _pass(self, int ticks, double emf_v) noexcept
-    @cython.locals(start=double, kind=cython.longlong, final=double, end=double, goes_on=cython.bint)
+    @cython.locals(kind=cython.longlong, goes_on=cython.bint)
     cdef inline double _flow(self, int ticks, double emf_v) noexcept
-    @cython.locals(start=double)
     cdef double _through_zero(self, int ticks, double emf_v, double final, double tau) noexcept
     @cython.locals(kind=cython.longlong)
     cdef inline double _onward(self, double ticks, double emf_v) noexcept
@@ -53,20 +48,16 @@ cdef class Quadrature:
 
     @cython.locals(c_radians='double[16]', c_ticks='long long[17]')
     cpdef int turn(self, list radians, list ticks) except -1
-    @cython.locals(chip=Lm629, least=double, slow=cython.bint, edges=cython.longlong, position=double, count=cython.longlong,
-                   step=cython.int, moved=double, before=cython.longlong, one_way=cython.bint)
+    @cython.locals(edges=cython.longlong, count=cython.longlong, before=cython.longlong, one_way=cython.bint)
     cdef void _turn(self, double *radians, long long *ticks, int steps) noexcept
-    @cython.locals(first=cython.int, way=cython.longlong, before=cython.longlong, step=cython.int, last_tick=cython.longlong,
-                   before_tick=cython.longlong)
+    @cython.locals(first=cython.int, way=cython.longlong)
     cdef int _tell_run(self, Lm629 chip, double *radians, long long *ticks, int steps, long long edges) noexcept
     cdef inline int _step_to(self, long long count, int step) noexcept
-    @cython.locals(step=cython.int, tick=cython.longlong)
     cdef void _tell_each(self, Lm629 chip, double *radians, long long *ticks, int steps) noexcept
-    @cython.locals(length=cython.longlong, moved=double, forward=cython.bint, exact=double, after=cython.longlong)
+    @cython.locals(forward=cython.bint, after=cython.longlong)
     cdef long long _edge_tick(self, double *radians, long long *ticks, int step, long long count) noexcept
     cpdef void attach(self, long long tick, Lm629 chip) noexcept
     cdef void _show(self, long long tick, Lm629 chip) noexcept
-    cpdef int after_load(self) except -1
     cpdef inline int a(self) noexcept
     cpdef inline int b(self) noexcept
     cpdef int index(self) noexcept
@@ -87,21 +78,16 @@ cdef class DifferentialDrive(Plant):
     cpdef attach(self, Lm629 left, Lm629 right)
     cpdef tuple pose_at(self, long long tick)
     cpdef tuple velocity_at(self, long long tick)
-    cpdef int after_load(self) except -1
     cpdef advance(self, long long tick)
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
-    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, other=cython.longlong)
     cpdef int run_pulses(self, long long tick) except -1
     @cython.final
-    @cython.locals(left=Lm629, right=Lm629, begin=cython.longlong, now=cython.longlong, ticks=cython.int,
-                   steps=cython.int, constant=double, impulse=double, left_charge=double)
+    @cython.locals(ticks=cython.int, steps=cython.int)
     cdef void _run(self, long long until, long long last, long long left_tick, long long right_tick) except *
     @cython.final
     @cython.locals(still=cython.bint)
     cdef inline bint _stands(self) noexcept
     @cython.final
-    @cython.locals(end=cython.longlong)
     cdef inline void _stand(self, long long until, long long last) noexcept
     @cython.final
-    @cython.locals(body=Body)
     cdef int _move(self, int steps) except -1

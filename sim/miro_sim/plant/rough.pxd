@@ -1,4 +1,3 @@
-# C layout of miro_sim.plant.rough.
 cimport cython
 from miro_exact cimport dmath
 from miro_exact.rng cimport Stream
@@ -18,29 +17,20 @@ cdef class RoughBody(Body):
     cdef double _rub_nms, _push_ns, _ball_x_ns, _ball_y_ns, _ball_z
 
     cpdef int feel(self, long long tick) except -1
-    @cython.locals(step_s=double, half_s=double, old_left=double, old_right=double, old_v=double, old_u=double,
-                   old_w=double, most_left=double, most_right=double, old_left_slip=double, old_right_slip=double,
-                   left_slip=double, right_slip=double)
+    @cython.locals(old_left_slip=double, old_right_slip=double, left_slip=double, right_slip=double)
     cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
     cdef int _roll(self, int steps) except -1
-    @cython.locals(most=double)
     cdef int _resist(self, double lever_m, double step_s) except -1
-    @cython.locals(squares=double, cosine=double, sine=double)
     cdef void _turn_frame(self, double tangent) except *
-    @cython.locals(grip=double, axle=double, left_rub=double, right_rub=double, left_push=double, right_push=double,
-                   sideways=double, inertia=double, hub=double, before=double, left_stands=cython.bint,
-                   right_stands=cython.bint, left_back=double, left_ahead=double, right_back=double,
-                   right_ahead=double, left_held=cython.bint, changed=double, speeds=double, signed=cython.bint)
+    @cython.locals(left_stands=cython.bint, right_stands=cython.bint, left_held=cython.bint, changed=double,
+                   signed=cython.bint)
     cdef int _dissipate(self, double most_left, double most_right, double step_s) except -1
     cdef double _grip_left_n(self, double along_n) except? -7.5
     cdef int _move(self, double push_ns, double lever_m) except -1
-    @cython.locals(inertia=double, free_hub=double, free_shaft=double, slip_per_ns=double, turning=double)
     cdef void _wheel(self, double hub, double shaft, double roll, double rub, double push, double most,
                     double back, double ahead) except *
-    @cython.locals(x_per_kg=double, y_per_kg=double, free_x=double, free_y=double, x=double, y=double, z=double,
-                   length=double, fall=double, more_y=double)
+    @cython.locals(x=double, y=double, z=double, length=double, fall=double, more_y=double)
     cdef int _drag(self, double most) except -1
-    @cython.locals(half=double)
     cdef void _glide(self, double forward_m, double left_m, double turn_rad) except *
     cpdef tuple pose_after(self, long long ticks)
     cpdef tuple velocity(self)

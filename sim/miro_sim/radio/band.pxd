@@ -31,14 +31,10 @@ cdef class Band:
     cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
-    @cython.locals(sent='long long')
     cdef int level(self, long long tick) except -1
-    @cython.locals(alone=Transmitter, line=Line)
     cdef int _follow(self, long long sent) except -1
-    @cython.locals(
-        transmitter=Transmitter, line=Line, slot='long long', level=int, keyed=int, carriers=int, wrong=cython.bint,
-        threshold='unsigned long long', change='long long', own_edge='long long', one_alone=cython.bint,
-    )
+    @cython.locals(transmitter=Transmitter, line=Line, level=int, wrong=cython.bint, change='long long',
+                   own_edge='long long', one_alone=cython.bint)
     cdef int _look(self, long long sent) except -1
     @cython.locals(transmitter=Transmitter)
     cpdef hear(self, long long tick)

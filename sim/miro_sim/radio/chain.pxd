@@ -11,5 +11,5 @@ cdef class Chain:
     cdef long long slot
     cdef int answer
 
-    @cython.locals(known='long long', index='long long', draw='unsigned long long', answer=int)
+    @cython.locals(draw='unsigned long long')
     cpdef int bad(self, long long slot) except -1

@@ -1,4 +1,3 @@
-# C layout of miro_sim.radio.downlink.
 cimport cython
 from miro_exact.rng cimport Stream
 from miro_sim.radio.listener cimport Listener
@@ -17,11 +16,8 @@ cdef class Downlink:
     cdef readonly list everyone, overheard, audience
     cdef readonly long long settled_tick, free_tick, busy_tick
 
-    @cython.locals(
-        lead='long long', key_tick='long long', slot='long long', late='long long', arrival='long long', air_ticks='long long',
-        link=Downlink, sender=Sender, stops=bytes
-    )
+    @cython.locals(late='long long', arrival='long long', link=Downlink, sender=Sender)
     cpdef long long send(self, long long start_tick, data, tuple bad_stop=*) except? -1
     cdef int _check_settled(self, long long start_tick, long long key_tick, long long settled_tick) except -1
-    @cython.locals(listener=Listener, sender=Sender, senders=list)
+    @cython.locals(listener=Listener, sender=Sender)
     cpdef settle(self, long long until_tick)

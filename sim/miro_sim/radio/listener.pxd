@@ -22,23 +22,18 @@ cdef class Listener:
     cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
     cdef bint squelch, noise_alone, perfect_idle
 
-    @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stops=bytes, stop='long long')
+    @cython.locals(sender=Sender, start='long long', stop='long long')
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
-    @cython.locals(level=int)
     cdef void hear_nothing(self, long long tick, long long until) except *
-    @cython.locals(slot='long long', bits='unsigned long long', level=int, before=int)
+    @cython.locals(bits='unsigned long long', level=int, before=int)
     cdef void hear_noise(self, long long tick, long long until) except *
     cdef int silence(self, long long tick, long long slot) except -1
-    @cython.locals(slot='long long')
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
-    @cython.locals(level=int, chance='unsigned long long')
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
-    @cython.locals(
-        sender=Sender, first='long long', begun='long long', number='long long', count='long long', judged='long long', begin='long long',
-        step='long long', place=int, levels=int, level=int, before=int,
-    )
+    @cython.locals(sender=Sender, first='long long', begun='long long', number='long long', count='long long',
+                   begin='long long', step='long long', place=int, levels=int, level=int, before=int)
     cdef void hear_data(
         self,
         long long tick,
@@ -53,9 +48,8 @@ cdef class Listener:
         self, long long first, long long number, long long count, bytes stops, list senders, Py_ssize_t rank
     ) except *
     cdef void hear_bad_stop(self, long long tick, long long until, long long begin, long long back) except *
-    @cython.locals(level=int, chance='unsigned long long')
     cdef int bit(
         self, long long begin, int sent, long long first, long long number, bint fresh, list senders, Py_ssize_t rank
     ) except -1
-    @cython.locals(sender=Sender, index=Py_ssize_t)
+    @cython.locals(sender=Sender)
     cdef int mixed(self, int level, long long begin, list senders, Py_ssize_t rank) except -1

@@ -14,9 +14,8 @@ cdef class Sender:
     cdef long long end_of(self, long long start, long long count) except? -1
     @cython.locals(start='long long')
     cpdef long long end(self, Py_ssize_t index) except? -1
-    @cython.locals(index='long long', stop=int)
     cdef int levels(self, bytes data, bytes stops, long long number) except -1
     cdef bint bad_stop(self, bytes stops, long long number) except -1
-    @cython.locals(index=Py_ssize_t, start='long long', data=bytes, stops=bytes, number='long long')
+    @cython.locals(start='long long')
     cdef int level(self, long long tick) except? -2
     cpdef forget(self, long long until)

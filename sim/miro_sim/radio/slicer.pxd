@@ -1,5 +1,3 @@
-cimport cython
-
 cdef long long _BIT, _ONE
 cdef int _TABLE, _STEP
 
@@ -10,7 +8,5 @@ cdef class Slicer:
     cdef long long gain, offset
     cdef unsigned long long table[513]
 
-    @cython.locals(target='long long', left='long long', step='long long', change='long long')
     cpdef hear(self, long long tick, int signal)
-    @cython.locals(margin='long long', index='long long')
     cpdef unsigned long long threshold(self, int level) except? 1

@@ -1,5 +1,3 @@
-cimport cython
-
 from miro_sim.radio.band cimport Band
 
 cdef long long _STOP
@@ -12,11 +10,7 @@ cdef class Uplink:
     cdef long long numerator, denominator
     cdef int before, bit, shift
 
-    cpdef int after_load(self) except -1
-    @cython.locals(until='long long')
     cpdef list receive(self, long long until_tick)
     cpdef long long full_tick(self) except? -1
-    @cython.locals(level=int)
     cdef void hunt(self, long long until) except *
-    @cython.locals(level=int, middle='long long')
     cdef void sample(self, long long until, list symbols) except *

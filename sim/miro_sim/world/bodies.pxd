@@ -1,4 +1,3 @@
-# C layout of miro_sim.world.bodies.
 cimport cython
 from miro_sim.pitch.contact cimport next_look, touch
 from miro_sim.world.robot cimport Robot
@@ -13,13 +12,10 @@ cdef class Bodies:
     cdef long long next_tick
 
     cpdef start_again(self, list touching)
-    @cython.locals(one=Robot, other=Robot)
     cpdef start_at(self, long long tick)
-    @cython.locals(robot=Robot, one=Robot, other=Robot, at=dict, index=Py_ssize_t, closing_m_s=double,
-                   look_tick='long long')
+    @cython.locals(robot=Robot, one=Robot, other=Robot, index=Py_ssize_t, closing_m_s=double)
     cpdef begin(self, long long tick, long long until_tick)
-    @cython.locals(one=Robot, other=Robot, index=Py_ssize_t, tick='long long', closing_m_s=double, at=tuple,
-                   beside=tuple, known=bint, found=list)
+    @cython.locals(one=Robot, other=Robot, index=Py_ssize_t, tick='long long', closing_m_s=double, known=bint)
     cpdef list look(self)
 
 

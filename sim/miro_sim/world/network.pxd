@@ -1,4 +1,3 @@
-# C layout of miro_sim.world.network.
 cimport cython
 from miro_host.station cimport Station
 from miro_sim.radio.downlink cimport Downlink
@@ -24,14 +23,14 @@ cdef class Network:
     cdef public long long frames_sent
     cdef public list heard, sent, seen
 
-    @cython.locals(robot=Robot, commands=list, measured=object)
+    @cython.locals(robot=Robot)
     cpdef begin_period(self, long long tick)
     cpdef do_due(self, long long tick)
     cpdef send_due(self, long long rendezvous_tick)
     cpdef settle(self, long long rendezvous_tick)
     @cython.locals(robot=Robot)
     cdef _transmit(self, long long start_tick, list commands)
-    @cython.locals(robot=Robot, stopped=cython.bint, full_tick=cython.longlong)
+    @cython.locals(robot=Robot, stopped=cython.bint)
     cpdef bint run(self, long long tick) except -1
     cpdef hear(self, long long tick)
     cpdef list end_period(self)

@@ -1,4 +1,3 @@
-# C layout of miro_sim.world.outbox.
 cimport cython
 
 
@@ -11,5 +10,4 @@ cdef class Outbox:
     @cython.locals(busy=cython.bint)
     cpdef bint post(self, sent, long long free_tick) except -1
     cdef _add(self, one)
-    @cython.locals(taken=list)
     cpdef list due(self, long long until_tick)

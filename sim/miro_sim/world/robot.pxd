@@ -1,5 +1,3 @@
-# C layout of miro_sim.world.robot.
-cimport cython
 from miro_host.pilot cimport Pilot
 from miro_robot.board cimport Board
 from miro_robot.lm629.chip cimport Lm629
@@ -20,7 +18,6 @@ cdef class Robot:
     cdef public long long grid_tick
 
     cpdef note_from(self, long long tick)
-    @cython.locals(stopped=int)
     cpdef int run(self, long long tick) except -1
     cdef int _run(self, long long tick) except -1
     cpdef steer(self, measured, telemetry, long long tick)
@@ -28,6 +25,5 @@ cdef class Robot:
     cpdef record(self, long long tick, measured, command)
 
 
-@cython.locals(profile=ProfileGenerator, data=bytes)
 cdef _axis(Lm629 chip)
 cdef _control(command)

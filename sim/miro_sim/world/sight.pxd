@@ -1,4 +1,3 @@
-# C layout of miro_sim.world.sight.
 cimport cython
 from libc cimport math
 from miro_exact.rng cimport Stream
@@ -15,7 +14,7 @@ cdef class GaussianSight:
     cdef readonly list bodies, visions, streams
     cdef public long long frame
 
-    @cython.locals(place=Py_ssize_t, vision=Vision, noise=Stream, body=Robot, found=list)
+    @cython.locals(vision=Vision, noise=Stream, body=Robot)
     cpdef list expose(self, long long tick)
 
 
@@ -28,11 +27,10 @@ cdef class SeeingSight:
     cdef readonly long long frame, lost, dropped, repeated, wrong, swapped
 
     cpdef list look(self, long long tick)
-    @cython.locals(robots='long long', first='long long', chance=Stream, seen=tuple)
+    @cython.locals(robots='long long')
     cpdef tuple expose(self, long long tick)
-    @cython.locals(chance=Stream)
     cdef tuple _kept(self, list seen, long long first)
-    @cython.locals(own=Py_ssize_t, other=Py_ssize_t, x_m=double, y_m=double, way_m=double)
+    @cython.locals(x_m=double, y_m=double)
     cdef _count(self, long long tick, tuple seen)
     @cython.locals(body=Robot, true_x_m=double, true_y_m=double, dx=double, dy=double)
     cdef double _distance_m(self, Py_ssize_t own, long long tick, double x_m, double y_m) except? -1.0
@@ -53,5 +51,5 @@ cdef class PixelSight(SeeingSight):
 
     cpdef tuple expose(self, long long tick)
     cpdef list look(self, long long tick)
-    @cython.locals(eye=Camera, body=Robot, x_m=double, y_m=double, theta_rad=double, v_m_s=double, w_rad_s=double)
+    @cython.locals(body=Robot, x_m=double, y_m=double, theta_rad=double, v_m_s=double, w_rad_s=double)
     cpdef Camera picture_at(self, long long frame, long long tick)

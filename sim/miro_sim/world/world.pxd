@@ -1,4 +1,3 @@
-# C layout of miro_sim.world.world.
 cimport cython
 from miro_sim.world.network cimport Network
 
@@ -21,5 +20,5 @@ cdef class World:
     cpdef long long rendezvous(self, long long tick) except -1
     @cython.locals(network=Network)
     cpdef run_piece(self, long long tick)
-    @cython.locals(network=Network, index=cython.longlong, wire=list, robots=list, actions=list)
+    @cython.locals(network=Network)
     cpdef end_period(self)
