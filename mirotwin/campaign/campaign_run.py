@@ -18,7 +18,7 @@ from mirotwin.campaign.ranges import SEEDS, seed_range
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
 from mirotwin.campaign.worker import RunOutcome
-from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.campaign.workers import Processes
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
 from mirotwin.shell.outputs import told_when_full
@@ -77,45 +77,37 @@ def run(options: CampaignOptions) -> int:
         design = replace(plan.design, first_seed=first, seed_count=count)
         plan = replace(plan, file=replace(plan.file, design=design))
     results = options.out or Path("runs") / f"{options.file.stem}.parquet"
-    running.refuse_many(plan, options.yes)
-    if not options.force and running.complete(results, running.head_of(plan)):
-        if not options.quiet:
-            show_line(f"{results} has all {amount(plan.runs, 'run')} already")
-        return _judge(plan, results)
-    tally, wall_s = _run(plan, results, Processes(options.jobs), options.force, options.quiet)
-    if not options.quiet:
-        rate = f"{tally.new / wall_s:.1f} runs/s" if tally.new else "all there before"
-        show_line(
-            f"{amount(tally.runs, 'run')} ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}"
-        )
+    began_s = time.monotonic()
+    tally = _run(plan, results, options)
+    wall_s = time.monotonic() - began_s
+    if tally.new and not options.quiet:
+        now = f"{tally.new} of them now, in {wall_s:.1f} s, {tally.new / wall_s:.1f} runs/s"
+        show_line(f"{amount(tally.runs, 'run')} ({now}): {results}")
+    elif not options.quiet:
+        show_line(f"{results} has all {amount(plan.runs, 'run')} already")
     return _judge(plan, results)
 
 
-def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) -> tuple[Tally, float]:
-    began_s = time.monotonic()
-    bar: ProgressBar | None = None
+def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:
     last: Tally | None = None
 
     def show(tally: Tally, outcome: RunOutcome) -> None:
-        nonlocal bar, last
+        nonlocal last
         last = tally
-        if bar is None:
-            bar = ProgressBar(plan.file.path, plan.runs, quiet, "runs", tally.done - tally.new)
-            bar.__enter__()
+        bar.begun = tally.done - tally.new
         bar.to(tally.done)
 
+    journal, workers = journal_path(results), Processes(options.jobs)
     try:
-        with told_when_full(journal_path(results), "--out", "file"):
-            tally = running.run(plan, results, workers, force=force, many=True, on_outcome=show)
+        with (
+            told_when_full(journal, "--out", "file"),
+            ProgressBar(plan.file.path, plan.runs, options.quiet, "runs") as bar,
+        ):
+            return running.run(plan, results, workers, force=options.force, many=options.yes, on_outcome=show)
     except BaseException:
         if last is not None:
-            where = f"{last.done} of {plan.runs} runs are in {journal_path(results)}"
-            complain(f"{where}; the same command goes on from there")
+            complain(f"{last.done} of {plan.runs} runs are in {journal}; the same command goes on from there")
         raise
-    finally:
-        if bar is not None:
-            bar.__exit__(None, None, None)
-    return tally, time.monotonic() - began_s
 
 
 def _judge(plan: Plan, results: Path) -> int:

@@ -7,9 +7,8 @@ itself: the one that ends its process twice gets an outcome that says so, and th
 from __future__ import annotations
 
 import concurrent.futures as futures
-from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import closing
 
 import msgspec
@@ -22,7 +21,7 @@ from mirotwin.campaign.workers import Workers
 SPREAD = 4096
 """Runs between the first one without an outcome and the last one handed over: so many rows wait for their turn."""
 TRIES = 2
-"""So often a job that was under way when a process ended is tried by itself."""
+"""So often a job that was under way when a process ended is tried by itself: a suspect."""
 FRUITLESS = 20
 """So many executors in a row that end before any run does."""
 
@@ -40,48 +39,41 @@ class Drive:
     def __init__(self, job: Callable[[int], Work], workers: Workers) -> None:
         self.job = job
         self.workers = workers
-        self._executor: Executor | None = None
         self._pending: dict[Future[RunOutcome], int] = {}
-        self._alone: deque[int] = deque()
-        self._tries: dict[int, int] = {}
+        self._suspects: dict[int, int] = {}  # run -> so often it was under way when a process ended
         self._fruitless = 0
 
     def outcomes(self, runs: Iterable[int]) -> Generator[RunOutcome]:
         """Each as soon as it is there. Whoever stops asking, or is interrupted, leaves no job behind."""
         self._runs = iter(runs)
         self._next = next(self._runs, None)
+        if self._next is None:
+            return
         self._executor = self.workers.start()
         try:
-            while self._hand_over() or self._pending:
+            self._hand_over()
+            while self._pending:
                 done, _ = futures.wait(self._pending, return_when=futures.FIRST_COMPLETED)
                 yield from self._take(done)
+                self._hand_over()
         finally:
             self._close()
 
-    def _hand_over(self) -> bool:
-        """Fills up what is handed over; returns whether anything was."""
-        handed = False
+    def _hand_over(self) -> None:
+        """Fills up what is handed over."""
         while (run := self._choose()) is not None:
-            assert self._executor is not None
             try:
-                future = self._executor.submit(work, self.job(run))
+                self._pending[self._executor.submit(work, self.job(run))] = run
             except BrokenExecutor:  # a worker has ended in between: this run is not to blame
-                self._alone.appendleft(run)
-                self._tries.setdefault(run, 0)
+                self._suspects.setdefault(run, 0)
                 if self._pending:  # they say so, too
-                    return handed
+                    return
                 self._restart()
-                continue
-            self._pending[future] = run
-            handed = True
-        return handed
 
     def _choose(self) -> int | None:
-        """The next run to hand over, None where all have their hands full. One that is suspect goes alone."""
-        if self._alone:
-            return self._alone.popleft() if not self._pending else None
-        if any(run in self._tries for run in self._pending.values()):
-            return None
+        """The next run to hand over, None where all have their hands full. A suspect goes alone."""
+        if self._suspects:
+            return None if self._pending else min(self._suspects)
         if self._next is None or len(self._pending) >= self.workers.ahead:
             return None
         if self._pending and self._next - min(self._pending.values()) >= SPREAD:
@@ -100,10 +92,7 @@ class Drive:
                 continue
             except CancelledError:
                 raise self._gone() from None
-            if outcome.refused:
-                what = f"has {outcome.refused}"
-                raise BadInput("", f"worker {outcome.where}", what, "install there what runs here")
-            self._tries.pop(run, None)
+            self._suspects.pop(run, None)
             self._fruitless = 0
             yield outcome
         if lost:
@@ -111,15 +100,14 @@ class Drive:
 
     def _broken(self, lost: list[int]) -> list[RunOutcome]:
         """A new executor for the jobs of the one that is broken. Outcomes of those that have had all their tries."""
-        lost = sorted([*lost, *self._pending.values()])
+        lost += self._pending.values()
         self._pending.clear()
         self._restart()
-        if len(lost) == 1 and self._tries.get(lost[0], 0) >= TRIES:
-            self._tries.pop(lost[0])
+        if len(lost) == 1 and self._suspects.get(lost[0], 0) >= TRIES:
+            self._suspects.pop(lost[0])
             return [RunOutcome(lost[0], error="ended the process that ran it (killed, or out of memory)")]
         for run in lost:
-            self._tries[run] = self._tries.get(run, 0) + 1
-        self._alone.extendleft(reversed(lost))
+            self._suspects[run] = self._suspects.get(run, 0) + 1
         return []
 
     def _restart(self) -> None:
@@ -130,12 +118,10 @@ class Drive:
         self._executor = self.workers.start()
 
     def _close(self) -> None:
-        if self._executor is None:
-            return
         for future in self._pending:
             future.cancel()
-        executor, self._executor = self._executor, None
-        self.workers.stop(executor)
+        if self.workers.restarts:
+            self._executor.shutdown(cancel_futures=True)
 
     def _gone(self) -> BadInput:
         what = "workers have ended, and with them what was under way"

@@ -18,30 +18,12 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
-from mirotwin.campaign.versions import Versions
+from mirotwin.campaign.plan import Head
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import now_s
 
-FORM = 1
 SYNC_S = 1.0
 _LINE_BYTES = 1 << 20
-
-
-class Head(msgspec.Struct, frozen=True):
-    """The first line: which campaign the outcomes belong to."""
-
-    mirotwin_campaign: int
-    hash: str
-    versions: Versions
-    runs: int
-
-    def difference(self, other: Head) -> str:
-        """What another campaign has else; "" where it is the same."""
-        if self.mirotwin_campaign != other.mirotwin_campaign:
-            return f"form {other.mirotwin_campaign} of such files instead of {self.mirotwin_campaign}"
-        return self.versions.difference(other.versions) or (
-            "other runs: scenario, keys, seeds, checks or firmware differ" if self.hash != other.hash else ""
-        )
 
 
 def journal_path(results: Path) -> Path:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -16,7 +17,7 @@ from miro_exact import engine
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
-from miro_sim.scenario.settings import EXPECT, OPTION, option_words
+from miro_sim.scenario.settings import OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
@@ -28,6 +29,24 @@ from mirotwin.verify.steps.keys import CheckStep
 from mirotwin.verify.steps.player import check_symbols
 
 OWN_IMAGE = "own"
+FORM = 1
+
+
+class Head(msgspec.Struct, frozen=True):
+    """Which campaign outcomes and results belong to. `mirotwin_campaign`: the form of such files."""
+
+    mirotwin_campaign: int
+    hash: str
+    versions: Versions
+    runs: int
+
+    def difference(self, other: Head) -> str:
+        """What another campaign has else; "" where it is the same."""
+        if self.mirotwin_campaign != other.mirotwin_campaign:
+            return f"form {other.mirotwin_campaign} of such files instead of {self.mirotwin_campaign}"
+        return self.versions.difference(other.versions) or (
+            "other runs: scenario, keys, seeds, checks or firmware differ" if self.hash != other.hash else ""
+        )
 
 
 class Plan(msgspec.Struct, frozen=True):
@@ -54,15 +73,21 @@ class Plan(msgspec.Struct, frozen=True):
     @property
     def hash(self) -> str:
         """What two campaigns with the same rows have in common, but for the versions."""
+        design = self.design
         content = (
             self.scenarios[self.file.scenario],
             [text for _, text in sorted(self.scenarios.items())],
             [image.sha256 for _, image in sorted(self.images.items())],
             self.file.settings,
-            _nameless(self.design),
+            msgspec.structs.replace(design, factors=()),
+            [(one.name, [(level.value, level.settings) for level in one.levels]) for one in design.factors],
             self.checks,
         )
         return hashlib.sha256(msgspec.json.encode(content)).hexdigest()
+
+    @property
+    def head(self) -> Head:
+        return Head(FORM, self.hash, self.versions, self.runs)
 
     def work(self, run: int) -> Work:
         """The job of run number `run`."""
@@ -125,9 +150,38 @@ def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
         if key in file.design.names:
             what = f"the campaign varies {key}, this would have no effect"
             raise BadInput(file.path, place, what, "leave it out, or the key in the campaign's file")
-    plan = Plan(file, _scenarios(file), _images(file), (), versions())
-    tried = _Tried(plan)
-    return msgspec.structs.replace(plan, checks=tuple(tried.checks), notes=tuple(tried.notes))
+    return _tried(Plan(file, _scenarios(file), _images(file), (), versions()))
+
+
+def _tried(plan: Plan) -> Plan:
+    """The plan with the names of all checks, and what settings left out. Raises BadInput with the place in the file."""
+    file = plan.file
+    checks: dict[str, None] = {}
+    notes: dict[str, None] = {}
+    for point in _tried_points(plan.design):
+        places = _places(plan, point)
+        job = plan.work_at(0, point)
+        try:
+            text, expected, steps = prepared(job.origin, job.text, job.settings)
+            check_symbols(steps, load_firmware(job.firmware.path), job.origin)
+        except BadInput as error:
+            raise _placed(file, places, error) from error.__cause__
+        of_steps = [step.checks for step in steps if isinstance(step, CheckStep)]
+        checks |= {check.name: None for group in (*expected.values(), *of_steps) for check in group}
+        notes |= {_placed_note(file, places, note): None for note in text.notes}
+    return msgspec.structs.replace(plan, checks=tuple(checks), notes=tuple(notes))
+
+
+def _tried_points(design: Design) -> Iterator[DesignPoint]:
+    """The first level of all, and each other level and end of a range with the first ones of the others."""
+    tried: list[Sequence[Any]] = [factor.levels for factor in design.factors]
+    tried += [draw.ends() for draw in design.draws]
+    points = [[one[0] for one in tried]]
+    for at, others in enumerate(tried):
+        points += [[*points[0][:at], other, *points[0][at + 1 :]] for other in others[1:]]
+    for point in points:
+        levels, drawn = point[: len(design.factors)], point[len(design.factors) :]
+        yield DesignPoint(tuple(levels), tuple(drawn), 0, design.first_seed)
 
 
 def _scenarios(file: CampaignFile) -> dict[str, str]:
@@ -162,41 +216,6 @@ def _named(file: CampaignFile, default: str, kind: str) -> Iterator[tuple[str, s
                 yield name, level.place
 
 
-class _Tried:
-    """Each level, tried once: the names of all `checks`, and what settings left out. Raises BadInput with the place."""
-
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
-        self.checks: dict[str, None] = {}
-        self.notes: dict[str, None] = {}
-        design = plan.design
-        first = [factor.levels[0] for factor in design.factors]
-        drawn = [draw.ends()[0] for draw in design.draws]
-        self._try(first, drawn)
-        for at, factor in enumerate(design.factors):
-            for level in factor.levels[1:]:
-                self._try([*first[:at], level, *first[at + 1 :]], drawn)
-        for at, draw in enumerate(design.draws):
-            for value in draw.ends()[1:]:
-                self._try(first, [*drawn[:at], value, *drawn[at + 1 :]])
-
-    def _try(self, levels: Sequence[Level], drawn: Sequence[Value]) -> None:
-        point = DesignPoint(tuple(levels), tuple(drawn), 0, self.plan.design.first_seed)
-        job = self.plan.work_at(0, point)
-        try:
-            text, expected, steps = prepared(job.origin, job.text, job.settings)
-            check_symbols(steps, load_firmware(job.firmware.path), job.origin)
-        except BadInput as error:
-            raise _placed(self.plan, point, error) from error.__cause__
-        for checks in expected.values():
-            self.checks |= dict.fromkeys(check.name for check in checks)
-        for step in steps:
-            if isinstance(step, CheckStep):
-                self.checks |= dict.fromkeys(check.name for check in step.checks)
-        places = _places(self.plan, point)
-        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in text.notes)
-
-
 def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
     """What says each setting of a run: a place in the campaign's file, or an option."""
     places = dict(plan.file.settings)
@@ -206,40 +225,19 @@ def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
     return places
 
 
-def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
+def _placed_note(file: CampaignFile, places: dict[str, str], note: str) -> str:
     """The same note at the place of the campaign's file that made the setting."""
     for setting, place in places.items():
         head = f"{OPTION} {setting} "
         if note.startswith(head) and not place.startswith(OPTION):
-            return f"{plan.file.path}: {place}: {setting} {note.removeprefix(head)}"
+            return f"{file.path}: {place}: {setting} {note.removeprefix(head)}"
     return note
 
 
-def _placed(plan: Plan, point: DesignPoint, error: BadInput) -> BadInput:
+def _placed(file: CampaignFile, places: dict[str, str], error: BadInput) -> BadInput:
     """The same error at the place of the campaign file that made it; the whole line where no single place did."""
-    places = _places(plan, point)
-    text = f"{error.place}".removeprefix(f"{OPTION} ")
-    if f"{error.place}".startswith("--expect "):
-        text = EXPECT + f"{error.place}".removeprefix("--expect ")
-    for setting in (text, *places):
-        if setting not in places:
-            continue
-        key = setting.partition("=")[0]
-        if setting == text or f"{error.place}" == key:
-            what = f"{setting} in {error.path}: {error.what}"
-            return BadInput(plan.file.path, places[setting], what, error.remedy)
-    return BadInput(plan.file.path, "", f"{error}")
-
-
-def _nameless(design: Design) -> Design:
-    """The design without what has no influence on a run: where the file says something, and where an image stands."""
-    factors = tuple(
-        msgspec.structs.replace(
-            factor,
-            levels=tuple(
-                msgspec.structs.replace(level, place="", scenario="", firmware="") for level in factor.levels
-            ),
-        )
-        for factor in design.factors
-    )
-    return msgspec.structs.replace(design, factors=factors)
+    found = f"{error.place}"
+    for setting, place in places.items():
+        if found in (" ".join(option_words(setting)), setting.partition("=")[0]):
+            return BadInput(file.path, place, f"{setting} in {error.path}: {error.what}", error.remedy)
+    return BadInput(file.path, "", f"{error}")

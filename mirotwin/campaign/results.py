@@ -20,8 +20,8 @@ from miro_exact.bad_input import BadInput, shortened
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN, TEXTS
 from mirotwin.campaign.design import Level
-from mirotwin.campaign.journal import Head, in_order, outcomes
-from mirotwin.campaign.plan import OWN_IMAGE, Plan
+from mirotwin.campaign.journal import in_order, outcomes
+from mirotwin.campaign.plan import OWN_IMAGE, Head, Plan
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.shell.outputs import OutputError, whole_file
 
@@ -67,10 +67,10 @@ def wall_path(results: Path) -> Path:
     return results.with_suffix(".wall.parquet")
 
 
-def about(plan: Plan, head: Head) -> ResultsInfo:
+def about(plan: Plan) -> ResultsInfo:
     design = plan.design
     return ResultsInfo(
-        head,
+        plan.head,
         Path(plan.file.path).stem,
         tuple(factor.name for factor in design.factors),
         tuple(draw.name for draw in design.draws),
@@ -93,12 +93,12 @@ def _name(path: str) -> str:
     return "" if path == OWN_IMAGE else Path(path).name
 
 
-def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
+def write(plan: Plan, journal: Path, results: Path) -> None:
     """Both files of a campaign whose runs all have an outcome in `journal`. Raises OutputError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = _schema(plan).with_metadata({META: msgspec.json.encode(about(plan, head))})
+    schema = _schema(plan).with_metadata({META: msgspec.json.encode(about(plan))})
     wall = pa.schema([("run", pa.int64()), ("wall_s", pa.float64())])
     with (
         whole_file(wall_path(results), OPTION) as wall_file,

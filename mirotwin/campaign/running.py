@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
+from contextlib import closing
 from pathlib import Path
 
 import msgspec
@@ -11,7 +12,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign import results as tables
 from mirotwin.campaign.drive import Drive
-from mirotwin.campaign.journal import FORM, Head, Journal, journal_path
+from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
@@ -22,16 +23,11 @@ MANY_RUNS = 100_000
 
 
 class Tally(msgspec.Struct):
-    """So many runs have an outcome, in all and in this process, and how many of each kind came in this process."""
+    """So many of `runs` have an outcome, and so many are `new`: of this process."""
 
     done: int = 0
     runs: int = 0
     new: int = 0
-    verdicts: dict[str, int] = msgspec.field(default_factory=dict)
-
-
-def head_of(plan: Plan) -> Head:
-    return Head(FORM, plan.hash, plan.versions, plan.runs)
 
 
 def refuse_many(plan: Plan, agreed: bool) -> None:
@@ -59,51 +55,32 @@ def run(
     path = Path(results)
     tables.require_arrow()
     refuse_many(plan, many)
-    head = head_of(plan)
     make_folder(path.parent, "--out")
-    if not force and complete(path, head):
+    if not force and _complete(path, plan):
         journal_path(path).unlink(missing_ok=True)  # left by a process that ended before it was taken away
         return Tally(plan.runs, plan.runs)
     workers = executor if isinstance(executor, Workers) else Workers(executor) if executor else Processes()
     check_file(path, "--out")
-    with Journal(journal_path(path), head, begin_anew=force) as journal:
+    with Journal(journal_path(path), plan.head, begin_anew=force) as journal:
         tally = Tally(journal.count, plan.runs)
-        _make(plan, journal, workers, tally, on_outcome)
-        tables.write(plan, head, journal.path, path)
+        with closing(Drive(plan.work, workers).outcomes(journal.missing())) as outcomes:
+            for outcome in outcomes:
+                journal.add(outcome)
+                tally.done, tally.new = journal.count, tally.new + 1
+                on_outcome(tally, outcome)
+        tables.write(plan, journal.path, path)
     journal.path.unlink()
     return tally
 
 
-def complete(results: Path, head: Head) -> bool:
+def _complete(results: Path, plan: Plan) -> bool:
     """Whether the results are there. Raises BadInput for a file of another campaign, and where none can be written."""
     if results.suffix != ".parquet":
         raise BadInput(results, "", "results are a .parquet file", f"write --out {results.stem}.parquet")
     if not results.exists():
         return False
-    found = tables.read_about(results).head
-    difference = head.difference(found)
+    difference = plan.head.difference(tables.read_about(results).head)
     if difference:
         what = f"holds the results of another campaign: {difference}"
         raise BadInput(results, "", what, "choose another file with --out, or replace it with --force")
     return True
-
-
-def _make(
-    plan: Plan,
-    journal: Journal,
-    workers: Workers,
-    tally: Tally,
-    on_outcome: Callable[[Tally, RunOutcome], object],
-) -> None:
-    if tally.done == plan.runs:
-        return
-    drive = Drive(plan.work, workers)
-    outcomes = drive.outcomes(journal.missing())
-    try:
-        for outcome in outcomes:
-            journal.add(outcome)
-            tally.done, tally.new = journal.count, tally.new + 1
-            tally.verdicts[outcome.verdict] = tally.verdicts.get(outcome.verdict, 0) + 1
-            on_outcome(tally, outcome)
-    finally:
-        outcomes.close()

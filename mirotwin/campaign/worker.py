@@ -45,7 +45,7 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
 
     `error`: why there are no figures. `failure`: the first check or step that failed. `checks`: name -> verdict.
-    `wall_s`: the simulation loop. `refused`: by a worker, which `where` names; there is no run then.
+    `wall_s`: the simulation loop.
     """
 
     run: int
@@ -56,23 +56,17 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     figures: dict[str, Figure] = {}
     checks: dict[str, str] = {}
     wall_s: float = 0.0
-    refused: str = ""
-    where: str = ""
 
 
 def work(job: Work) -> RunOutcome:
-    """Runs a job to its end. Nothing but an outcome comes back, whatever happens to the run."""
-    refused = job.versions.difference(versions()) or _engine(job.engine) or _firmware(job.firmware)
-    if refused:
-        return RunOutcome(job.run, refused=refused, where=place())
+    """Runs a job to its end, whatever happens to the run. Raises BadInput where this process is not as the job's."""
+    difference = job.versions.difference(versions()) or _engine(job.engine) or _firmware(job.firmware)
+    if difference:
+        worker = f"worker {socket.gethostname()} process {os.getpid()}"
+        raise BadInput("", worker, f"has {difference}", "install there what runs here")
     from mirotwin.campaign.single import run_single  # loads hot modules
 
     return run_single(job)
-
-
-def place() -> str:
-    """How a worker is called."""
-    return f"{socket.gethostname()} process {os.getpid()}"
 
 
 @cache

@@ -91,23 +91,19 @@ AHEAD = 4
 class Workers:
     """An executor that is the caller's own, and stays open.
 
-    `ahead`: jobs that are handed over at once. `restarts`: whether `start` gives another executor when one is broken.
-    `option` names the workers in errors.
+    `ahead`: jobs that are handed over at once. `restarts`: whether `start` gives another executor each time, which has
+    to be shut down. `option` names the workers in errors.
     """
 
     restarts = False
     option = "executor"
 
-    def __init__(self, executor: Executor | None = None) -> None:
-        self.executor = executor
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
         self.ahead = AHEAD * int(getattr(executor, "_max_workers", cores()))
 
     def start(self) -> Executor:
-        assert self.executor is not None
-        return self.executor
-
-    def stop(self, executor: Executor) -> None:
-        """Ends what `start` gave. Jobs that can be cancelled are cancelled already."""
+        return self._executor
 
 
 class Processes(Workers):
@@ -117,12 +113,8 @@ class Processes(Workers):
     option = "--jobs"
 
     def __init__(self, count: int | None = None) -> None:
-        super().__init__()
         self.count = count or cores()
         self.ahead = AHEAD * self.count
 
     def start(self) -> Executor:
         return processes(self.count)
-
-    def stop(self, executor: Executor) -> None:
-        executor.shutdown(wait=True, cancel_futures=True)

@@ -24,13 +24,11 @@ class ProgressBar:
 
     PATIENCE_S = 1.0
 
-    def __init__(
-        self, what: str, total: float | None, quiet: bool = False, unit: str = "", begun: int = 0
-    ) -> None:
+    def __init__(self, what: str, total: float | None, quiet: bool = False, unit: str = "") -> None:
         self.what = one_line(what)
         self.total = total
         self.unit = unit
-        self.begun = begun
+        self.begun = 0
         stream = vars(sys)["stderr"]  # None where it is closed
         self._shown = not quiet and stream is not None and stream.isatty()
         self._began_s = time.monotonic()

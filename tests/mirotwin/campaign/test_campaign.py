@@ -159,7 +159,7 @@ def test_unfinished_results_of_another_campaign_are_refused(tmp_path):
 def test_unfinished_results_without_a_single_outcome_are_in_nobodys_way(tmp_path):
     path = tmp_path / "short.parquet"
     other = plan_of(SHORT.replace("3-5", "3-6"))
-    with Journal(journal_path(path), running.head_of(other)):
+    with Journal(journal_path(path), other.head):
         pass
     assert campaign.run(plan_of(), path, InThisProcess()).new == 6
 

@@ -77,7 +77,8 @@ def test_what_is_counted_is_shown_with_its_rate_and_the_time_left(monkeypatch):
     monkeypatch.setattr(ProgressBar, "PATIENCE_S", 0.0)
     now_s = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now_s[0])
-    with ProgressBar("noise.toml", 1000, unit="runs", begun=200) as bar:
+    with ProgressBar("noise.toml", 1000, unit="runs") as bar:
+        bar.begun = 200
         now_s[0] += 10.0
         bar.to(240)
     assert "4.0 runs/s, 0:03:10 left" in screen.getvalue()
