@@ -25,11 +25,11 @@ def mean(numbers):
 
 
 def by_seed(numbers, seeds):
-    """A list of numbers for each seed, in the order in which seeds first appear."""
+    """A list of numbers for each seed, in the order of the seeds."""
     found = {}
     for number, seed in zip(numbers, seeds, strict=True):
         found.setdefault(seed, []).append(number)
-    return list(found.values())
+    return [found[seed] for seed in sorted(found)]
 
 
 def median_interval(numbers, seeds, student):
