@@ -13,7 +13,7 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.campaign.columns import CHECK
-from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifference, differences
+from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, SHOWN, MetricDifference, differences
 from mirotwin.campaign.rows import UNSETTLED, VERDICTS, Arm, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -22,7 +22,6 @@ from mirotwin.shell.console import show as show_table
 from mirotwin.shell.options import JSON, PATH, FiniteNumber
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 
-SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
 MOST_GROUPS = 50
 """More are in --json only."""
 
@@ -103,9 +102,8 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
 
 
 def _groups_table(groups: Sequence[Arm]) -> Table:
-    table = plain_table(*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric")
-    for name in ("of", "median", "95 % interval", "5 %", "95 %", "worst"):
-        table.add_column(name, justify="right")
+    figures = ("of", "median", "95 % interval", "5 %", "95 %", "worst")
+    table = plain_table(*groups[0].factors, "runs", *VERDICTS, "metric", right=figures)
     for group in groups:
         head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
         head += [f"{group.verdicts[name]}" for name in VERDICTS]
@@ -135,7 +133,7 @@ def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool)
     if not pairs:
         what = f"no run with {first} has a twin with {second}"
         raise BadInput(rows.path, "--between", what, "the campaign has to be complete")
-    found = differences(metrics, rows, rows, pairs)
+    found = [one for one, _ in differences(metrics, rows, rows, pairs)]
     if as_json:
         _print_json({"factor": name, "first": first, "second": second, "differences": found})
         return DONE
@@ -155,7 +153,7 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
     if seeds < FEWEST_FOR_GATE:
         what = f"has only {amount(seeds, 'seed')} in common with {rows.path}"
         raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
-    found = differences(metrics, baseline, rows, pairs)
+    found = [one for one, _ in differences(metrics, baseline, rows, pairs)]
     worse = [one for one in found if one.worse(tolerance)]
     ours, theirs = rows.column("digest"), baseline.column("digest")
     same = [theirs[first] == ours[second] for first, second in pairs].count(True)
@@ -184,11 +182,8 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
 
 
 def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:
-    table = plain_table("metric")
-    for name in ("pairs", "left out", "seeds", first, second, "difference", "95 % interval", "median"):
-        table.add_column(name, justify="right")
-    for name in ("higher", "lower"):
-        table.add_column(name, justify="right")
+    means = (first, second, "difference", "95 % interval", "median")
+    table = plain_table("metric", right=("pairs", "left out", "seeds", *means, "higher", "lower"))
     for one in found:
         table.add_row(
             _labelled(one.metric),

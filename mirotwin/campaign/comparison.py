@@ -13,12 +13,14 @@ import msgspec
 import numpy as np
 
 from mirotwin.campaign.rows import ResultRows
-from mirotwin.campaign.statistics import Interval, Numbers, Seeds, mean, mean_interval, quantile
+from mirotwin.campaign.statistics import Interval, Numbers, mean, mean_interval, quantile
 
 FEWEST_FOR_GATE = 20
 """Seeds below which a comparison fails or passes by the luck of a few."""
 COUNTED = ("error", "fault")
-GATED = ("rms_position_cm", "rms_theta_deg", "settling_s", "unsettled", "failed", *COUNTED)
+SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
+"""What is shown unless told."""
+GATED = (*SHOWN, "unsettled", "failed", *COUNTED)
 """What is judged unless told. A smaller number is better in each."""
 MORE_IS_BETTER = ("frames_accepted", "frames_sent", "simulated_s", "vision_frames", "idle_cycles")
 
@@ -54,42 +56,30 @@ class MetricDifference(msgspec.Struct, frozen=True):
         return self.interval.low > allowed
 
 
-def both_have(
-    metric: str, first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
-) -> tuple[Numbers, Numbers, Seeds]:
-    """The metric's numbers in the pairs in which both have it, and the rows of `second` that these are."""
-    places = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    before, after = first.numbers(metric)[places[:, 0]], second.numbers(metric)[places[:, 1]]
-    both = ~(np.isnan(before) | np.isnan(after))
-    return before[both], after[both], places[both, 1]
-
-
 def differences(
     metrics: Sequence[str], first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
-) -> list[MetricDifference]:
-    """Those of the metrics that both have in a pair."""
-    found = [difference(name, first, second, pairs) for name in metrics]
-    return [one for one in found if one is not None]
-
-
-def difference(
-    metric: str, first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
-) -> MetricDifference | None:
-    """Of the pairs (row of `first`, row of `second`) in which both have the metric; None where there are none."""
-    before, after, places = both_have(metric, first, second, pairs)
-    if not len(before):
-        return None
-    apart, seeds = after - before, second.samples()[places]
-    return MetricDifference(
-        metric=metric,
-        pairs=len(apart),
-        without=len(pairs) - len(apart),
-        seeds=len(np.unique(seeds)),
-        first=mean(before),
-        second=mean(after),
-        difference=mean(apart),
-        interval=mean_interval(apart, seeds),
-        median=quantile(np.sort(apart), 0.5),
-        higher=int(np.count_nonzero(apart > 0.0)),
-        lower=int(np.count_nonzero(apart < 0.0)),
-    )
+) -> list[tuple[MetricDifference, Numbers]]:
+    """Of each metric that both rows of a pair (row of `first`, row of `second`) have, with second minus first."""
+    found = []
+    places, samples = np.array(pairs, dtype=np.int64).reshape(-1, 2), second.samples()
+    for name in metrics:
+        before, after = first.numbers(name)[places[:, 0]], second.numbers(name)[places[:, 1]]
+        both = ~(np.isnan(before) | np.isnan(after))
+        if not both.any():
+            continue
+        apart, seeds = (after - before)[both], samples[places[both, 1]]
+        of_metric = MetricDifference(
+            metric=name,
+            pairs=len(apart),
+            without=len(pairs) - len(apart),
+            seeds=len(np.unique(seeds)),
+            first=mean(before[both]),
+            second=mean(after[both]),
+            difference=mean(apart),
+            interval=mean_interval(apart, seeds),
+            median=quantile(np.sort(apart), 0.5),
+            higher=int(np.count_nonzero(apart > 0.0)),
+            lower=int(np.count_nonzero(apart < 0.0)),
+        )
+        found.append((of_metric, apart))
+    return found

@@ -11,7 +11,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.settings import EXPECT
-from mirotwin.campaign.comparison import GATED, both_have, differences
+from mirotwin.campaign.comparison import GATED, SHOWN, differences
 from mirotwin.campaign.design import inline
 from mirotwin.campaign.results import ResultsInfo
 from mirotwin.campaign.rows import VERDICTS, Arm, ResultRows, label_of, paired_levels
@@ -42,7 +42,6 @@ def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
     ).command_line()
 
 
-METRICS = ("rms_position_cm", "rms_theta_deg", "settling_s")
 MOST_ARMS = 24
 """More would be no picture: then the runs are grouped by fewer factors."""
 MOST_LEVELS = 6
@@ -57,7 +56,7 @@ def campaign_page(path: Path) -> bytes:
     rows = ResultRows(path)
     if not rows.count:
         raise BadInput(path, "", "holds no runs", "give the results of a campaign")
-    metrics = [name for name in METRICS if name in rows.metrics()]
+    metrics = [name for name in SHOWN if name in rows.metrics()]
     by = _by(rows)
     made: dict[str, Any] = {}
     arms = _arms(rows, by, metrics, made)
@@ -112,19 +111,14 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]
             if not pairs or len(found) == MOST_COMPARISONS:
                 continue
             compared = differences(GATED, rows, rows, pairs)
-            shown = [(one, _apart(rows, one.metric, pairs)) for one in compared if one.metric in METRICS]
+            shown = [(one, numbers) for one, numbers in compared if one.metric in SHOWN]
             figure = ""
             if any(one.first and one.interval for one, _ in shown):
                 figure = f"plot-pairs-{len(found)}"
                 made[figure] = apart(shown)
             levels = {"factor": factor, "first": first, "second": second, "pairs": len(pairs)}
-            found.append({**levels, "differences": compared, "figure": figure})
+            found.append({**levels, "differences": [one for one, _ in compared], "figure": figure})
     return found
-
-
-def _apart(rows: ResultRows, metric: str, pairs: Sequence[tuple[int, int]]) -> Any:
-    before, after, _ = both_have(metric, rows, rows, pairs)
-    return after - before
 
 
 def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:

@@ -38,23 +38,16 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
     made = _rows(metric, labels)
     _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])
     _widen(made, LEAST[metric], *(numbers for _, numbers in arms))
-    figures = [found for arm, _ in arms if (found := arm.metrics[metric]) is not None]
-    quantiles = [one.quantiles for one in figures]
-    source = ColumnDataSource(
-        {
-            "arm": labels,
-            **{name: [one[share] for one in quantiles] for name, share in (("q05", "0.05"), ("q25", "0.25"))},
-            **{name: [one[share] for one in quantiles] for name, share in (("q75", "0.75"), ("q95", "0.95"))},
-            "median": [one.median for one in figures],
-        }
-    )
-    whisker = made.segment(x0="q05", x1="q95", y0="arm", y1="arm", source=source, line_width=1.4)
+    quantiles = [found.quantiles for arm, _ in arms if (found := arm.metrics[metric]) is not None]
+    shares = {share: [one[share] for one in quantiles] for share in ("0.05", "0.25", "0.5", "0.75", "0.95")}
+    source = ColumnDataSource({"arm": labels, **shares})
+    whisker = made.segment(x0="0.05", x1="0.95", y0="arm", y1="arm", source=source, line_width=1.4)
     tagged(whisker.glyph, line_color="ink")
     box = made.hbar(
-        y="arm", left="q25", right="q75", height=0.5, source=source, line_width=1.4, fill_alpha=0.25
+        y="arm", left="0.25", right="0.75", height=0.5, source=source, line_width=1.4, fill_alpha=0.25
     )
     tagged(box.glyph, line_color="ink", fill_color="truth")
-    median = made.hbar(y="arm", left="median", right="median", height=0.62, source=source, line_width=3.0)
+    median = made.hbar(y="arm", left="0.5", right="0.5", height=0.62, source=source, line_width=3.0)
     tagged(median.glyph, line_color="truth")
     return made
 

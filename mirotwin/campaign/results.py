@@ -8,7 +8,8 @@ pyarrow is loaded when a file is written or read; it comes with the extra `campa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
@@ -27,9 +28,10 @@ from mirotwin.shell.outputs import OutputError, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
 GIVE = "give the .parquet file of a campaign"
-MOST_ROWS, MOST_COLUMNS, MOST_BYTES, META_BYTES = 5_000_000, 2000, 2 << 30, 64 << 20
+MOST_ROWS, MOST_COLUMNS, MOST_MIB, META_BYTES = 5_000_000, 2000, 2 << 10, 64 << 20
 EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
 """Columns that no row may lack, with their types."""
 OWN_COLUMNS = frozenset((*OWN, *FIGURES))
@@ -121,6 +123,21 @@ def write(plan: Plan, journal: Path, results: Path) -> None:
 
 def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
     """The rows of a results file, and what it says of itself. Raises BadInput for any other file."""
+    with _opened(path) as (file, about):
+        table = file.read()
+    _check_columns(path, table, about)
+    return table, about
+
+
+def read_about(path: str | Path) -> ResultsInfo:
+    """Only what the file says of itself. Raises BadInput for any other file."""
+    with _opened(path, "choose another file with --out") as (_, about):
+        return about
+
+
+@contextmanager
+def _opened(path: str | Path, remedy: str = GIVE) -> Iterator[tuple[pq.ParquetFile, ResultsInfo]]:
+    """Raises BadInput for what cannot be opened, or read within it."""
     require_arrow()
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -129,52 +146,51 @@ def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
     try:
         with pq.ParquetFile(path, thrift_string_size_limit=META_BYTES) as file:
             _check_size(path, file.metadata)
-            about = about_of(path, file.schema_arrow.metadata)
-            _check_columns(path, file.schema_arrow, about)
-            table = file.read()
+            yield file, msgspec.json.decode((file.schema_arrow.metadata or {})[META], type=ResultsInfo)
     except FileNotFoundError:
-        raise BadInput(path, "", "there is no such file", GIVE) from None
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise BadInput(path, "", "there is no such file", remedy) from None
+    except (KeyError, msgspec.DecodeError, UnicodeDecodeError):
+        raise BadInput(path, "", "is no campaign's results", remedy) from None
+    except (pa.ArrowException, OSError) as error:
         reason = f"{error}".partition("\n")[0].rstrip(".")
-        raise BadInput(path, "", f"is no Parquet file: {reason}", GIVE) from None
-    for name in (*about.factors, *about.drawn, *EACH_ROW):
-        if table[name].null_count:
-            raise BadInput(path, f"column {shortened(name)}", "lacks a value in some row", GIVE)
-    return table, about
+        raise BadInput(path, "", f"is no Parquet file: {reason}", remedy) from None
 
 
 def _check_size(path: str | Path, metadata: Any) -> None:
     """Before anything is read: a small file may hold many rows, which are many equal ones."""
     groups = map(metadata.row_group, range(metadata.num_row_groups))
-    size = sum(group.total_byte_size for group in groups)
-    if metadata.num_rows > MOST_ROWS:
-        raise BadInput(path, "", f"holds {metadata.num_rows} runs, more than {MOST_ROWS}", GIVE)
-    if metadata.num_columns > MOST_COLUMNS:
-        raise BadInput(path, "", f"has {metadata.num_columns} columns, more than {MOST_COLUMNS}", GIVE)
-    if size > MOST_BYTES:
-        raise BadInput(path, "", f"holds {size >> 20} MiB, more than {MOST_BYTES >> 20}", GIVE)
+    mib = sum(group.total_byte_size for group in groups) >> 20
+    limits = (
+        (metadata.num_rows, MOST_ROWS, "runs"),
+        (metadata.num_columns, MOST_COLUMNS, "columns"),
+        (mib, MOST_MIB, "MiB"),
+    )
+    for held, most, unit in limits:
+        if held > most:
+            raise BadInput(path, "", f"holds {held} {unit}, more than {most}", GIVE)
 
 
-def _check_columns(path: str | Path, schema: Any, about: ResultsInfo) -> None:
+def _check_columns(path: str | Path, table: pa.Table, about: ResultsInfo) -> None:
     """What statistics rely on: a seed in each row, and each factor once, with values that can be compared."""
-    kinds = ("int64", "double", "bool", "string")
     named = (*about.factors, *about.drawn)
     if len(set(named)) < len(named) or set(named) & OWN_COLUMNS:
         raise BadInput(path, "", "names a factor twice, or one that does not exist", GIVE)
     for name in (*named, *EACH_ROW):
-        places = schema.get_all_field_indices(name)
-        kind = f"{schema.field(places[0]).type}" if len(places) == 1 else None
-        if kind not in EACH_ROW.get(name, kinds):
-            what = "there is no such column" if kind is None else f"holds {kind}"
-            raise BadInput(path, f"column {shortened(name)}", what, GIVE)
+        places = table.schema.get_all_field_indices(name)
+        kind = f"{table.schema.field(places[0]).type}" if len(places) == 1 else "nothing"
+        if kind not in EACH_ROW.get(name, ("int64", "double", "bool", "string")):
+            what = "there is no such column" if kind == "nothing" else f"holds {kind}"
+        elif table[name].null_count:
+            what = "lacks a value in some row"
+        else:
+            continue
+        raise BadInput(path, f"column {shortened(name)}", what, GIVE)
 
 
 def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:
     """Verdict -> how many runs have it, and the first ones: number, and what the row says of it."""
-    import pyarrow.parquet as pq
-
     found: dict[str, tuple[int, list[tuple[int, str]]]] = {}
-    with pq.ParquetFile(path) as file:
+    with _opened(path) as (file, _):
         for batch in file.iter_batches(columns=["run", "verdict", "error", "failure"]):
             for run, verdict, error, failure in zip(
                 *(column.to_pylist() for column in batch.columns), strict=True
@@ -184,28 +200,6 @@ def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str
                     first.append((run, error or failure))
                 found[verdict] = (count + 1, first)
     return found
-
-
-def read_about(path: str | Path) -> ResultsInfo:
-    """Only what the file says of itself. Raises BadInput for any other file."""
-    require_arrow()
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        return about_of(path, pq.read_schema(path).metadata)
-    except (pa.ArrowException, OSError):
-        raise BadInput(path, "", "is no Parquet file", "choose another file with --out") from None
-
-
-def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> ResultsInfo:
-    try:
-        return msgspec.json.decode((metadata or {})[META], type=ResultsInfo)
-    except (KeyError, msgspec.DecodeError, UnicodeDecodeError):
-        what = "is no campaign's results"
-        raise BadInput(
-            path, "", what, "give the .parquet file that `mirotwin campaign` has written"
-        ) from None
 
 
 def _schema(plan: Plan) -> pa.Schema:

@@ -16,7 +16,7 @@ import numpy as np
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Value, inline
-from mirotwin.campaign.results import ResultsInfo, read
+from mirotwin.campaign.results import read
 from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
 
 VERDICTS = ("failed", "fault", "error")
@@ -53,10 +53,8 @@ class ResultRows:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        table, about = read(path)
-        self.table = table
-        self.about: ResultsInfo = about
-        self.count: int = table.num_rows
+        self.table, self.about = read(path)
+        self.count: int = self.table.num_rows
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -87,16 +85,16 @@ class ResultRows:
     def numbers(self, name: str) -> Numbers:
         """One for each row; NaN where a run does not have it."""
         if name in VERDICTS:
-            return _numbers([verdict == name for verdict in self.column("verdict")])
-        if name == UNSETTLED:
-            return _numbers([None if settled is None else not settled for settled in self.column("settled")])
-        if name.startswith(CHECK):
-            return _numbers([None if one is None else one == "failed" for one in self.column(name)])
+            found = [verdict == name for verdict in self.column("verdict")]
+        elif name == UNSETTLED:
+            found = [None if settled is None else not settled for settled in self.column("settled")]
+        elif name.startswith(CHECK):
+            found = [None if one is None else one == "failed" for one in self.column(name)]
+        else:
+            found = self.column(name)
         try:
-            return _numbers(self.column(name))
-        except (TypeError, ValueError) as error:
-            if isinstance(error, BadInput):
-                raise
+            return np.array(found, dtype=np.float64)
+        except (TypeError, ValueError):
             raise BadInput(self.path, name, "holds no numbers", "run the campaign again") from None
 
     def samples(self) -> Seeds:
@@ -185,7 +183,3 @@ def paired_levels(rows: ResultRows, name: str, first: Value, second: Value) -> l
     values, keys = rows.column(name), rows.keys(without=name)
     places = {key: row for row, key in enumerate(keys) if values[row] == first}
     return [(places[key], row) for row, key in enumerate(keys) if values[row] == second and key in places]
-
-
-def _numbers(values: Sequence[float | bool | None]) -> Numbers:
-    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)

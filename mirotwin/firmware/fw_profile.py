@@ -64,8 +64,7 @@ def _print(result: Profile, name: str) -> None:
         f"asleep {_percent(result.asleep_cycles, result.cycles)}"
     )
     counts = ("address", "calls", "instructions", "cycles", "of awake", "of all")
-    functions = plain_table("function", *counts, justify="right")
-    functions.columns[0].justify = "left"
+    functions = plain_table("function", right=counts)
     for function in result.functions:
         functions.add_row(
             function.name,
@@ -78,8 +77,7 @@ def _print(result: Profile, name: str) -> None:
         )
     show(functions)
     worst = ("count", "worst latency", "at tick", "worst duration", "at tick", "of all")
-    interrupts = plain_table("interrupt", *worst, justify="right")
-    interrupts.columns[0].justify = "left"
+    interrupts = plain_table("interrupt", right=worst)
     for found in result.interrupts:
         if found.count:
             interrupts.add_row(

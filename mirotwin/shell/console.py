@@ -1,6 +1,7 @@
 """The output of a command: tables and text, on a terminal or in a pipe."""
 
 import sys
+from collections.abc import Iterable
 from typing import Any
 
 import click
@@ -20,11 +21,13 @@ class _Plain(Console):
         return super().render_str(one_line(text), **options)
 
 
-def plain_table(*names: str, bold: bool = False, **style: Any) -> Table:
-    """A table without lines, with these columns, each in this style; the first one `bold`."""
+def plain_table(*names: str, right: Iterable[str] = (), bold: bool = False, **style: Any) -> Table:
+    """A table without lines, with these columns, each in this style, and those of numbers at the `right`."""
     table = Table(box=None, pad_edge=False)
     for index, name in enumerate(names):
         table.add_column(name, style="bold" if bold and not index else None, **style)
+    for name in right:
+        table.add_column(name, justify="right")
     return table
 
 
