@@ -67,25 +67,15 @@ class _FixedSettings:
     cts = dsr = cd = True
     ri = False
     xonxoff = rtscts = dtr = rts = break_condition = False
+    baudrate, bytesize, parity, stopbits = BAUD, EIGHTBITS, PARITY_NONE, STOPBITS_ONE
 
     def __init__(self, endpoint: Rfc2217Endpoint) -> None:
         self._endpoint = endpoint
 
-    @staticmethod
-    def _fixed(value: object) -> property:
-        def get(line: _FixedSettings) -> object:
-            return value
-
-        def put(line: _FixedSettings, wanted: object) -> None:
-            if wanted != value:
-                raise ValueError(f"this radio's port has {value}")
-
-        return property(get, put)
-
-    baudrate = _fixed(BAUD)
-    bytesize = _fixed(EIGHTBITS)
-    parity = _fixed(PARITY_NONE)
-    stopbits = _fixed(STOPBITS_ONE)
+    def __setattr__(self, name: str, wanted: object) -> None:
+        if name in ("baudrate", "bytesize", "parity", "stopbits") and wanted != getattr(self, name):
+            raise ValueError(f"this radio's port has {getattr(self, name)}")
+        super().__setattr__(name, wanted)
 
     def reset_input_buffer(self) -> None:
         self._endpoint.out.clear()

@@ -16,10 +16,13 @@ With `realtime=1` it passes by the wall clock instead, also between calls, and c
 
 from __future__ import annotations
 
+import atexit
+import logging
 import threading
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 from serial.serialutil import (
@@ -34,19 +37,35 @@ from serial.serialutil import (
 )
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK, seconds, ticks
+from miro_exact.clock import (
+    CONTROL_PERIOD_TICKS,
+    HOST_CHARACTER_TICKS,
+    NEVER_TICK,
+    TICKS_PER_SECOND,
+    seconds,
+    ticks,
+)
 from miro_robot.faults import FirmwareFault
+from miro_sim.periods import Period
+from miro_sim.scenario.file import ScenarioText, live_scenario
+from miro_sim.world.conditions import Heard
+from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
-from mirotwin.ports.recorded_world import RecordedWorld, open_world
-from mirotwin.ports.time_policy import RealTime, TimePolicy, VirtualTime
 from mirotwin.ports.url import parse_url
-from mirotwin.rerun.pacing import Pace
+from mirotwin.recording.recorder import Recorder, source_of
+from mirotwin.rerun.pacing import Every, Pace
+from mirotwin.run.run_files import FLUSH_S
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 
 BAUD = 9600
 POLLS = 1000
 """After so many in a row that find nothing while no time passes, a warning says why."""
+CATCH_UP_S = 0.25
+"""A call that finds the world late works on that for so long; the rest is left to later ones."""
+_log = logging.getLogger("mirotwin.ports")
 
 
 class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
@@ -57,7 +76,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     def __init__(self, *args: Any, **named: Any) -> None:
         self._lock = threading.RLock()  # a terminal reads in one thread and writes in another
-        self._recorded: RecordedWorld | None = None
+        self._world: World | None = None
+        self._pace: Pace | None = None
+        self._files = ExitStack()
         self._cancel_read = self._cancel_write = False
         self._polls = 0
         super().__init__(*args, **named)
@@ -65,17 +86,22 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
     @property
     def world(self) -> World:
         """The world of the open port. Raises PortNotOpenError."""
-        return self._there().world
+        if self._world is None:
+            raise PortNotOpenError()
+        return self._world
 
     @property
     def virtual_tick(self) -> int | None:
         """Where virtual time stands, for programs that keep time by it; None where it passes by the wall clock."""
-        return self._there().world.tick if self._polling else None
+        return self.world.tick if self._pace is None else None
 
     # ---- opening -----------------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Makes the world. Raises SerialException for a URL, scenario, image or folder that cannot be used."""
+        """Makes the world. Raises SerialException for a URL, scenario, image or folder that cannot be used.
+
+        A program that records and ends without closing closes at its exit.
+        """
         if self._port is None:
             raise SerialException("Port must be configured before it can be used.")
         if self.is_open:
@@ -83,26 +109,24 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._reconfigure_port()
         try:
             options = parse_url(self._port)
-            self._recorded = open_world(options, self.close)
+            text = live_scenario(options.scenario, options.settings)
+            world = World(text.scenario, options.seed, load_firmware(options.firmware, named=False))
+            self._radio = RadioPort(world, options.network)
+            if options.out:
+                self._files.enter_context(_recorded(world, text, OutputFolder(Path(options.out))))
+                atexit.register(self.close)
         except (BadInput, OSError, ValueError) as error:
             raise SerialException(str(error)) from None
-        world = self._recorded.world
-        port = self._radio = RadioPort(world, options.network)
+        self._world = world
         self._inbox = ByteFifo()
         self._limit_tick = ticks(options.limit_s)
-        self._time: TimePolicy
-        if options.realtime:
-            self._time = RealTime(port, self._inbox, Pace(options.realtime))
-        else:
-            self._time = VirtualTime(port, self._inbox)
-        self._polling = not options.realtime
+        self._pace = Pace(options.realtime) if options.realtime else None
         self.is_open = True
 
     def close(self) -> None:
         """Sends what waits, and ends the control period, so that a recording holds it."""
         if not self.is_open:
             return
-        there = self._there()
         try:
             if not self._why_over():
                 self._drain(None)
@@ -111,8 +135,17 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         finally:
             self.is_open = False
             with self._lock:
-                self._recorded = None
-                there.close()
+                self._world = None
+                self._end_recording()
+
+    def _end_recording(self, error: OSError | None = None) -> None:
+        """`error` broke it off, after which a part stays. Raises SerialException."""
+        try:
+            with self._files:
+                if error is not None:
+                    raise error
+        except (BadInput, OSError) as told:
+            raise SerialException(str(told)) from None
 
     def _reconfigure_port(self) -> None:
         """Raises ValueError for anything that the port of this radio is not: it has one rate and one format."""
@@ -135,8 +168,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
     @property
     def overruns(self) -> int:
         """Bytes that came while 65536 waited to be read, and were dropped."""
-        self._there()
-        return self._inbox.dropped
+        return self._inbox.dropped if self.world else 0
 
     def read(self, size: int = 1) -> bytes:
         """See the head of this file. Raises SerialException once the run is over and all is read."""
@@ -213,7 +245,6 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     def flush(self) -> None:
         """Waits until everything is sent. Raises SerialException where the run ends before."""
-        self._there()
         self._drain(self._write_timeout)
 
     def _drain(self, timeout_s: float | None) -> None:
@@ -243,16 +274,14 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     @property
     def cts(self) -> bool:
-        """Always active, as DSR and CD are; RI never is."""
-        self._there()
-        return True
+        """Always active, as DSR and CD are; RI never is. Raises PortNotOpenError."""
+        return self.world is not None
 
     dsr = cd = cts
 
     @property
     def ri(self) -> bool:
-        self._there()
-        return False
+        return self.world is None
 
     def _update_line(self) -> None:
         """RTS and DTR are not connected, and a break does not get through the radio module."""
@@ -261,18 +290,40 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     # ---- within ------------------------------------------------------------------------------------------
 
-    def _there(self) -> RecordedWorld:
-        if self._recorded is None:
-            raise PortNotOpenError()
-        return self._recorded
-
     @contextmanager
     def _caught_up(self) -> Iterator[World]:
         """The world, where it should be now; other threads wait meanwhile. Raises PortNotOpenError."""
         with self._lock:
-            world = self._there().world
-            self._time.catch_up()
-            yield world
+            world = self.world
+            try:
+                self._catch_up(world)
+                yield world
+            except SerialException:
+                raise
+            except OSError as error:  # what is recorded cannot be written
+                self._end_recording(error)
+                raise
+
+    def _catch_up(self, world: World) -> None:
+        """By the wall clock, if the port keeps to that; takes over what the PC has received."""
+        if self._pace is not None:
+            due = self._pace.tick()
+            latest = due + int(CATCH_UP_S * self._pace.factor * TICKS_PER_SECOND)
+            while world.tick < due and not world.stopped and self._pace.tick() < latest:
+                world.run_to(min(due, world.tick + CONTROL_PERIOD_TICKS))
+                self._inbox.add(self._radio.received())
+            if behind := self._pace.note(world.tick, world.tick, self._pace.tick()):
+                _log.warning("tick %d: %s", world.tick, behind)
+        self._inbox.add(self._radio.received())
+
+    def _advance(self, world: World, tick: int, for_byte: bool) -> None:
+        """In virtual time towards `tick`; with `for_byte` not beyond the next byte heard."""
+        tick = min(tick, world.tick + CONTROL_PERIOD_TICKS)
+        if for_byte:
+            with suppress(WaitExpired):
+                world.run_until(Heard(network=self._radio.network), within=tick - world.tick)
+        else:
+            world.run_to(tick)
 
     def _wait(
         self, timeout_s: float | None, until: Callable[[World, int], int | None], for_byte: bool = False
@@ -287,12 +338,14 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 if tick is None:
                     return
                 tick = min(tick, self._limit_tick)
-                self._time.advance(tick, for_byte)
-            self._time.rest(tick)
+                if self._pace is None:
+                    self._advance(world, tick, for_byte)
+            if self._pace is not None:  # other threads may have the world
+                self._pace.sleep_until(min(tick, world.tick + HOST_CHARACTER_TICKS))
 
     def _why_over(self) -> str:
         """Why no more time passes, if so."""
-        world = self._there().world
+        world = self.world
         if world.stopped:
             fault: FirmwareFault = world.faults[0]
             return f"the run has stopped: firmware fault: {fault}"
@@ -301,7 +354,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         return "the day that a world may last is over" if world.finished else ""
 
     def _note_poll(self, found: object) -> None:
-        self._polls = 0 if found else self._polls + self._polling
+        self._polls = 0 if found else self._polls + (self._pace is None)
         if self._polls == POLLS:
             warnings.warn(
                 f"{POLLS} times in a row nothing was there, and no time passed: in_waiting and reads with timeout 0"
@@ -309,3 +362,27 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 RuntimeWarning,
                 stacklevel=3,
             )
+
+
+@contextmanager
+def _recorded(world: World, text: ScenarioText, folder: OutputFolder) -> Iterator[None]:
+    """Records `world` up to the end of a control period."""
+    source, flush = source_of(text, world), Every(FLUSH_S)
+    with folder:
+        folder.keep = KEPT
+        stream = folder.part(RECORDING).open("wb", buffering=0)
+        with stream, Recorder(stream, source) as recorder:
+
+            def write(period: Period) -> None:
+                recorder.write(period)
+                if flush.due():
+                    recorder.flush()
+
+            world.observers.append(write)
+            try:
+                yield
+                if world.in_period and not world.stopped:
+                    world.run_to(world.period_end)
+                recorder.write_faults(world.robots)
+            finally:
+                world.observers.remove(write)

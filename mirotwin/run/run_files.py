@@ -31,6 +31,7 @@ from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
+from mirotwin.rerun.pacing import Every
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain
@@ -149,7 +150,7 @@ class RunFiles:
     stops: Stops | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
     _wall_s: float = field(default=0.0, init=False)
-    _flushed_s: float = field(default=-FLUSH_S, init=False)
+    _flush: Every = field(default_factory=partial(Every, FLUSH_S), init=False)
 
     def fill(self, bar: ProgressBar, title: str | None) -> Summary:
         """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
@@ -187,10 +188,8 @@ class RunFiles:
         def keep(period: Period) -> None:
             self.tracks.add(period)
             recorder.write_theories(self.tracks.theories())
-            now_s = time.monotonic()
-            if now_s - self._flushed_s >= FLUSH_S:
+            if self._flush.due():
                 recorder.flush()
-                self._flushed_s = now_s
             bar.to(self.tracks.count)
 
         def keep_frame(view: View) -> None:
