@@ -46,43 +46,26 @@ def minimise(data: bytes, still: Question, budget: Budget) -> bytes:
         return data
     while not budget.over:
         before = data
-        data = _without_chunks(data, still, budget)
-        data = _with_zeros(data, still, budget)
+        data = _simpler(data, still, budget, lambda chunk: b"")
+        data = _simpler(data, still, budget, lambda chunk: bytes(len(chunk)))
         if data == before:
             break
     return data
 
 
-def _without_chunks(data: bytes, still: Question, budget: Budget) -> bytes:
-    """Chunks are taken away from the end on: what comes after the crash goes first."""
+def _simpler(data: bytes, still: Question, budget: Budget, instead: Callable[[bytes], bytes]) -> bytes:
+    """What is put in the place of chunks, from the end on: what comes after the crash goes first."""
     size = max(1, len(data) // 2)
     while data:
         end = len(data)
         while end > 0 and not budget.over:
             begin = max(0, end - size)
-            shorter = data[:begin] + data[end:]
-            if budget.asked(still, shorter):
-                data = shorter
+            chunk = data[begin:end]
+            simpler = data[:begin] + instead(chunk) + data[end:]
+            if simpler != data and budget.asked(still, simpler):
+                data = simpler
             end = begin
         if size == 1 or budget.over:
-            break
-        size //= 2
-    return data
-
-
-def _with_zeros(data: bytes, still: Question, budget: Budget) -> bytes:
-    size = max(1, len(data) // 2)
-    while data:
-        for begin in range(0, len(data), size):
-            chunk = data[begin : begin + size]
-            if not any(chunk):
-                continue
-            if budget.over:
-                return data
-            zeroed = data[:begin] + bytes(len(chunk)) + data[begin + size :]
-            if budget.asked(still, zeroed):
-                data = zeroed
-        if size == 1:
             break
         size //= 2
     return data

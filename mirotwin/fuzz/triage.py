@@ -94,96 +94,90 @@ class Triage:
         if failure is None:
             self.unrepeated += 1
             return None
-        group = _group(failure)
-        if self._in_vain[group] >= SAME_TRIED:
-            self.more[self._last[group].name] += 1
-            return None
-        small = minimise(data, lambda one: self._fails(one, group), Budget(TRIES, self.minimise_s, self.tell))
-        counts = self.reached.run(small)
-        key = (*group, self.reached.path(counts))
-        known = self._by_key.get(key)
-        if known is not None and known.confirmed:
-            self._count(key)
-            return None
-        again = self._failure(small) or failure
-        verdict = self.oracle.confirm(small, again)
-        if verdict.failure is None and small != data:
-            whole = self.oracle.confirm(data, failure)
-            if whole.failure is not None:  # smaller, it is only the target's
-                small, verdict, again = data, whole, failure
-                counts = self.reached.run(small)
-        if known is not None:
-            if verdict.failure is None:
-                self._count(key)
-                return None
-            self._take_back(known)
-        sizes = (len(data), len(small))
-        return self._keep(key, small, again.pc, again.what, verdict, counts, sizes)
+        group = failure.check, failure.pc or None
+
+        def fails(one: bytes) -> bool:
+            found = self._failure(one)
+            return found is not None and (found.check, found.pc or None) == group
+
+        def judged(one: bytes) -> tuple[OracleVerdict, str]:
+            again = self._failure(one) or failure
+            return self.oracle.confirm(one, again), again.what
+
+        return self._take(data, group, TRIES, fails, judged)
 
     def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Crash | None:
         """An input in whose World one of the checks in `expected` failed; the crash, if it is a new one."""
-        group = (failure.check, None)
+
+        def judged(one: bytes) -> tuple[OracleVerdict, str]:
+            return self.oracle.judged(one, expected), ""
+
+        def fails(one: bytes) -> bool:
+            found = judged(one)[0].failure
+            return found is not None and found.check == failure.check
+
+        return self._take(data, (failure.check, None), TRIES_IN_A_WORLD, fails, judged)
+
+    def _take(
+        self,
+        data: bytes,
+        group: tuple[str, int | None],
+        tries: int,
+        fails: Callable[[bytes], bool],
+        judged: Callable[[bytes], tuple[OracleVerdict, str]],
+    ) -> Crash | None:
+        """`fails`: whether an input is still of the group; `judged`: the verdict on one, and what the target says."""
         if self._in_vain[group] >= SAME_TRIED:
             self.more[self._last[group].name] += 1
             return None
-
-        def fails(one: bytes) -> bool:
-            found = self.oracle.judged(one, expected).failure
-            return found is not None and found.check == failure.check
-
-        small = minimise(data, fails, Budget(TRIES_IN_A_WORLD, self.minimise_s, self.tell))
+        small = minimise(data, fails, Budget(tries, self.minimise_s, self.tell))
         counts = self.reached.run(small)
         key = (*group, self.reached.path(counts))
-        if key in self._by_key:
-            self._count(key)
-            return None
-        verdict = self.oracle.judged(small, expected)
-        return self._keep(key, small, 0, "", verdict, counts, (len(data), len(small)))
+        known = self._by_key.get(key)
+        if known is not None:
+            self.more[known.name] += 1
+            self._in_vain[group] += 1
+            if known.confirmed:
+                return None
+        verdict, what = judged(small)
+        if verdict.failure is None and small != data:
+            whole, said = judged(data)
+            if whole.failure is not None:  # smaller, it is only the target's
+                small, verdict, what, counts = data, whole, said, self.reached.run(data)
+        if known is not None:
+            if verdict.failure is None:
+                return None
+            self.found.remove(known)  # another input shows now that it is real
+            self.folder.remove(known.folder, known.name)
+        return self._keep(key, small, what, verdict, counts, (len(data), len(small)))
 
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None
-
-    def _fails(self, data: bytes, group: tuple[str, int | None]) -> bool:
-        failure = self._failure(data)
-        return failure is not None and _group(failure) == group
-
-    def _take_back(self, crash: Crash) -> None:
-        """A crash that was not confirmed, of which another input shows now that it is real."""
-        self.found.remove(crash)
-        self.more[crash.name] += 1
-        self.folder.remove(crash.folder, crash.name)
-
-    def _count(self, key: tuple[str, int | None, str]) -> None:
-        crash = self._by_key[key]
-        self.more[crash.name] += 1
-        self._in_vain[key[:2]] += 1
 
     def _keep(
         self,
         key: tuple[str, int | None, str],
         data: bytes,
-        pc: int,
         what: str,
         verdict: OracleVerdict,
         counts: Counts,
         sizes: tuple[int, int],
     ) -> Crash:
-        check, place_pc, path = key
-        name = "-".join([check, *([] if place_pc is None else [f"{place_pc:04x}"]), path])
+        check, pc, path = key
         failure = verdict.failure
         crash = Crash(
-            name=name,
+            name="-".join([check, *([] if pc is None else [f"{pc:04x}"]), path]),
             check=check,
-            pc=place_pc,
+            pc=pc,
             path=path,
-            function="" if place_pc is None else self.reached.function(pc),
+            function="" if pc is None else self.reached.function(pc),
             verdict=f"{check}: {what}" if failure is None else str(failure),
             folder=UNCONFIRMED if failure is None else CONFIRMED,
             sizes=sizes,
             fault=failure is not None and failure.fault,
         )
         again = self.oracle.judged(data, {}).stream() if failure is None else verdict.case()
-        self.leave(crash.folder, name, data, again, counts)
+        self.leave(crash.folder, crash.name, data, again, counts)
         self.found.append(crash)
         self._by_key[key] = crash
         self._last[key[:2]] = crash
@@ -202,8 +196,3 @@ class Triage:
         report = collect(self.target.image, counts, self.sources, path)
         write(report.tracefile, report, path, "--out")
         return report.tracefile
-
-
-def _group(failure: TargetFailure) -> tuple[str, int | None]:
-    """Check and PC of what a target found."""
-    return failure.check, failure.pc or None
