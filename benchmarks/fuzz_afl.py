@@ -17,9 +17,8 @@ from benchmarks.fuzz import classes
 from miro_exact import engine
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from mirotwin.fuzz.afl import AflRun
-from mirotwin.fuzz.afl.inputs import write_seeds
-from mirotwin.fuzz.engine import EngineInput
+from mirotwin.fuzz.afl.run import AflRun
+from mirotwin.fuzz.engine import EngineInput, write_seeds
 from mirotwin.fuzz.spec import TargetSpec
 
 WARM = 500
@@ -44,13 +43,13 @@ def last_said(job: Path) -> dict[str, str]:
 
 def measured(folder: Path, spec: TargetSpec, inputs: list[bytes], wall_s: float) -> str:
     """A row of the table."""
-    write_seeds(folder / "seeds", {str(number): data for number, data in enumerate(inputs)})
+    write_seeds(folder / "seeds", inputs)
     lengths = min(map(len, inputs)), max(map(len, inputs))
-    run = AflRun(EngineInput(spec.text(), folder / "seeds", folder / "out"), spec.make(), lengths)
-    with run:
+    given = EngineInput(spec.text(), folder / "seeds", folder / "out", lengths=lengths)
+    with AflRun(given, spec.make()) as run:
         while run.progress().executions < WARM:
             time.sleep(0.1)
-        both = run.jobs[0].process, child_of(run.jobs[0].process)
+        both = run.jobs[0].process.pid, child_of(run.jobs[0].process.pid)
         began, before = run.progress(), [processor_s(process) for process in both]
         time.sleep(wall_s)
         ended, after = run.progress(), [processor_s(process) for process in both]

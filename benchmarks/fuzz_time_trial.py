@@ -20,11 +20,10 @@ from benchmarks.processor_time import of_descendants
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
 from mirotwin.fuzz.afl.run import AflRun
-from mirotwin.fuzz.engine import EngineInput
-from mirotwin.fuzz.hypothesis_engine import HypothesisRun
-from mirotwin.fuzz.inputs import seeds
+from mirotwin.fuzz.engine import EngineInput, write_dictionary, write_seeds
+from mirotwin.fuzz.hypothesis_process import HypothesisRun
+from mirotwin.fuzz.inputs import message_tokens, seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from tests.mutants.build import CACHE, IMAGE
@@ -119,10 +118,10 @@ def _of_engine(wanted: Wanted, folder: Path) -> Trial:
     except BadInput as error:
         return Trial(wanted, 0.0, 0.0, refused=error.what)
     given = seeds(spec.input, ROBOTS, SLOT)
-    write_seeds(folder / "seeds", {f"seed-{number}": data for number, data in enumerate(given)})
+    write_seeds(folder / "seeds", given)
     write_dictionary(folder / "dictionary", message_tokens(ROBOTS))
     begin = EngineInput(spec.text(), folder / "seeds", folder / "out", folder / "dictionary", 1, wanted.seed)
-    engine = AflRun(begin, spec.make()) if wanted.engine == "afl" else HypothesisRun(begin)
+    engine = (AflRun if wanted.engine == "afl" else HypothesisRun)(begin, spec.make())
     looked = _Looked(target)
     with ExitStack() as at_end:
         begun_s, spent_s = time.monotonic(), 0.0

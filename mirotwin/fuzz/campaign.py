@@ -14,7 +14,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import Engine, EngineProgress
-from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.triage import Crash, Triage
 
 LOOK_S = 0.2
@@ -42,37 +40,31 @@ class Covering(msgspec.Struct, frozen=True):
     address: int
 
 
-class Status(msgspec.Struct, frozen=True):
-    """How a campaign stands. Rates over wall time; `waiting`: inputs that were not looked at yet."""
-
-    run_s: float
-    executions: int
-    executions_per_s: float
-    edges: int | None
-    crashes: int
-    unconfirmed: int
-    waiting: int
-
-
-@dataclass(eq=False)
 class Campaign:
     """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
-    `judged`: inputs that those have looked at; `reached_by`: the stream that reached what was to be reached.
+    `inputs`: those of the queue that were looked at; `judged`: those that the checks have looked at; `reached_by`: the
+    stream that reached what was to be reached. `show` is called now and then.
     """
 
-    engine: Engine
-    triage: Triage
-    folder: CampaignFolder
-    expected: Mapping[str, Any]
-    covering: Covering | None = None
-    tell: Callable[[Crash], None] = lambda crash: None
-
-    def __post_init__(self) -> None:
-        self._progress = EngineProgress()
+    def __init__(
+        self,
+        engine: Engine,
+        triage: Triage,
+        expected: Mapping[str, Any],
+        covering: Covering | None,
+        tell: Callable[[Crash], None],
+    ) -> None:
+        self.engine = engine
+        self.triage = triage
+        self.expected = expected
+        self.covering = covering
+        self.tell = tell
+        self.show: Callable[[Campaign], None] = lambda campaign: None
         self.judged = 0
         self.inputs = 0
         self.reached_by: Path | None = None
+        self._progress = EngineProgress()
         self._crashes: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._to_judge: deque[bytes] = deque()
@@ -82,40 +74,37 @@ class Campaign:
         self._began_s = time.monotonic()
         self._stopped_s: float | None = None
         self._shown_s = 0.0
+        triage.tell = self._show_sometimes
 
     def begin_with(self, failing: Iterable[bytes], passing: Iterable[bytes]) -> None:
         """Inputs to look at before those of the engine: seeds that fail are crashes, others give coverage."""
-        for inputs, data_of in ((self._crashes, failing), (self._queue, passing)):
-            for data in data_of:
-                self._seen.add(data)
-                inputs.append(data)
+        for data in failing:
+            self._add(data, self._crashes)
+        for data in passing:
+            self._add(data, self._queue)
         self._looked = LOOKED - len(self._queue)  # these are quick, and --covering may need no more
 
     # ---- the loop ------------------------------------------------------------------------------------------
 
-    def run(self, time_s: float | None, show: Callable[[Status], None]) -> None:
-        """Until the time is over (None: never), or what was to be reached is. The engine is stopped however it ends."""
+    def run(self, time_s: float) -> None:
+        """Until the time is over, or what was to be reached is. The engine is stopped however it ends."""
         self._began_s = time.monotonic()
-        self.triage.tell = lambda: self._show_sometimes(show)
         try:
             self.engine.start()
-            while self.reached_by is None and (time_s is None or self.run_s < time_s):
+            while self.reached_by is None and self.run_s < time_s:
                 began_s = time.monotonic()
                 self._collect()
-                self._work(began_s + SLICE_S, time_s)
-                self._show_sometimes(show)
+                self._work(min(began_s + SLICE_S, self._began_s + time_s))
+                self._show_sometimes()
                 time.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
         finally:
             self.engine.stop()
             self._stopped_s = time.monotonic()
         self._collect()
 
-    def finish(self, show: Callable[[Status], None], limit_s: float = AFTER_S) -> int:
+    def finish(self, limit_s: float) -> int:
         """Looks at what is left, so long at most; returns how many inputs were left out."""
-        end_s = time.monotonic() + limit_s
-        self.triage.tell = lambda: self._show_sometimes(show)
-        while (self._crashes or self._queue or self._to_judge) and time.monotonic() < end_s:
-            self._work(end_s, None, at_ease=True)
+        self._work(time.monotonic() + limit_s, at_ease=True)
         return len(self._crashes) + len(self._queue) + len(self._to_judge)
 
     @property
@@ -123,49 +112,40 @@ class Campaign:
         """Wall time for which the engine has been running."""
         return (self._stopped_s or time.monotonic()) - self._began_s
 
-    def status(self) -> Status:
-        """How far it is; of an engine that has ended with an error, how far it was when last asked."""
+    def progress(self) -> EngineProgress:
+        """How far the engine is; of one that has ended with an error, how far it was when last asked."""
         with suppress(BadInput):
             self._progress = self.engine.progress()
-        progress = self._progress
-        return Status(
-            self.run_s,
-            progress.executions,
-            progress.executions_per_s,
-            progress.edges,
-            len(self.triage.confirmed),
-            len(self.triage.unconfirmed),
-            len(self._crashes) + len(self._queue) + len(self._to_judge),
-        )
+        return self._progress
 
-    def _show_sometimes(self, show: Callable[[Status], None]) -> None:
+    @property
+    def rate(self) -> float:
+        """Executions a second of wall time, as last asked."""
+        return self._progress.executions / self.run_s if self.run_s else 0.0
+
+    def _show_sometimes(self) -> None:
         now_s = time.monotonic()
         if now_s - self._shown_s >= LOOK_S:
             self._shown_s = now_s
-            show(self.status())
+            self.show(self)
 
     # ---- what comes from the engine ------------------------------------------------------------------------
 
     def _collect(self) -> None:
-        for path in self.engine.new_crashes():
-            self._take(path, self._crashes)
-        for path in self.engine.new_queue():
-            self._take(path, self._queue)
+        new = (self.engine.new_crashes(), self._crashes), (self.engine.new_queue(), self._queue)
+        for paths, inputs in new:
+            for path in paths:
+                with suppress(OSError):  # the engine has taken it away again
+                    self._add(path.read_bytes(), inputs)
 
-    def _take(self, path: Path, inputs: deque[bytes]) -> None:
-        try:
-            data = path.read_bytes()
-        except OSError:  # the engine has taken it away again
-            return
+    def _add(self, data: bytes, inputs: deque[bytes]) -> None:
         if data not in self._seen:
             self._seen.add(data)
             inputs.append(data)
 
-    def _work(self, end_s: float, time_s: float | None, at_ease: bool = False) -> None:
+    def _work(self, end_s: float, at_ease: bool = False) -> None:
         """Crashes, and coverage between two of them; then checks in Python, a third of the time."""
-        while self.reached_by is None or at_ease:
-            if time.monotonic() >= end_s or (time_s is not None and self.run_s >= time_s):
-                return
+        while (self.reached_by is None or at_ease) and time.monotonic() < end_s:
             if self._crashes and (not self._queue or self._looked >= LOOKED):
                 done = self._crashes
                 self._looked = 0
@@ -188,7 +168,7 @@ class Campaign:
     def _look(self, data: bytes) -> None:
         """An input that found something new: what it executes."""
         self.inputs += 1
-        self.folder.write("corpus", f"input-{self.inputs:05d}", data)
+        self.triage.folder.write("corpus", f"input-{self.inputs:05d}", data)
         counts = self.triage.reached.run(data)
         if self.expected:
             self._to_judge.append(data)

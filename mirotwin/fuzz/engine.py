@@ -1,20 +1,36 @@
-"""Who makes up inputs: AFL++ where it is installed, else Hypothesis."""
+"""Who makes up inputs: AFL++ where it is installed, else Hypothesis. Their processes have a target each, leave files.
+
+Nothing here imports a hot module: a process that has a target chooses its engine by the specification first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import struct
+import subprocess
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.target import Target
 
+if TYPE_CHECKING:
+    from mirotwin.fuzz.target import Target
+
+PATIENCE_S = 10.0
+"""Time for a job to write its last files once it is told to end."""
+LOG_BYTES = 1 << 20
+"""A log is emptied when it is longer: afl-fuzz writes a line for each input that it takes up."""
+LONGEST_BYTES = 1024
+"""AFL++ makes no longer inputs: a thousand characters are a second on the air, and a hundred frames."""
 _TOKENS, _TOKEN = 32, 64
 """How many inputs are words of a foreign format, and how much of them."""
+_COUNT = struct.Struct("<Q")
 
 
 class EngineInput(msgspec.Struct, frozen=True):
@@ -22,6 +38,7 @@ class EngineInput(msgspec.Struct, frozen=True):
 
     `out`: the folder of the campaign, made if it is not there. `dictionary`: a file of words for AFL++. `jobs`: so many
     processes, each with a target of its own. `seed`: of the random numbers; the system's where none is given.
+    `lengths`: the shortest and the longest input in bytes that AFL++ makes.
     """
 
     target: str
@@ -30,41 +47,169 @@ class EngineInput(msgspec.Struct, frozen=True):
     dictionary: Path | None = None
     jobs: int = 1
     seed: int | None = None
+    lengths: tuple[int, int] = (1, LONGEST_BYTES)
 
-    def check(self, program: str, absent: str | None) -> None:
-        """Raises BadInput for no job, and for a program of which `absent` says what is missing and how to get it."""
-        if self.jobs < 1:
-            raise BadInput("--jobs", "", f"{self.jobs}: there is nothing to do", "give 1 or more")
-        if absent:
-            raise BadInput(program, "", *absent.split("; ", 1))
+
+NOTHING = EngineInput("", Path(), Path(), jobs=0)
 
 
 class EngineProgress(msgspec.Struct, frozen=True):
-    """A campaign so far: the rate is that of all its jobs together; `edges` is None as long as nothing is known."""
+    """A campaign so far; `edges` is None as long as nothing is known."""
 
     executions: int = 0
-    executions_per_s: float = 0.0
     edges: int | None = None
+
+
+def counter(path: Path) -> Callable[[int], None]:
+    """Writes to `path` how many inputs a process has run, counted on from those of processes before it."""
+    before = read_executions(path)
+    file = path.open("wb", buffering=0)
+
+    def keep(executions: int) -> None:
+        file.seek(0)
+        file.write(_COUNT.pack(before + executions))
+
+    keep(0)
+    return keep
+
+
+def read_executions(path: Path) -> int:
+    """The number at `path`; 0 where there is no such file, or none that is whole."""
+    content = _content(path)
+    return int(_COUNT.unpack(content)[0]) if len(content) == _COUNT.size else 0
+
+
+class Explorer:
+    """Runs inputs and tells `keep(kind, data)` which to keep: "queue" for new edges, "crashes" for a new failure.
+
+    How often an edge was executed counts by AFL++'s classes: 1, 2, 3, 4 to 7, 8 to 15, .. times. Failures are new by
+    check and place.
+    """
+
+    def __init__(
+        self, target: Target, keep: Callable[[str, bytes], object] = lambda kind, data: None
+    ) -> None:
+        self.target = target
+        self.keep = keep
+        self.seen = 0
+        self.failures: dict[tuple[str, int], None] = {}
+        self._edges = bytearray(target.map_size)
+        self._none = bytes(target.map_size)
+        target.use_map(self._edges)
+
+    def run(self, data: bytes) -> int:
+        """Returns how many edges it executed."""
+        self._edges[:] = self._none
+        found = self.target.run(data)
+        classes = int.from_bytes(self._edges.translate(_CLASSES), "little")
+        failure = self.target.failure if found else None
+        if failure is not None:
+            if (failure.check, failure.pc) not in self.failures:
+                self.failures[failure.check, failure.pc] = None
+                self.keep("crashes", data)
+        elif classes & ~self.seen:
+            self.seen |= classes
+            self.keep("queue", data)
+        return len(self._edges) - self._edges.count(0)
+
+    @property
+    def edges(self) -> int:
+        """Seen, in runs without a failure."""
+        seen = self.seen.to_bytes(len(self._edges), "little")
+        return len(seen) - seen.count(0)
+
+
+def _class_of(count: int) -> int:
+    """A bit for each class of counts."""
+    bit = count - 1 if count < 4 else min(count.bit_length(), 7)
+    return 1 << bit if count else 0
+
+
+_CLASSES = bytes(_class_of(count) for count in range(256))
+
+
+class Job:
+    """A process of an engine, which runs at once and gets no Ctrl-C of a terminal.
+
+    In `out`, beside the folder of its name with `queue` and `crashes`: its output as NAME.log, how many inputs its
+    target has run as NAME.counts, and what that complained of as NAME.target.
+    """
+
+    def __init__(
+        self,
+        out: Path,
+        name: str,
+        line: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+        **how: Any,
+    ) -> None:
+        self.name = name
+        self.folder = out / name
+        self.log = out / f"{name}.log"
+        self.counts = out / f"{name}.counts"
+        self.complaint = out / f"{name}.target"
+        self.log.unlink(missing_ok=True)
+        self.complaint.unlink(missing_ok=True)
+        with self.log.open("ab") as log:  # the next line is the first of a log that was emptied
+            self.process = subprocess.Popen(
+                line,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=environment,
+                start_new_session=True,
+                **how,
+            )
+
+    @property
+    def running(self) -> bool:
+        return self.process.poll() is None
+
+    def wait(self) -> None:
+        """Waits until it has ended; one that does not end is killed, and its target with it."""
+        try:
+            self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
 
 
 class Engine:
     """One campaign of an engine, which gives paths of files that hold an input each.
 
-    This one makes up no inputs: there is none to begin with. The others derive from it.
+    This one makes up no inputs: there is none to begin with. The others derive from it, and start the jobs of `given`.
+    `watch`: a target by which the edges of their inputs are counted.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, given: EngineInput = NOTHING, watch: Target | None = None) -> None:
+        self.given = given
+        self.jobs: list[Job] = []
         self._handed_out: dict[Path, None] = {}
+        self._explorer = None if watch is None else Explorer(watch)
+        self._counted: dict[Path, None] = {}
+        self._stopped = False
 
     def start(self) -> None:
         """Starts all jobs."""
 
     def stop(self) -> None:
         """Ends all jobs. A second call does nothing."""
+        self._stopped = True
+        for job in self.jobs:
+            self._interrupt(job)
+        for job in self.jobs:
+            job.wait()
 
     def progress(self) -> EngineProgress:
-        """How far it is."""
-        return EngineProgress()
+        """How far it is. Raises BadInput for a job that has ended with an error, with its own line."""
+        self._require_health()
+        if self._explorer is None or not self.jobs:
+            return EngineProgress()
+        for path in self._inputs("queue"):
+            if path not in self._counted and (data := _content(path)):
+                self._counted[path] = None
+                self._explorer.run(data)
+        return EngineProgress(sum(read_executions(job.counts) for job in self.jobs), self._explorer.edges)
 
     def new_crashes(self) -> list[Path]:
         """Inputs with a failure that were not given before. Different jobs may find the same."""
@@ -76,20 +221,30 @@ class Engine:
 
     def _new(self, kind: str) -> list[Path]:
         self._require_health()
-        found = [path for path in self._inputs(kind) if path not in self._handed_out and self._is_whole(path)]
+        found = [path for path in self._inputs(kind) if path not in self._handed_out and _content(path)]
         self._handed_out.update(dict.fromkeys(found))
         return found
 
     def _inputs(self, kind: str) -> list[Path]:
-        """All that its jobs have left in `queue` or `crashes`."""
-        return []
-
-    def _is_whole(self, path: Path) -> bool:
-        """Whether a job has written all of an input."""
-        return True
+        """All that its jobs have left in `queue` or `crashes`, without those that one took over from another."""
+        taken = {f"sync:{job.name}" for job in self.jobs}
+        left = [path for job in self.jobs for path in sorted((job.folder / kind).glob("id:*"))]
+        return [path for path in left if taken.isdisjoint(path.name.split(","))]
 
     def _require_health(self) -> None:
-        """Raises BadInput for a job that has ended with an error, with its own line."""
+        for job in self.jobs:
+            if job.process.poll() and not self._stopped:
+                raise self._why_ended(job)
+            if job.log.exists() and job.log.stat().st_size > LOG_BYTES:
+                os.truncate(job.log, 0)
+
+    def _interrupt(self, job: Job) -> None:
+        """Tells a job to end."""
+        job.process.kill()
+
+    def _why_ended(self, job: Job) -> BadInput:
+        """What is to be told of a job that has ended with an error."""
+        raise NotImplementedError
 
     def __enter__(self) -> Self:
         self.start()
@@ -97,6 +252,27 @@ class Engine:
 
     def __exit__(self, *raised: object) -> None:
         self.stop()
+
+
+def _content(path: Path) -> bytes:
+    """What is at `path`; empty while it is written, or where afl-fuzz writes a shorter input in its place."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def write_dictionary(path: Path, tokens: Iterable[bytes]) -> None:
+    """Writes `"\\x55.."` lines, as `afl-fuzz -x` reads them; each string once."""
+    words = ("".join(f"\\x{byte:02x}" for byte in token) for token in dict.fromkeys(tokens))
+    path.write_text("".join(f'"{word}"\n' for word in words), encoding="ascii")
+
+
+def write_seeds(folder: Path, inputs: Iterable[bytes]) -> None:
+    """Writes the inputs into `folder`, one a file, long ones up to the length that afl-fuzz makes itself."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, data in enumerate(inputs):
+        (folder / f"seed-{number:04d}").write_bytes(data[:LONGEST_BYTES])
 
 
 def engine_for(
@@ -108,23 +284,25 @@ def engine_for(
     seed: int | None,
 ) -> tuple[Engine, list[str]]:
     """AFL++, or Hypothesis, with what a user should hear about it. Raises BadInput for what cannot be."""
-    from mirotwin.fuzz.afl.inputs import message_tokens, wire_tokens, write_dictionary, write_seeds
-    from mirotwin.fuzz.afl.run import AflRun
+    from mirotwin.fuzz.afl.run import AflRun, shared_cores
     from mirotwin.fuzz.afl.settings import missing
+    from mirotwin.fuzz.inputs import message_tokens, wire_tokens
 
     seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
-    write_seeds(seeds, {f"seed-{number:04d}": data for number, data in enumerate(inputs)})
+    write_seeds(seeds, inputs)
     if spec.board == "bare":
-        tokens = {f"seed {number}": data[:_TOKEN] for number, data in enumerate(inputs[:_TOKENS]) if data}
+        tokens = [data[:_TOKEN] for data in inputs[:_TOKENS]]
     else:
         tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
     write_dictionary(dictionary, tokens)
     given = EngineInput(spec.text(), seeds, folder.folder("engine"), dictionary, jobs, seed)
     lacking = missing()
     if lacking is None:
-        afl = AflRun(given, target)
-        return afl, afl.notes()
-    from mirotwin.fuzz.hypothesis_engine import HypothesisRun
+        return AflRun(given, target), shared_cores(jobs)
+    if find_spec("hypothesis") is None:
+        remedy = "install it with `pip install 'mirotwin[hypothesis]'`"
+        raise BadInput("Hypothesis", "", "Hypothesis is not installed", remedy)
+    from mirotwin.fuzz.hypothesis_process import HypothesisRun
 
     note = f"{lacking}; until then Hypothesis makes up the inputs, which is slower and not guided by edges"
-    return HypothesisRun(given), [note]
+    return HypothesisRun(given, target), [note]

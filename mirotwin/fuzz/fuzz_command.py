@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -19,7 +20,7 @@ from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
-from mirotwin.fuzz.engine import Engine, engine_for
+from mirotwin.fuzz.engine import Engine, Explorer, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.fuzz_output import FuzzProgress, report
 from mirotwin.fuzz.input_coverage import InputCoverage
@@ -216,10 +217,10 @@ def _campaign(
     covering = _covering(options.covering, image)
     target = spec.make()
     oracle = oracle_of(target, check)
-    inputs = target.seeds()
+    inputs = dict.fromkeys(filter(None, target.seeds()))
     if options.corpus is not None:
         found, notes = read_corpus(options.corpus, spec.input, spec.robots)
-        inputs = list(dict.fromkeys((*inputs, *found)))
+        inputs |= dict.fromkeys(found)
         for note in notes:
             complain(note)
     _check_at_rest(target, image)
@@ -232,7 +233,7 @@ def _campaign(
     with folder.filled():
         failing, passing, silent = _sorted_out(target, inputs)
         engine = _engine(spec, passing, folder, options)
-        campaign = Campaign(engine, triage, folder, expected, covering, _teller(options.quiet))
+        campaign = Campaign(engine, triage, expected, covering, _teller(options.quiet))
         campaign.begin_with(failing, (*passing, *silent))
         check_in_file = check.text if check is not None and check.from_file else None
         return _run(campaign, options.time_s if passing else 0.0, options.quiet, check_in_file)
@@ -249,19 +250,15 @@ def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, opti
     return engine
 
 
-def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
+def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
     """Those that fail, those that an engine can begin with, and those that execute no branch."""
     failing: list[bytes] = []
     passing: list[bytes] = []
     silent: list[bytes] = []
-    edges = bytearray(target.map_size)
-    target.use_map(edges)
+    explorer = Explorer(target)
     for data in inputs:
-        edges[:] = bytes(len(edges))
-        if target.run(data):
-            failing.append(data)
-        else:
-            (passing if any(edges) else silent).append(data)
+        edges = explorer.run(data)
+        (failing if target.failure else passing if edges else silent).append(data)
     return failing, passing, silent
 
 
@@ -270,22 +267,23 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | No
     stopped: BaseException | None = None
     left = 0
     with FuzzProgress(campaign.triage.target.image.path.name, time_s, quiet) as progress:
+        campaign.show = progress.show
         try:
-            campaign.run(time_s, progress.show)
-            left = campaign.finish(progress.show, AFTER_S)
+            campaign.run(time_s)
+            left = campaign.finish(AFTER_S)
         except (KeyboardInterrupt, Terminated) as error:
             stopped, limit_s = error, 1.0
             if isinstance(error, KeyboardInterrupt):
                 limit_s = INTERRUPTED_S
                 complain(f"interrupted; looking for {limit_s:.0f} s at most at what is left")
-            left = campaign.finish(progress.show, limit_s)
+            left = campaign.finish(limit_s)
         except PluginError as error:
             stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
             stopped.__cause__ = error
         except BadInput as error:  # of the engine: what was found until then is told first
             stopped = error
             with suppress(BadInput, PluginError):
-                left = campaign.finish(progress.show, INTERRUPTED_S)
+                left = campaign.finish(INTERRUPTED_S)
     code = report(campaign, left, stopped is None, check_in_file, quiet)
     if stopped is not None:
         raise stopped

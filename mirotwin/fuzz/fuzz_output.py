@@ -15,7 +15,7 @@ from miro_exact.bad_input import amount
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
-from mirotwin.fuzz.campaign import Campaign, Status
+from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
@@ -31,12 +31,13 @@ LINE_S = 10.0
 
 
 class FuzzProgress(ProgressBar):
-    """A context manager; `show(status)` may be called as often as one likes. `time_s` None: no end is known."""
+    """A context manager; `show(campaign)` may be called as often as one likes."""
 
     PATIENCE_S = 0.0
 
-    def __init__(self, what: str, time_s: float | None, quiet: bool = False) -> None:
+    def __init__(self, what: str, time_s: float, quiet: bool) -> None:
         super().__init__(f"fuzzing {what}", time_s, quiet)
+        self._time_s = time_s
         self._quiet = quiet
         self._line_s = time.monotonic()
 
@@ -44,15 +45,15 @@ class FuzzProgress(ProgressBar):
         self.to(0.0, said="starting")
         return self
 
-    def show(self, status: Status) -> None:
+    def show(self, campaign: Campaign) -> None:
         """Draws the line again, or writes one if the last is some time ago."""
+        run_s = campaign.run_s
         if self._shown:
-            done = status.run_s if self.total is None else min(status.run_s, self.total)
-            self.to(done, said=said(status))
+            self.to(min(run_s, self._time_s), said=said(campaign))
         elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
             self._line_s = time.monotonic()
-            left = "" if self.total is None else f", {clock(max(0.0, self.total - status.run_s))} left"
-            complain(f"{self.what}: {clock(status.run_s)}: {said(status)}{left}")
+            left = clock(max(0.0, self._time_s - run_s))
+            complain(f"{self.what}: {clock(run_s)}: {said(campaign)}, {left} left")
 
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -61,14 +62,15 @@ class FuzzProgress(ProgressBar):
         return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
 
 
-def said(status: Status) -> str:
+def said(campaign: Campaign) -> str:
     """Rates and counts of a campaign, in short."""
-    parts = [f"{status.executions_per_s:.0f}/s"]
-    if status.edges is not None:  # else the engine has not said yet
-        parts.append(amount(status.edges, "edge"))
-    parts.append(amount(status.crashes or "no", "crash", "crashes"))
-    if status.unconfirmed:
-        parts.append(f"{status.unconfirmed} unconfirmed")
+    edges, triage = campaign.progress().edges, campaign.triage
+    parts = [f"{campaign.rate:.0f}/s"]
+    if edges is not None:  # else the engine has not said yet
+        parts.append(amount(edges, "edge"))
+    parts.append(amount(len(triage.confirmed) or "no", "crash", "crashes"))
+    if triage.unconfirmed:
+        parts.append(f"{len(triage.unconfirmed)} unconfirmed")
     return ", ".join(parts)
 
 
@@ -89,17 +91,17 @@ def report(campaign: Campaign, left: int, complete: bool, check: str | None, qui
     `left`: inputs that were not looked at; `complete`: whether it came to the end of its time. `check`:
     FILE.py:FUNCTION of --check.
     """
-    triage, out = campaign.triage, campaign.folder.path
+    triage, out, progress = campaign.triage, campaign.triage.folder.path, campaign.progress()
     tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
     never = never_reached(tracefile)
     _write_summary(campaign, tracefile, never, left, complete)
-    status = campaign.status()
     if not quiet:
-        edges = "" if status.edges is None else f", {amount(status.edges, 'edge')}"
-        rate = status.executions / status.run_s if status.run_s else 0.0
-        done = f"{amount(status.executions, 'execution')} in {clock(status.run_s)} ({rate:.0f}/s){edges}"
+        edges = "" if progress.edges is None else f", {amount(progress.edges, 'edge')}"
+        made = (
+            f"{amount(progress.executions, 'execution')} in {clock(campaign.run_s)} ({campaign.rate:.0f}/s)"
+        )
         new = f"{amount(campaign.inputs or 'no', 'input')} that found something new"
-        show_line(f"{triage.target.image.path.name}: {done}, {new}")
+        show_line(f"{triage.target.image.path.name}: {made}{edges}, {new}")
         show(table(tracefile))
         if never:
             show_line(f"never reached: {', '.join(never)}")
@@ -130,7 +132,7 @@ def _print_crashes(campaign: Campaign, check: str | None) -> None:
     for crash in triage.confirmed:
         _print_crash(crash, campaign, check)
     if triage.unconfirmed:
-        where = campaign.folder.path / "unconfirmed"
+        where = campaign.triage.folder.path / "unconfirmed"
         what = "not confirmed: wrong on the target, right in a World"
         show_line(f"{len(triage.unconfirmed)} {what}; kept in {where}")
         for crash in triage.unconfirmed:
@@ -144,7 +146,7 @@ def _print_crash(crash: Crash, campaign: Campaign, check: str | None) -> None:
     before, after = crash.sizes
     show_line(f"  {crash.name}{where}: {crash.verdict} ({amount(after, 'byte')}, found with {before}{again})")
     in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
-    stream = campaign.folder.path / crash.folder / f"{crash.name}.stream"
+    stream = campaign.triage.folder.path / crash.folder / f"{crash.name}.stream"
     image = foreign_path(campaign.triage.target.image)
     show_line(f"    {replay_line(stream, image, in_file)}")
     show_line(f"    {debug_line(stream, image, check=in_file)}")
@@ -164,14 +166,14 @@ def _print_covering(campaign: Campaign, symbol: str) -> bool:
 def _write_summary(
     campaign: Campaign, tracefile: Tracefile, never: list[str], left: int, complete: bool
 ) -> None:
-    status = campaign.status()
+    progress = campaign.progress()
     lines, branches = line_share(tracefile), branch_share(tracefile)
     document = {
         "firmware_sha256": campaign.triage.target.image.sha256,
         "complete": complete,
-        "run_s": status.run_s,
-        "executions": status.executions,
-        "edges": status.edges,
+        "run_s": campaign.run_s,
+        "executions": progress.executions,
+        "edges": progress.edges,
         "inputs": campaign.inputs,
         "inputs_left": left,
         "inputs_judged": campaign.judged,
@@ -189,4 +191,4 @@ def _write_summary(
             for crash in campaign.triage.found
         ],
     }
-    campaign.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")
+    campaign.triage.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")

@@ -6,18 +6,28 @@ and radios, and bad stop bits of characters outside a frame, for which a session
 alone, `bytes` no pauses.
 
 Eight random bytes alone never get past the synchronisation, so a campaign begins with frames: what a host may say, each
-kind of it once. A seed is short, and they differ in what a robot does with them.
+kind of it once. A seed is short, and they differ in what a robot does with them. Tokens are words for AFL++.
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Sequence
 
 from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, encode
-from miro_protocol.table import DEFAULT_ACCELERATION, SEQ_MODULUS, FrameType
+from miro_protocol.table import (
+    DEFAULT_ACCELERATION,
+    SEQ_MODULUS,
+    SERVICE_DATA,
+    VELOCITY,
+    VELOCITY_SATURATION,
+    FrameType,
+    Opcode,
+    downlink,
+)
 from miro_protocol.transmission import DOWN, Transmission
 
 SERVICE, FULL, FRAME, AGAIN, RAW, PAUSE, SILENCE, RESET = 5, 6, 7, 8, 9, 10, 11, 15
@@ -166,3 +176,27 @@ def seeds(kind: str, robots: int, slot: int) -> list[bytes]:
         found += [one + bytes([SILENCE, 39]) for one in found[:1]]  # 120 ms of silence at the end
         found += [one + bytes([SILENCE, 173]) for one in found[:1]]  # 522 ms
     return list(dict.fromkeys(found))
+
+
+def wire_tokens(robots: int) -> list[bytes]:
+    """For inputs that are characters: what a frame begins with, and one whole frame of each kind."""
+    form = downlink(robots)
+    still = ((0, 0),) * robots
+    messages: list[Message] = [TeamFrame(kind, 1, still) for kind in (FrameType.TEAM, FrameType.TEAM_ASK)]
+    messages += [
+        ServiceFrame(1, 0, opcode, tuple(field.low for field in SERVICE_DATA[opcode])) for opcode in Opcode
+    ]
+    return [form.lead, form.sync, form.lead + form.sync, *(encode(message, robots) for message in messages)]
+
+
+def message_tokens(robots: int) -> list[bytes]:
+    """For inputs whose frames are sealed by the target: heads of service payloads, and limits of numbers."""
+    heads = [bytes([slot, op]) for op in Opcode for slot in range(robots)]
+    speeds = [limit for field in VELOCITY for limit in (field.low, field.high, field.low - 1)]
+    speeds += [VELOCITY_SATURATION, VELOCITY_SATURATION + 1, -VELOCITY_SATURATION, -VELOCITY_SATURATION - 1]
+    limits = [struct.pack("<h", value) for value in speeds]
+    for fields in SERVICE_DATA.values():
+        for field in fields:
+            for value in (field.low, field.high, min(field.high + 1, (1 << 8 * field.size) - 1)):
+                limits.append(value.to_bytes(field.size, "little"))
+    return heads + limits

@@ -21,12 +21,11 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.inputs import seeds
+from mirotwin.fuzz.spec import MAP_SIZE
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS
 
 NEVER_SLEEPS_CODE = len(NAMES)
-MAP_SIZE = 8192
-"""Bytes of the edge map. AFL++ is 1.5 times as fast with it as with its own 64 KiB; firmware has some hundred edges."""
 
 
 class TargetFailure(msgspec.Struct, frozen=True):

@@ -1,78 +1,34 @@
-"""One campaign of afl-fuzz: its jobs, how far they are, and the inputs that they leave.
-
-The folder, beside what afl-fuzz makes itself (`JOB/queue`, `JOB/crashes`, ..): `JOB.log` is afl-fuzz's output,
-`JOB.target` what the target process complained of, `JOB.counts` how many inputs that has run.
-"""
+"""One campaign of afl-fuzz: on which cores its jobs run, and why one of them ended."""
 
 from __future__ import annotations
 
 import os
-import time
+import re
+import signal
 from collections import Counter
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.job import AflJob
-from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
-from mirotwin.fuzz.engine import Engine, EngineInput, EngineProgress
-
-if TYPE_CHECKING:
-    from mirotwin.fuzz.target import Target
-
-MAP_BYTES = 8192
-RATE_S = 1.0
-"""The rate is measured over at least so long."""
-_ONE_IF_ANY = bytes([0]) + bytes([1]) * 255
-
-
-class EdgeUnion:
-    """Edges of all inputs that were `add`ed. `count` is how many these are.
-
-    The target counts into this object's map from then on: give it another by `use_map` to use it elsewhere.
-    """
-
-    def __init__(self, target: Target) -> None:
-        self._target = target
-        self._edges = bytearray(target.map_size)
-        self._none = bytes(target.map_size)
-        self._seen = 0
-
-    @property
-    def count(self) -> int:
-        """Edges seen."""
-        return self._seen.bit_count()
-
-    def add(self, data: bytes) -> int:
-        """Runs an input; how many edges no input before has executed. Those of a run with a failure do not count."""
-        self._edges[:] = self._none
-        self._target.use_map(self._edges)
-        if self._target.run(data):
-            return 0
-        before = self.count
-        self._seen |= int.from_bytes(self._edges.translate(_ONE_IF_ANY), "little")
-        return self.count - before
+from mirotwin.fuzz.afl.settings import end_with_parent, environment, job_name, line
+from mirotwin.fuzz.engine import Engine, Job
 
 
 def cores_for(jobs: int, proc: Path = Path("/proc")) -> list[int]:
-    """A core for each job, those first to which the fewest other processes are bound. Empty where none can be told."""
-    if not hasattr(os, "sched_getaffinity"):
-        return []
+    """A core for each job, those first to which the fewest other processes are bound."""
     mine = sorted(os.sched_getaffinity(0))
     taken = bound(proc)
     mine.sort(key=lambda core: taken[core])  # a stable sort: equal ones stay in the order of their numbers
     return [mine[job % len(mine)] for job in range(jobs)]
 
 
-def shared_cores(jobs: int) -> str | None:
-    """What there is to say about more jobs than cores, None where there are enough."""
-    if not hasattr(os, "sched_getaffinity"):
-        return None
+def shared_cores(jobs: int) -> list[str]:
+    """What there is to say about more jobs than cores, nothing where there are enough."""
     cores = len(os.sched_getaffinity(0))
     if jobs <= cores:
-        return None
+        return []
     what = f"--jobs {jobs}: this process may use {cores} core{'s' if cores > 1 else ''}, so jobs share them"
-    return f"{what}; --jobs {cores} makes as many executions"
+    return [f"{what}; --jobs {cores} makes as many executions"]
 
 
 def bound(proc: Path) -> Counter[int]:
@@ -91,97 +47,77 @@ def bound(proc: Path) -> Counter[int]:
 
 
 class AflRun(Engine):
-    """A campaign: each of the jobs is an afl-fuzz.
-
-    `watch`: a target by which new edges are counted at once: afl-fuzz says them after a minute. `lengths`: the shortest
-    and the longest input in bytes that it makes.
-
-    Raises BadInput for AFL++ that is missing and a folder without seeds; `start` for a program that cannot be started.
-    """
-
-    def __init__(
-        self, given: EngineInput, watch: Target, lengths: tuple[int, int] = (1, LONGEST_BYTES)
-    ) -> None:
-        given.check("AFL++", missing())
-        super().__init__()
-        _require_seeds(given.seeds)
-        self._call = Call(given, lengths)
-        self._environment = environment(os.environ, MAP_BYTES)
-        self._out = given.out
-        self.jobs = [AflJob(given.out, job_name(job, given.jobs)) for job in range(given.jobs)]
-        self._union = EdgeUnion(watch)
-        self._counted: dict[Path, None] = {}
-        self._rate_s = 0.0
-        self._rate_executions = 0
-        self._per_s = 0.0
-
-    def notes(self) -> list[str]:
-        """What a user should know before it starts: more jobs than cores."""
-        note = shared_cores(len(self.jobs))
-        return [] if note is None else [note]
+    """A campaign: each of the jobs is an afl-fuzz that is bound to a core."""
 
     def start(self) -> None:
-        """Starts all jobs. An afl-fuzz that ends at once is told by the next call of another method."""
-        self._out.mkdir(parents=True, exist_ok=True)
-        self._rate_s = time.monotonic()
-        self._rate_executions = self._executions()
-        cores: list[int | None] = [*cores_for(len(self.jobs))] or [None] * len(self.jobs)
-        for number, (job, core) in enumerate(zip(self.jobs, cores, strict=True)):
-            job.start(self._call.line(number), self._environment, core)
+        given = self.given
+        given.out.mkdir(parents=True, exist_ok=True)
 
-    def stop(self) -> None:
-        for job in self.jobs:
-            job.interrupt()
-        for job in self.jobs:
-            job.wait()
+        def prepare(core: int) -> None:
+            end_with_parent(signal.SIGINT)
+            os.sched_setaffinity(0, {core})
 
-    def progress(self) -> EngineProgress:
-        self._require_health()
-        return EngineProgress(self._executions(), self._rate(), self._edges())
+        for number, core in enumerate(cores_for(given.jobs)):
+            name = job_name(number, given.jobs)
+            begin = partial(prepare, core)
+            job = Job(given.out, name, line(given, number), environment(os.environ), preexec_fn=begin)
+            self.jobs.append(job)
 
-    # ---- what the jobs leave -------------------------------------------------------------------------------
+    def _interrupt(self, job: Job) -> None:
+        job.process.send_signal(signal.SIGINT)
 
-    def _require_health(self) -> None:
-        for job in self.jobs:
-            _ = job.running
-            job.shorten_log()
-
-    def _inputs(self, kind: str) -> list[Path]:
-        names = [job.name for job in self.jobs]
-        return [path for job in self.jobs for path in job.inputs(kind, names)]
-
-    def _is_whole(self, path: Path) -> bool:
-        return bool(_content(path))
-
-    def _executions(self) -> int:
-        return sum(job.executions() for job in self.jobs)
-
-    def _rate(self) -> float:
-        now_s, executions = time.monotonic(), self._executions()
-        passed_s = now_s - self._rate_s
-        if passed_s >= RATE_S:
-            self._per_s = (executions - self._rate_executions) / passed_s
-            self._rate_s, self._rate_executions = now_s, executions
-        return self._per_s
-
-    def _edges(self) -> int:
-        for path in self._inputs("queue"):
-            if path not in self._counted and (data := _content(path)):
-                self._counted[path] = None
-                self._union.add(data)
-        return self._union.count
+    def _why_ended(self, job: Job) -> BadInput:
+        return why_ended(job.log, job.complaint)
 
 
-def _require_seeds(folder: Path) -> None:
-    if not folder.is_dir():
-        raise BadInput(folder, "", "is no folder", "give a folder of inputs, one a file")
-    if not any(path.is_file() and path.stat().st_size for path in folder.iterdir()):
-        raise BadInput(folder, "", "holds no file that is not empty", "put at least one input into it")
+_COLOUR = re.compile(r"\x1b(\[[0-9;?]*[a-zA-Z]|[()].)")
+_ABORT = re.compile(r"\[-\]\s+(?:PROGRAM ABORT|SYSTEM ERROR) : (.*)")
+_REASON = re.compile(r"OS message : (.*)")
+
+REMEDIES = (
+    (
+        "valid input seed that does not crash",
+        "each seed fails by itself: these are crashes; give one that does not",
+    ),
+    ("No usable test cases", "give a folder with at least one file that is not empty"),
+    ("no test cases", "give a folder with at least one file that is not empty"),
+    ("core_pattern", "run `echo core | sudo tee /proc/sys/kernel/core_pattern`"),
+    ("CPU scaling", "set AFL_SKIP_CPUFREQ=1"),
+    ("free CPU cores", "give fewer --jobs, or end other programs that are bound to cores"),
+    ("' is in use", "another campaign runs in this folder: end it, or choose another one"),
+    ("shmget", "segments of killed programs may fill the limit: see `ipcs -m`, remove them with `ipcrm`"),
+    ("initializing fork server", "the target took too long to start: give fewer --jobs"),
+    ("cleanup failed", "something in it is not afl-fuzz's: choose another folder"),
+    ("Unable to create", "choose a folder that can be written to"),
+    ("Unable to open", "choose a folder that can be read"),
+)
+"""A part of afl-fuzz's line -> what to do about it. The first that fits counts."""
+
+_ELSE = "its whole output is in the file named first"
 
 
-def _content(path: Path) -> bytes:
-    """The input at `path`; empty while afl-fuzz writes it, or writes a shorter one in its place."""
+def why_ended(log: Path, target: Path) -> BadInput:
+    """What is to be told of an afl-fuzz that ended by itself with an error.
+
+    `log` is its output. `target` is what the target process complained of, if it did: that is the cause then.
+    """
+    own = _read(target).strip().splitlines()
+    if own:
+        return BadInput(target, len(own), own[-1], "" if len(own) == 1 else f"whole text: {target}")
+    text = _COLOUR.sub("", _read(log))
+    found = list(_ABORT.finditer(text))
+    if not found:
+        last = next((line for line in reversed(text.splitlines()) if line.strip()), "it said nothing")
+        return BadInput(log, "", f"afl-fuzz ended: {last.strip()}", _ELSE)
+    line = found[-1][1].strip()
+    reason = _REASON.search(text, found[-1].end())
+    said = f"{line} ({reason[1].strip()})" if reason else line
+    remedy = next((what for part, what in REMEDIES if part in said), _ELSE)
+    return BadInput(log, "", f"afl-fuzz ended: {said}", remedy)
+
+
+def _read(path: Path) -> str:
     try:
-        return path.read_bytes()
+        return path.read_text(encoding="utf-8", errors="replace")
     except FileNotFoundError:
-        return b""
+        return ""

@@ -3,7 +3,7 @@
     python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
 
 SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,
-`BESIDE.counts` how many inputs it has run (`job.Counts`).
+`BESIDE.counts` how many inputs it has run (`engine.counter`).
 
 AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
 puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too
@@ -29,8 +29,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.job import Counts
 from mirotwin.fuzz.afl.settings import end_with_parent
+from mirotwin.fuzz.engine import counter
 from mirotwin.fuzz.spec import spec_of
 
 if TYPE_CHECKING:
@@ -95,8 +95,8 @@ def hello(map_size: int) -> bytes:
     return struct.pack("<I", options)
 
 
-def answer(target: Target, cases: memoryview, control: int, status: int, keep: Callable[[], None]) -> None:
-    """Runs what AFL++ puts into `cases` until it closes `control`. `keep` is called now and then."""
+def answer(target: Target, cases: memoryview, control: int, status: int, keep: Callable[[int], None]) -> None:
+    """Runs what AFL++ puts into `cases` until it closes `control`. `keep` is told the executions now and then."""
     length, data = cases[:4].cast("I"), cases[4:]
     answers = [struct.pack("<II", NO_PROCESS, wait_status(kind)) for kind in range(256)]
     run, read, write = target.run, os.read, os.write
@@ -105,25 +105,25 @@ def answer(target: Target, cases: memoryview, control: int, status: int, keep: C
             if not read(control, 4):
                 return
             write(status, answers[run(data[: length[0]])])
-        keep()
+        keep(target.executions)
 
 
-def serve(target: Target, counts: Counts, control: int = CONTROL_FD, status: int = STATUS_FD) -> bool:
+def serve(target: Target, keep: Callable[[int], None]) -> bool:
     """Serves AFL++ until it ends; False when there is none."""
     if MAP_VARIABLE in os.environ:
         target.use_map(attach(int(os.environ[MAP_VARIABLE]))[: target.map_size])
-    if not _is_writable(status):
+    if not _is_writable(STATUS_FD):
         return False
     if MAP_VARIABLE not in os.environ:
         raise BadInput("AFL++", "", f"{MAP_VARIABLE} is not set", "start this program by afl-fuzz")
     with suppress(BrokenPipeError):  # AFL++ has ended
-        os.write(status, hello(target.map_size))
-        if not os.read(control, 4):
+        os.write(STATUS_FD, hello(target.map_size))
+        if not os.read(CONTROL_FD, 4):
             return True
         if CASES_VARIABLE not in os.environ:
             raise BadInput("AFL++", "", f"{CASES_VARIABLE} is not set", "install AFL++ 4.00c or newer")
         cases = attach(int(os.environ[CASES_VARIABLE]))
-        answer(target, cases, control, status, lambda: counts.keep(target.executions))
+        answer(target, cases, CONTROL_FD, STATUS_FD, keep)
     return True
 
 
@@ -150,9 +150,8 @@ def main(arguments: Sequence[str]) -> int:
     beside = arguments[1] if len(arguments) > 1 else ""
     try:
         target = spec_of(arguments[0]).make()
-        with Counts(Path(f"{beside}.counts") if beside else None) as counts:
-            if serve(target, counts):
-                return NOTHING
+        if serve(target, counter(Path(f"{beside}.counts")) if beside else lambda executions: None):
+            return NOTHING
         return run_once(target, sys.stdin.buffer.read())
     except BadInput as error:
         _complain(beside, f"{error}")

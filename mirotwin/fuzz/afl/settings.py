@@ -5,18 +5,14 @@ from __future__ import annotations
 import ctypes
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
-
-import msgspec
+from collections.abc import Mapping
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import EngineInput
+from mirotwin.fuzz.spec import MAP_SIZE
 from mirotwin.shell.program import python_module
 
 PROGRAM = "afl-fuzz"
-LONGEST_BYTES = 1024
-"""Inputs that afl-fuzz makes are not longer: a thousand characters are a second on the air, and a hundred frames."""
-
 ANSWER_MS = 10_000
 """Time for one execution. The server answers at once at its end (`serve`), so that AFL++ never sees it pass."""
 
@@ -37,43 +33,33 @@ REASONS = {
 not know: it warns and sleeps 2 s for such a one."""
 
 
-def environment(inherited: Mapping[str, str], map_size: int) -> dict[str, str]:
+def environment(inherited: Mapping[str, str]) -> dict[str, str]:
     """The environment of afl-fuzz: what is inherited, and what `REASONS` names. Ours win."""
     ours = dict.fromkeys(REASONS, "1")
-    ours |= {"AFL_MAP_SIZE": str(map_size), "AFL_FORKSRV_INIT_TMOUT": str(START_MS)}
+    ours |= {"AFL_MAP_SIZE": str(MAP_SIZE), "AFL_FORKSRV_INIT_TMOUT": str(START_MS)}
     return {**inherited, **ours}
 
 
-class Call(msgspec.Struct, frozen=True):
-    """One call of afl-fuzz, without what differs from job to job.
+def line(given: EngineInput, job: int) -> list[str]:
+    """The command of one of the jobs: the first is the main one, the others take its crashes over.
 
-    `lengths`: the shortest and the longest input in bytes that it makes. Where a seed is given, afl-fuzz takes all
-    inputs for equally fast, so that its choices do not depend on time.
+    Where a seed is given, afl-fuzz takes all inputs for equally fast, so that its choices do not depend on time. Raises
+    BadInput for a folder whose name means something to afl-fuzz.
     """
-
-    given: EngineInput
-    lengths: tuple[int, int] = (1, LONGEST_BYTES)
-
-    def line(self, job: int) -> list[str]:
-        """The command of one of the jobs: the first is the main one, the others take its crashes over.
-
-        Raises BadInput for a folder whose name means something to afl-fuzz.
-        """
-        given = self.given
-        name = job_name(job, given.jobs)
-        options = ["-i", str(given.seeds), "-o", str(given.out), "-t", str(ANSWER_MS)]
-        options += ["-g", str(self.lengths[0]), "-G", str(self.lengths[1])]
-        if given.jobs > 1:
-            options += ["-M" if job == 0 else "-S", name]
-        if given.dictionary is not None:
-            options += ["-x", str(given.dictionary)]
-        if given.seed is not None:
-            options += ["-s", str(given.seed + job)]
-        beside = str(given.out / name)
-        if "@@" in beside:
-            raise BadInput(given.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
-        server = python_module("mirotwin.fuzz.afl.serve", given.target, beside)
-        return [shutil.which(PROGRAM) or PROGRAM, *options, "--", *server]
+    name, (shortest, longest) = job_name(job, given.jobs), given.lengths
+    options = ["-i", str(given.seeds), "-o", str(given.out), "-t", str(ANSWER_MS)]
+    options += ["-g", str(shortest), "-G", str(longest)]
+    if given.jobs > 1:
+        options += ["-M" if job == 0 else "-S", name]
+    if given.dictionary is not None:
+        options += ["-x", str(given.dictionary)]
+    if given.seed is not None:
+        options += ["-s", str(given.seed + job)]
+    beside = str(given.out / name)
+    if "@@" in beside:
+        raise BadInput(given.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
+    server = python_module("mirotwin.fuzz.afl.serve", given.target, beside)
+    return [PROGRAM, *options, "--", *server]
 
 
 def job_name(job: int, jobs: int) -> str:
@@ -83,14 +69,13 @@ def job_name(job: int, jobs: int) -> str:
     return "main" if job == 0 else f"job{job}"
 
 
-def missing(programs: Sequence[str] = (PROGRAM,)) -> str | None:
+def missing() -> str | None:
     """What of AFL++ is missing and how to get it; None where all is there."""
     if sys.platform != "linux":
         return f"AFL++ is spoken to by System V shared memory as Linux has it; this is {sys.platform}"
-    absent = [program for program in programs if shutil.which(program) is None]
-    if not absent:
-        return None
-    return f"{', '.join(absent)} is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
+    if shutil.which(PROGRAM) is None:
+        return f"{PROGRAM} is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
+    return None
 
 
 _SET_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG, `man 2 prctl`

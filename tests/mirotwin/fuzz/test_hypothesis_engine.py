@@ -12,10 +12,9 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.program import INPUTS, OPERATIONS
 from miro_robot.image import load_hex
 from mirotwin.fuzz import hypothesis_process
-from mirotwin.fuzz.engine import EngineInput
-from mirotwin.fuzz.hypothesis_engine import HypothesisRun
+from mirotwin.fuzz.engine import EngineInput, Explorer
 from mirotwin.fuzz.hypothesis_inputs import inputs
-from mirotwin.fuzz.hypothesis_process import Explorer, explore
+from mirotwin.fuzz.hypothesis_process import HypothesisRun, explore
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import RobotTarget, TargetFailure
 
@@ -145,7 +144,7 @@ def waited(run, limit_s=60.0):
 def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(tmp_path, seeds):
     crashes = []
     queue = []
-    with HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", jobs=2, seed=5)) as run:
+    with HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", jobs=2, seed=5), Toy()) as run:
         for _ in waited(run):
             crashes += run.new_crashes()
             queue += run.new_queue()
@@ -154,7 +153,7 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
                 break
         begun_s = time.monotonic()
     assert time.monotonic() - begun_s < 2.0
-    assert all(process.poll() is not None for process in run._processes)
+    assert not any(job.running for job in run.jobs)
     assert len(set(crashes)) == len(crashes)
     assert {path.parent.parent.name for path in crashes} == {"job0", "job1"}
     assert crashes[0].read_bytes().startswith(b"FZ")
@@ -162,13 +161,14 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
     run.stop()
 
 
-def test_a_process_that_somebody_kills_is_told(tmp_path, seeds):
-    with HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", seed=5)) as run:
+def test_a_process_on_the_engine_that_is_asked_for_that_somebody_kills_is_told(tmp_path, seeds):
+    spec = TargetSpec(input="bytes", maker=TOY.maker, engine="python")
+    with HypothesisRun(EngineInput(spec.text(), seeds, tmp_path / "out", seed=5), Toy()) as run:
         for _ in waited(run):
             if run.progress().executions:
                 break
-        run._processes[0].kill()
-        run._processes[0].wait()
+        run.jobs[0].process.kill()
+        run.jobs[0].process.wait()
         with pytest.raises(BadInput, match="Hypothesis"):
             run.progress()
 
@@ -176,7 +176,7 @@ def test_a_process_that_somebody_kills_is_told(tmp_path, seeds):
 def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(tmp_path, seeds):
     spec = TargetSpec(image=str(tmp_path / "none.ihx"))
     with (
-        HypothesisRun(EngineInput(spec.text(), seeds, tmp_path / "out")) as run,
+        HypothesisRun(EngineInput(spec.text(), seeds, tmp_path / "out"), Toy()) as run,
         pytest.raises(BadInput, match=r"none\.ihx"),
     ):
         _wait_for_ever(run)
@@ -185,8 +185,3 @@ def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(tmp_pa
 def _wait_for_ever(run):
     for _ in waited(run):
         run.progress()
-
-
-def test_no_job_is_refused(tmp_path, seeds):
-    with pytest.raises(BadInput, match=r"^--jobs: 0: there is nothing to do; give 1 or more$"):
-        HypothesisRun(EngineInput(TOY.text(), seeds, tmp_path / "out", jobs=0))

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mirotwin.fuzz.afl import serve
-from mirotwin.fuzz.afl.job import read_executions
 from mirotwin.fuzz.afl.serve import CASES_VARIABLE, MAP_VARIABLE, attach, wait_status
+from mirotwin.fuzz.engine import read_executions
+from mirotwin.fuzz.spec import TargetSpec
 from tests import children
-from tests.mirotwin.fuzz.afl.double import MAP_SIZE, ROOT, WORD, spec
+from tests.mirotwin.fuzz.afl.double import MAKER, MAP_SIZE, ROOT, WORD, spec
 
 PRIVATE, CREATE, REMOVE = 0, 0o1000, 0
 CASES_BYTES = 4096
@@ -219,6 +220,10 @@ def test_shared_memory_that_is_not_there_is_an_error():
 def test_without_afl_standard_input_is_run_once_and_told():
     assert by_hand(spec(), WORD + b"Y") == (1, "word: found at 4 (tick 24, PC 0x0004)\n44 55 43 4b 59\n", "")
     assert by_hand(spec(), b"hello") == (0, "nothing found\n", "")
+
+
+def test_the_target_runs_on_the_engine_that_is_asked_for():
+    assert by_hand(TargetSpec(maker=MAKER, engine="python"), b"hello") == (0, "nothing found\n", "")
 
 
 UNUSABLE = {
