@@ -81,7 +81,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
         script.wait_until(other.now)
         script.expect(script.now, "", lambda observed: None)
 
-    rule = Rule("P24", "", "", ways, (topology,))
+    rule = Rule("P24", "", ways, (topology,))
     (listener,) = listen(make_trial(rule), image, seed)
     right = said[0][1]
     return (

@@ -53,18 +53,18 @@ THREE = (Topology(3, (1,)),)
 
 
 class Rule(msgspec.Struct, frozen=True):
-    """`text` is a sentence with MUST, `source` the page and section that it comes from.
+    """`source` is the page and section that it comes from.
 
     `write` writes the trial: what the host of a network sends, and what its robots have to make of it. It is called
-    for each of `topologies`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of
-    others. `lm629`: the chips of its robots. `presupposes`: ids of rules without which its trial says nothing about
-    its own sentence; where one of them failed, this one is not judged. `broken`: what firmware does that breaks it,
-    for rules that others presuppose. `probe` finds out more about such firmware, in the network that is given; it may
-    find nothing, "".
+    for each of `topologies`; its name is the rule's, and its docstring the rule, a sentence with MUST.
+
+    `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others. `lm629`: the chips
+    of its robots. `presupposes`: ids of rules without which its trial says nothing about its own sentence; where one of
+    them failed, this one is not judged. `broken`: what firmware does that breaks it, for rules that others presuppose.
+    `probe` finds out more about such firmware, in the network that is given; it may find nothing, "".
     """
 
     id: str
-    text: str
     source: str
     write: Written
     topologies: tuple[Topology, ...] = BOTH
@@ -79,19 +79,23 @@ class Rule(msgspec.Struct, frozen=True):
         """A few words, for tables."""
         return self.write.__name__.replace("_", " ")
 
+    @property
+    def text(self) -> str:
+        return " ".join((self.write.__doc__ or "").split())
+
 
 class Chapter:
-    """Collects the rules of a file: `@chapter.rule("P01", "The robot MUST ..", SOURCE)` before each function."""
+    """Collects the rules of a file: `@chapter.rule("P03", SOURCE, presupposes="P01 P02")` before each function."""
 
     def __init__(self, title: str) -> None:
         self.title = title
         self.rules: list[Rule] = []
 
-    def rule(self, id: str, text: str, source: str, **more: Any) -> Callable[[Written], Written]:
+    def rule(self, id: str, source: str, presupposes: str = "", **more: Any) -> Callable[[Written], Written]:
         """`more`: other fields of the rule."""
 
         def keep(write: Written) -> Written:
-            self.rules.append(Rule(id, text, source, write, **more))
+            self.rules.append(Rule(id, source, write, presupposes=tuple(presupposes.split()), **more))
             return write
 
         return keep

@@ -34,14 +34,15 @@ _AT_SPEED = 40
 
 @CHAPTER.rule(
     "P41",
-    "The robot in slot seq mod N MUST answer a fresh frame of type 3, with that frame's seq and its own slot, and the"
-    " answer MUST be over before the next question can be: 33.37 ms after it.",
     TURNS,
+    presupposes="P42",
     topologies=(*BOTH, Topology(3, (0, 1, 2)), Topology(5, (0, 1, 2, 3, 4))),
-    presupposes=("P42",),
     broken="a question is not answered in turn",
 )
 def in_turn(script: TrialScript) -> None:
+    """The robot in slot seq mod N MUST answer a fresh frame of type 3, with that frame's seq and its own slot, and the
+    answer MUST be over before the next question can be: 33.37 ms after it.
+    """
     script.seq = 59
     for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
         question = script.team(ask=True, what="question", gap_ms=36.0)
@@ -52,15 +53,11 @@ def in_turn(script: TrialScript) -> None:
             script.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
 
 
-@CHAPTER.rule(
-    "P42",
-    "An answer MUST be 19 characters without a pause, at 9615 baud +- 1 %: 55h four times, FFh, 2Dh D4h, HDR to CRC"
-    " whitened, CRC with the layout byte 1Eh.",
-    FRAME,
-    presupposes=("P16",),
-    broken="an answer is not well formed",
-)
+@CHAPTER.rule("P42", FRAME, presupposes="P16", broken="an answer is not well formed")
 def form(script: TrialScript) -> None:
+    """An answer MUST be 19 characters without a pause, at 9615 baud +- 1 %: 55h four times, FFh, 2Dh D4h, HDR to CRC
+    whitened, CRC with the layout byte 1Eh.
+    """
     for _ in range(3 * script.n):  # whoever it takes itself for
         _formed(script, script.team(ask=True, what="question", gap_ms=36.0))
     end = script.now
@@ -101,15 +98,11 @@ def _badly_formed(heard: list[Event], question: Frame, observed: Observed) -> st
     return ""
 
 
-@CHAPTER.rule(
-    "P43",
-    "A robot MUST speak only when it is asked: not on type 0 and 1, not on questions to others, nor on those that are"
-    " not fresh or not valid.",
-    TURNS,
-    presupposes=("P07", "P09", "P20", "P41"),
-    broken="a robot speaks unasked",
-)
+@CHAPTER.rule("P43", TURNS, presupposes="P07 P09 P20 P41", broken="a robot speaks unasked")
 def unasked(script: TrialScript) -> None:
+    """A robot MUST speak only when it is asked: not on type 0 and 1, not on questions to others, nor on those that are
+    not fresh or not valid.
+    """
     slot = script.topology.slots[0]
     script.silent(0, script.now, "nobody asks")
     for _ in range(script.n + 1):
@@ -131,13 +124,9 @@ def unasked(script: TrialScript) -> None:
     script.answered(script.ask(slot, gap_ms=36.0), slot)
 
 
-@CHAPTER.rule(
-    "P44",
-    "A robot MUST hear the next frame while it answers, and what it hears MUST NOT disturb its answer.",
-    TURNS,
-    presupposes=("P04", "P41"),
-)
+@CHAPTER.rule("P44", TURNS, presupposes="P04 P41")
 def full_duplex(script: TrialScript) -> None:
+    """A robot MUST hear the next frame while it answers, and what it hears MUST NOT disturb its answer."""
     slot = script.topology.slots[0]
     for _ in range(3):
         question = script.ask(slot, gap_ms=0.0)
@@ -149,14 +138,11 @@ def full_duplex(script: TrialScript) -> None:
     script.obeyed(script.ask(slot, lead=b"", gap_ms=40.0))
 
 
-@CHAPTER.rule(
-    "P45",
-    "The flags MUST say whether since the last answer the robot stopped (08h, 110 ms) and put its motors off (10h,"
-    " 500 ms), and an answer MUST clear them; all other flags are 0.",
-    FRAME,
-    presupposes=("P32", "P43"),
-)
+@CHAPTER.rule("P45", FRAME, presupposes="P32 P43")
 def flags(script: TrialScript) -> None:
+    """The flags MUST say whether since the last answer the robot stopped (08h, 110 ms) and put its motors off (10h, 500
+    ms), and an answer MUST clear them; all other flags are 0.
+    """
     both = Flags.STOPPED | Flags.MOTORS_OFF
     _says_flags(script, Flags.MOTORS_OFF, " of power-on")
     for silence_ms, frames, wanted in (
@@ -200,13 +186,9 @@ def _flagged(wanted: int, answer: Answer, observed: Observed) -> str:
     return "" if answer.said.flags == wanted else f"{answer.said.flags:02X}h"
 
 
-@CHAPTER.rule(
-    "P46",
-    "The status bytes MUST be those of the left and of the right LM629.",
-    FRAME,
-    presupposes=("P35", "P41"),
-)
+@CHAPTER.rule("P46", FRAME, presupposes="P35 P41")
 def status(script: TrialScript) -> None:
+    """The status bytes MUST be those of the left and of the right LM629."""
     script.team()
     _says(script, "the chips' status", _status)
     _run_away(script)  # then they differ
@@ -253,14 +235,11 @@ def _around(answer: Answer, observed: Observed) -> tuple[RobotPeriod, RobotPerio
     return before[-1], (after or [observed.periods[-1][1]])[0]
 
 
-@CHAPTER.rule(
-    "P47",
-    "The positions MUST be the low 16 bits of the real positions of both wheels, as they are when the robot answers.",
-    FRAME,
-    presupposes=("P35", "P41"),
-    broken="positions in answers are wrong",
-)
+@CHAPTER.rule("P47", FRAME, presupposes="P35 P41", broken="positions in answers are wrong")
 def positions(script: TrialScript) -> None:
+    """The positions MUST be the low 16 bits of the real positions of both wheels, as they are when the robot
+    answers.
+    """
     slot = script.topology.slots[0]
     for _ in range(10):  # beyond 65536 counts, one wheel forward and one backward
         script.team(script.same(slot, 13000, -12000), gap_ms=50.0)
@@ -320,15 +299,11 @@ def _within(position: int, ends: tuple[int, int]) -> bool:
     return (position - low) & 0xFFFF <= high - low
 
 
-@CHAPTER.rule(
-    "P48",
-    "`accepted` MUST count the fresh frames since power-on, the question itself included, and wrap at 256; no other"
-    " frame counts.",
-    FRAME,
-    topologies=THREE,
-    presupposes=("P17", "P34", "P40", "P41"),
-)
+@CHAPTER.rule("P48", FRAME, presupposes="P17 P34 P40 P41", topologies=THREE)
 def accepted(script: TrialScript) -> None:
+    """`accepted` MUST count the fresh frames since power-on, the question itself included, and wrap at 256; no other
+    frame counts.
+    """
     count = 0
 
     def counted(wanted: int) -> None:
@@ -353,15 +328,11 @@ def _counts(name: str, wanted: int, answer: Answer, observed: Observed) -> str:
     return "" if found == wanted % 256 else number(found, 2)
 
 
-@CHAPTER.rule(
-    "P49",
-    "`rejected` MUST count the windows whose sync, stop bits and spacings are good and whose CRC is bad, and wrap at"
-    " 256; nothing else counts.",
-    RECEPTION,
-    topologies=BOTH,
-    presupposes=("P06", "P13", "P41"),
-)
+@CHAPTER.rule("P49", RECEPTION, presupposes="P06 P13 P41")
 def rejected(script: TrialScript) -> None:
+    """`rejected` MUST count the windows whose sync, stop bits and spacings are good and whose CRC is bad, and wrap at
+    256; nothing else counts.
+    """
     count = 0
     size = script.form.size
 
@@ -388,14 +359,9 @@ def rejected(script: TrialScript) -> None:
         counted()
 
 
-@CHAPTER.rule(
-    "P50",
-    "A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it.",
-    FRESHNESS,
-    topologies=THREE,
-    presupposes=("P41",),
-)
+@CHAPTER.rule("P50", FRESHNESS, presupposes="P41", topologies=THREE)
 def after_silence(script: TrialScript) -> None:
+    """A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it."""
     slot = script.topology.slots[0]
     for silence_ms in (130.0, 700.0):
         script.answered(script.ask(slot, gap_ms=36.0), slot)

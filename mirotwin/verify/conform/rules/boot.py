@@ -18,28 +18,20 @@ STRAPS = Chapter("Straps")
 _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
 
 
-@CHAPTER.rule(
-    "P01",
-    "From power-on until the first fresh team frame both motors MUST be off, however long that takes.",
-    POWER_ON,
-    presupposes=("P24",),
-    broken="a motor is on before the first team frame",
-)
+@CHAPTER.rule("P01", POWER_ON, presupposes="P24", broken="a motor is on before the first team frame")
 def motors_off(script: TrialScript) -> None:
+    """From power-on until the first fresh team frame both motors MUST be off, however long that takes."""
     script.wait(600.0)
     first = script.team()
     keeps_off(script, 0, first.tick)
     script.obeyed(first)
 
 
-@CHAPTER.rule(
-    "P02",
-    "Both LM629 MUST leave reset together, and RESET (00h) MUST never be sent to one alone: their samples coincide;"
-    " RSTI 0000h follows, and both show 80h or C0h.",
-    POWER_ON,
-    presupposes=("P03",),
-)
+@CHAPTER.rule("P02", POWER_ON, presupposes="P03")
 def reset_together(script: TrialScript) -> None:
+    """Both LM629 MUST leave reset together, and RESET (00h) MUST never be sent to one alone: their samples coincide;
+    RSTI 0000h follows, and both show 80h or C0h.
+    """
     script.wait(60.0)
     first = script.team()
     script.obeyed(first)
@@ -76,14 +68,9 @@ def reset_together(script: TrialScript) -> None:
     script.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
 
 
-@CHAPTER.rule(
-    "P03",
-    f"A robot MUST be ready {BOOTED_MS:g} ms after power-on: it acts on a frame that begins then.",
-    POWER_ON,
-    presupposes=("P24",),
-    broken="it is not ready 40 ms after power-on",
-)
+@CHAPTER.rule("P03", POWER_ON, presupposes="P24", broken="it is not ready 40 ms after power-on")
 def ready(script: TrialScript) -> None:
+    """A robot MUST be ready 40 ms after power-on: it acts on a frame that begins then."""
     script.seq = 0  # P19 has other numbers
     script.obeyed(script.team())
 
@@ -108,8 +95,8 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
 
 @STRAPS.rule(
     "P60",
-    "A robot whose slot pins say N or more MUST never move and never answer.",
     TURNS,
+    presupposes="P41",
     topologies=(
         Topology(3, (1,)),
         Topology(3, (1,), strap=3),
@@ -117,9 +104,9 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
         Topology(3, (1,), strap=7),
         Topology(5, (3,), strap=5),
     ),
-    presupposes=("P41",),
 )
 def no_slot(script: TrialScript) -> None:
+    """A robot whose slot pins say N or more MUST never move and never answer."""
     for _ in range(2):
         for slot in range(script.n):
             script.team()

@@ -19,15 +19,11 @@ _NEVER_FREE = Lm629Options(busy_clocks=1 << 20)  # 175 ms after each command
 _NEVER_UP = Lm629Options(reset_clocks=1 << 24)  # 2.8 s: the trial is over before
 
 
-@CHAPTER.rule(
-    "P57",
-    "LM629s that take the data sheet's longest times, 1.5 ms for a reset and 100 us for a command or a word, and that"
-    " show C4h after a reset, MUST be waited for: the robot does as with others.",
-    POWER_ON,
-    lm629=_SLOW,
-    presupposes=("P47",),
-)
+@CHAPTER.rule("P57", POWER_ON, presupposes="P47", lm629=_SLOW)
 def slow(script: TrialScript) -> None:
+    """LM629s that take the data sheet's longest times, 1.5 ms for a reset and 100 us for a command or a word, and that
+    show C4h after a reset, MUST be waited for: the robot does as with others.
+    """
     slot = script.topology.slots[0]
     for _ in range(3):
         script.obeyed(script.team())
@@ -37,27 +33,19 @@ def slow(script: TrialScript) -> None:
     nothing_refused(script)
 
 
-@CHAPTER.rule(
-    "P58",
-    "With LM629s that do not come out of reset, motors MUST stay off, and a robot MUST answer all the same and say so"
-    " (20h).",
-    FRAME,
-    lm629=_NEVER_UP,
-    presupposes=("P41",),
-    broken="a broken LM629 is not told of",
-)
+@CHAPTER.rule("P58", FRAME, presupposes="P41", lm629=_NEVER_UP, broken="a broken LM629 is not told of")
 def broken(script: TrialScript) -> None:
+    """With LM629s that do not come out of reset, motors MUST stay off, and a robot MUST answer all the same and say so
+    (20h).
+    """
     _tells_of_them(script)
 
 
-@CHAPTER.rule(
-    "P59",
-    "LM629s that stay busy MUST NOT be waited for without end: motors stay off, and a robot answers and says so (20h).",
-    PORT,
-    lm629=_NEVER_FREE,
-    presupposes=("P58",),
-)
+@CHAPTER.rule("P59", PORT, presupposes="P58", lm629=_NEVER_FREE)
 def busy(script: TrialScript) -> None:
+    """LM629s that stay busy MUST NOT be waited for without end: motors stay off, and a robot answers and says so
+    (20h).
+    """
     _tells_of_them(script)
 
 

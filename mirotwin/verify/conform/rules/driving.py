@@ -12,7 +12,7 @@ from miro_robot.lm629.commands import BY_NAME
 from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.probe import why_deaf
 from mirotwin.verify.conform.rule import FIRMWARE, FRAME, TURNS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import ACTING_MS, Found, Frame, How, TrialScript, ms
+from mirotwin.verify.conform.trial_script import Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")
 _LTRJ = BY_NAME["LTRJ"].opcode
@@ -22,38 +22,23 @@ _ANY_BOOT_MS = 260.0
 """More than that of P03, which presupposes P24."""
 
 
-@CHAPTER.rule(
-    "P22",
-    "In a network of 3, each robot MUST take the velocities of its own slot.",
-    FRAME,
-    topologies=(Topology(3, (0, 1, 2)),),
-    presupposes=("P19",),
-)
+@CHAPTER.rule("P22", FRAME, presupposes="P19", topologies=(Topology(3, (0, 1, 2)),))
 def own_slot_of_three(script: TrialScript) -> None:
+    """In a network of 3, each robot MUST take the velocities of its own slot."""
     for _ in range(4):
         script.obeyed(script.team())
 
 
-@CHAPTER.rule(
-    "P23",
-    "In a network of 5, each robot MUST take the velocities of its own slot.",
-    FRAME,
-    topologies=(Topology(5, (0, 1, 2, 3, 4)),),
-    presupposes=("P19",),
-)
+@CHAPTER.rule("P23", FRAME, presupposes="P19", topologies=(Topology(5, (0, 1, 2, 3, 4)),))
 def own_slot_of_five(script: TrialScript) -> None:
+    """In a network of 5, each robot MUST take the velocities of its own slot."""
     for _ in range(4):
         script.obeyed(script.team())
 
 
-@CHAPTER.rule(
-    "P24",
-    f"On a fresh frame of type 0 or 3 both LM629 MUST be told the velocities within {ACTING_MS:g} ms of its end.",
-    FRAME,
-    broken="a plain team frame is not obeyed",
-    probe=why_deaf,
-)
+@CHAPTER.rule("P24", FRAME, broken="a plain team frame is not obeyed", probe=why_deaf)
 def both_types(script: TrialScript) -> None:
+    """On a fresh frame of type 0 or 3 both LM629 MUST be told the velocities within 10 ms of its end."""
     script.wait(_ANY_BOOT_MS)
     after = ""
     for ask in (False, True, True, False):
@@ -62,14 +47,11 @@ def both_types(script: TrialScript) -> None:
         after = f" after a {what}"
 
 
-@CHAPTER.rule(
-    "P25",
-    "Velocities MUST be taken as they are: 16 bits, low byte first, two's complement, left before right, 1/256 count"
-    " per sample, none rounded.",
-    FRAME,
-    presupposes=("P19",),
-)
+@CHAPTER.rule("P25", FRAME, presupposes="P19")
 def words(script: TrialScript) -> None:
+    """Velocities MUST be taken as they are: 16 bits, low byte first, two's complement, left before right, 1/256 count
+    per sample, none rounded.
+    """
     pairs = [
         (1, -1), (-1, 1), (2, 255), (-255, -256), (256, 257), (-257, 127), (128, -128),
         (0x1234, -0x1234),
@@ -79,13 +61,9 @@ def words(script: TrialScript) -> None:
         script.obeyed(_only(script, left, right))
 
 
-@CHAPTER.rule(
-    "P26",
-    f"Velocities beyond +-{VELOCITY_SATURATION} MUST be cut off there, and those within MUST not.",
-    FRAME,
-    presupposes=("P19",),
-)
+@CHAPTER.rule("P26", FRAME, presupposes="P19")
 def saturation(script: TrialScript) -> None:
+    """Velocities beyond +-16633 MUST be cut off there, and those within MUST not."""
     limit = VELOCITY_SATURATION
     for left, right in (
         (limit, -limit),
@@ -108,13 +86,9 @@ def _only(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Fra
     return script.team(tuple(pairs), what=f"team frame with {left}, {right}", **how)
 
 
-@CHAPTER.rule(
-    "P27",
-    "Both wheels MUST get their velocities in one LM629 sample, and likewise stop and go off.",
-    FIRMWARE,
-    presupposes=("P32",),
-)
+@CHAPTER.rule("P27", FIRMWARE, presupposes="P32")
 def one_sample(script: TrialScript) -> None:
+    """Both wheels MUST get their velocities in one LM629 sample, and likewise stop and go off."""
     frames = [script.team(gap_ms=12.0 + 0.11 * count) for count in range(12)]
     script.wait(620.0)
     for frame in frames:
@@ -138,14 +112,9 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) 
     script.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
 
 
-@CHAPTER.rule(
-    "P28",
-    "Between frames the wheels MUST keep their velocities.",
-    TURNS,
-    presupposes=("P19",),
-    broken="velocities are not kept between frames",
-)
+@CHAPTER.rule("P28", TURNS, presupposes="P19", broken="velocities are not kept between frames")
 def kept(script: TrialScript) -> None:
+    """Between frames the wheels MUST keep their velocities."""
     for sign in (1, -1, 1):
         frame = _only(script, 300 * sign, -311 * sign, gap_ms=65.0)
         script.obeyed(frame)

@@ -29,13 +29,12 @@ _COUNTED = (
 
 
 @CHAPTER.rule(
-    "P29",
-    f"110 ms after the last fresh frame both wheels MUST be told to stop. {_COUNTED}.",
-    FRESHNESS,
-    presupposes=("P28",),
-    broken="the wheels are not told to stop 110 ms after the last frame",
+    "P29", FRESHNESS, presupposes="P28", broken="the wheels are not told to stop 110 ms after the last frame"
 )
 def stop(script: TrialScript) -> None:
+    """110 ms after the last fresh frame both wheels MUST be told to stop. A robot may count from the start or from the
+    end of that frame's last character (1.04 ms apart), and may be 0.5 ms off.
+    """
     for make in (script.team, script.team, script.ask_nobody):
         script.obeyed(script.team())
         script.wait(3.3)
@@ -43,14 +42,9 @@ def stop(script: TrialScript) -> None:
         script.wait(130.0)
 
 
-@CHAPTER.rule(
-    "P30",
-    "Frames that are not fresh, or not valid, and characters that are no frame MUST NOT put off the failsafe.",
-    FRESHNESS,
-    presupposes=("P06", "P13", "P20", "P32", "P37"),
-    broken="the failsafe is put off",
-)
+@CHAPTER.rule("P30", FRESHNESS, presupposes="P06 P13 P20 P32 P37", broken="the failsafe is put off")
 def not_put_off(script: TrialScript) -> None:
+    """Frames that are not fresh, or not valid, and characters that are no frame MUST NOT put off the failsafe."""
     last = script.team()
     script.obeyed(last)
     for count in range(16):
@@ -86,15 +80,11 @@ def _stop_of_a_busy_robot(script: TrialScript) -> None:
         script.wait(130.0)
 
 
-@CHAPTER.rule(
-    "P31",
-    "The failsafe's stop MUST be smooth, with the acceleration in force: 5973 (6 m/s2) until a service frame sets"
-    " another.",
-    FRESHNESS,
-    presupposes=("P29", "P36"),
-    broken="the failsafe's stop is not as it has to be",
-)
+@CHAPTER.rule("P31", FRESHNESS, presupposes="P29 P36", broken="the failsafe's stop is not as it has to be")
 def smooth(script: TrialScript) -> None:
+    """The failsafe's stop MUST be smooth, with the acceleration in force: 5973 (6 m/s2) until a service frame sets
+    another.
+    """
     for acceleration in (DEFAULT_ACCELERATION, 3000):
         if acceleration != DEFAULT_ACCELERATION:
             script.service(script.topology.slots[0], Opcode.ACCELERATION, acceleration.to_bytes(4, "little"))
@@ -148,13 +138,12 @@ def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
 
 
 @CHAPTER.rule(
-    "P32",
-    f"500 ms after the last fresh frame both motors MUST be off. {_COUNTED}.",
-    FRESHNESS,
-    presupposes=("P31", "P34"),
-    broken="the motors are not off 500 ms after the last frame",
+    "P32", FRESHNESS, presupposes="P31 P34", broken="the motors are not off 500 ms after the last frame"
 )
 def off(script: TrialScript) -> None:
+    """500 ms after the last fresh frame both motors MUST be off. A robot may count from the start or from the end of
+    that frame's last character (1.04 ms apart), and may be 0.5 ms off.
+    """
     script.obeyed(script.team())
     last = script.ping()
     off_behind(script, last)
@@ -166,13 +155,9 @@ def off(script: TrialScript) -> None:
     script.chips_keep(last.end_tick + ms(501.0), script.now, "both motors off", driven)
 
 
-@CHAPTER.rule(
-    "P33",
-    "After a failsafe stop and after motors off the next fresh team frame MUST be obeyed, with both motors on.",
-    WHEELS,
-    presupposes=("P28",),
-)
+@CHAPTER.rule("P33", WHEELS, presupposes="P28")
 def back(script: TrialScript) -> None:
+    """After a failsafe stop and after motors off the next fresh team frame MUST be obeyed, with both motors on."""
     for silence_ms in (150.0, 600.0, 900.0, 120.0):
         frame = script.team()
         script.obeyed(frame)

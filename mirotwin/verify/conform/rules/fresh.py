@@ -12,29 +12,20 @@ NEAR_MS = 0.3
 """So near to 150 ms a robot may judge either way: three times the error of the shipped firmware. Chosen."""
 
 
-@CHAPTER.rule(
-    "P16",
-    f"A valid frame MUST be fresh if its seq is 1 to {FRESH_STEPS} steps (mod 64) past that of the last fresh one.",
-    FRESHNESS,
-    presupposes=("P28",),
-    broken="a frame 1 to 8 steps on is not obeyed",
-)
+@CHAPTER.rule("P16", FRESHNESS, presupposes="P28", broken="a frame 1 to 8 steps on is not obeyed")
 def steps(script: TrialScript) -> None:
+    """A valid frame MUST be fresh if its seq is 1 to 8 steps (mod 64) past that of the last fresh one."""
     script.seq = 30 + 20 * script.network
     script.obeyed(script.team())
     for step in range(1, FRESH_STEPS + 1):
         script.obeyed(script.team(step=step, what=f"team frame {step} steps on"))
 
 
-@CHAPTER.rule(
-    "P17",
-    f"A valid frame with the same seq as the last fresh one, or {FRESH_STEPS + 1} to 63 steps past it within 150 ms,"
-    " MUST NOT be acted on.",
-    FRESHNESS,
-    presupposes=("P04", "P16"),
-    broken="a frame that is not fresh is acted on",
-)
+@CHAPTER.rule("P17", FRESHNESS, presupposes="P04 P16", broken="a frame that is not fresh is acted on")
 def stale(script: TrialScript) -> None:
+    """A valid frame with the same seq as the last fresh one, or 9 to 63 steps past it within 150 ms, MUST NOT be acted
+    on.
+    """
     every = range(FRESH_STEPS + 1, SEQ_MODULUS) if script.n == 3 else (9, 10, 16, 24, 32, 40, 48, 56, 62, 63)
     for count, step in enumerate((0, *every)):
         if count % 2 == 0:
@@ -44,15 +35,12 @@ def stale(script: TrialScript) -> None:
     script.obeyed(script.team())
 
 
-@CHAPTER.rule(
-    "P18",
-    "150 ms or more after the last fresh frame a valid frame with any other seq MUST be fresh, and less than that after"
-    f" it none but 1 to {FRESH_STEPS} steps on. Times run from last character to last character; within {NEAR_MS:g} ms"
-    " of the limit either is right.",
-    FRESHNESS,
-    presupposes=("P30",),
-)
+@CHAPTER.rule("P18", FRESHNESS, presupposes="P30")
 def again(script: TrialScript) -> None:
+    """150 ms or more after the last fresh frame a valid frame with any other seq MUST be fresh, and less than that
+    after it none but 1 to 8 steps on. Times run from last character to last character; within 0.3 ms of the limit
+    either is right.
+    """
     for step in (20, 63, 9):
         for after_ms, fresh in ((AGAIN_MS - NEAR_MS, False), (AGAIN_MS + NEAR_MS, True), (400.0, True)):
             last = script.team()
@@ -72,26 +60,21 @@ def again(script: TrialScript) -> None:
 
 @CHAPTER.rule(
     "P19",
-    "The first valid frame after power-on MUST be fresh, whatever its seq.",
     FRESHNESS,
+    presupposes="P03",
     topologies=(Topology(3, (1,)), Topology(5, (3,)), Topology(3, (2,)), Topology(3, (0,))),
-    presupposes=("P03",),
     broken="the first frame is not obeyed, whatever its seq",
 )
 def first(script: TrialScript) -> None:
+    """The first valid frame after power-on MUST be fresh, whatever its seq."""
     script.seq = (0, 40, 63, 1)[script.network]
     script.obeyed(script.team(step=0, what="first team frame"))
     script.obeyed(script.team())
 
 
-@CHAPTER.rule(
-    "P20",
-    "A host that repeats one frame MUST never become fresh again, not after 150 ms either.",
-    FRESHNESS,
-    presupposes=("P17", "P29"),
-    broken="a repeated frame is acted on",
-)
+@CHAPTER.rule("P20", FRESHNESS, presupposes="P17 P29", broken="a repeated frame is acted on")
 def repeated(script: TrialScript) -> None:
+    """A host that repeats one frame MUST never become fresh again, not after 150 ms either."""
     script.obeyed(script.team())
     for _ in range(3):
         script.wait(105.0)
@@ -99,15 +82,11 @@ def repeated(script: TrialScript) -> None:
     script.obeyed(script.team())
 
 
-@CHAPTER.rule(
-    "P21",
-    "One counter MUST serve all types: a frame with the seq of the last fresh one is not fresh, whatever the type of"
-    " either.",
-    FRESHNESS,
-    presupposes=("P17", "P34"),
-    broken="not one counter serves all types",
-)
+@CHAPTER.rule("P21", FRESHNESS, presupposes="P17 P34", broken="not one counter serves all types")
 def one_counter(script: TrialScript) -> None:
+    """One counter MUST serve all types: a frame with the seq of the last fresh one is not fresh, whatever the type of
+    either.
+    """
     script.obeyed(script.team())
     how = How(fresh=False, lead=b"", gap_ms=12.0)
     for make in (script.ping, script.of_type_2, script.ask_nobody):

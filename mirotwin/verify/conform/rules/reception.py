@@ -39,15 +39,11 @@ def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int 
     script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
 
 
-@CHAPTER.rule(
-    "P04",
-    "A frame MUST be found by its sync: without preamble, and whatever characters, bad stop bits or pauses come before"
-    " the sync.",
-    RECEPTION,
-    presupposes=("P28",),
-    broken="a frame is not found by its sync alone",
-)
+@CHAPTER.rule("P04", RECEPTION, presupposes="P28", broken="a frame is not found by its sync alone")
 def preamble(script: TrialScript) -> None:
+    """A frame MUST be found by its sync: without preamble, and whatever characters, bad stop bits or pauses come before
+    the sync.
+    """
     ways: tuple[tuple[str, How], ...] = (
         ("without preamble", How(lead=b"")),
         ("after FFh alone", How(lead=b"\xff")),
@@ -62,13 +58,9 @@ def preamble(script: TrialScript) -> None:
         script.obeyed(script.team(what=f"team frame {what}", **how))
 
 
-@CHAPTER.rule(
-    "P05",
-    "A frame with any wrong bit in its sync MUST be refused.",
-    RECEPTION,
-    presupposes=("P04",),
-)
+@CHAPTER.rule("P05", RECEPTION, presupposes="P04")
 def sync(script: TrialScript) -> None:
+    """A frame with any wrong bit in its sync MUST be refused."""
     refused(
         script,
         (
@@ -79,26 +71,16 @@ def sync(script: TrialScript) -> None:
     )
 
 
-@CHAPTER.rule(
-    "P06",
-    "The CRC MUST begin with the layout byte 10h | N: a frame of another layout is refused.",
-    VERSIONS,
-    presupposes=("P07",),
-    broken="a frame of another layout is taken",
-)
+@CHAPTER.rule("P06", VERSIONS, presupposes="P07", broken="a frame of another layout is taken")
 def layout(script: TrialScript) -> None:
+    """The CRC MUST begin with the layout byte 10h | N: a frame of another layout is refused."""
     others = (LAYOUT_TEAM | (8 - script.n), TELEMETRY.layout, 0x20 | script.n, LAYOUT_TEAM, 0x00, 0xFF)
     refused(script, ((f"frame of layout {byte:02X}h", How(layout=byte)) for byte in others))
 
 
-@CHAPTER.rule(
-    "P07",
-    "All 16 bits of the CRC MUST count: a frame with a wrong CRC is refused.",
-    RECEPTION,
-    presupposes=("P04",),
-    broken="a wrong CRC is not handled as it has to be",
-)
+@CHAPTER.rule("P07", RECEPTION, presupposes="P04", broken="a wrong CRC is not handled as it has to be")
 def crc(script: TrialScript) -> None:
+    """All 16 bits of the CRC MUST count: a frame with a wrong CRC is refused."""
     low = script.form.size - 2
     refused(
         script,
@@ -117,13 +99,9 @@ def leaving(register: int) -> int:
     return register
 
 
-@CHAPTER.rule(
-    "P08",
-    "Frames with 1 to 4 wrong bits in HDR..CRC MUST be refused.",
-    WHY,
-    presupposes=("P07",),
-)
+@CHAPTER.rule("P08", WHY, presupposes="P07")
 def wrong_bits(script: TrialScript) -> None:
+    """Frames with 1 to 4 wrong bits in HDR..CRC MUST be refused."""
     refused(script, _wrong_bits(script))
 
 
@@ -150,14 +128,9 @@ def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
             )
 
 
-@CHAPTER.rule(
-    "P09",
-    "A frame with a bad stop bit in any of its F characters MUST be refused.",
-    RECEPTION,
-    presupposes=("P04",),
-    broken="a bad stop bit is not handled as it has to be",
-)
+@CHAPTER.rule("P09", RECEPTION, presupposes="P04", broken="a bad stop bit is not handled as it has to be")
 def stop_bits(script: TrialScript) -> None:
+    """A frame with a bad stop bit in any of its F characters MUST be refused."""
     refused(
         script,
         (
@@ -168,13 +141,10 @@ def stop_bits(script: TrialScript) -> None:
 
 
 @CHAPTER.rule(
-    "P10",
-    f"A frame with a pause of {LONGEST_US:g} us or more between any two of its F characters MUST be refused.",
-    RECEPTION,
-    presupposes=("P04",),
-    broken="a pause within a frame is not handled as it has to be",
+    "P10", RECEPTION, presupposes="P04", broken="a pause within a frame is not handled as it has to be"
 )
 def long_pauses(script: TrialScript) -> None:
+    """A frame with a pause of 80 us or more between any two of its F characters MUST be refused."""
     short = [(at, LONGEST_US) for at in range(1, script.form.size)]
     # counters of 8 and 16 bits that count machine cycles come round after the first two and the last
     long = [(script.form.size // 2, pause_us) for pause_us in (128.0, 256.0, 1040.0, 10_000.0, 32_766.3)]
@@ -185,13 +155,14 @@ def long_pauses(script: TrialScript) -> None:
 
 @CHAPTER.rule(
     "P11",
-    f"A frame with pauses of up to {SHORTEST_US:g} us between its characters MUST be taken, and one of a host whose"
-    " serial port is 2.5 % too fast or 1.5 % too slow: the spacings are within 1040 +- 50 us.",
     RECEPTION,
+    presupposes="P04",
     topologies=(*BOTH, Topology(3, (0,), baud_offset_ppm=25_000), Topology(5, (4,), baud_offset_ppm=-15_000)),
-    presupposes=("P04",),
 )
 def short_pauses(script: TrialScript) -> None:
+    """A frame with pauses of up to 20 us between its characters MUST be taken, and one of a host whose serial port is
+    2.5 % too fast or 1.5 % too slow: the spacings are within 1040 +- 50 us.
+    """
     offset = script.topology.baud_offset_ppm
     for _ in range(3):
         script.obeyed(script.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
@@ -206,13 +177,9 @@ def short_pauses(script: TrialScript) -> None:
             script.obeyed(script.team(what=what, lead=b"", pauses={at: SHORTEST_US}))
 
 
-@CHAPTER.rule(
-    "P12",
-    "A valid frame MUST empty the window: none of its characters is part of another frame.",
-    RECEPTION,
-    presupposes=("P14", "P16"),
-)
+@CHAPTER.rule("P12", RECEPTION, presupposes="P14 P16")
 def emptied(script: TrialScript) -> None:
+    """A valid frame MUST empty the window: none of its characters is part of another frame."""
     for spoilt in (False, True):
         script.obeyed(script.team())
         outer, inner = _nested(script, spoilt)
@@ -265,14 +232,9 @@ def _payload(words: Iterable[tuple[int, int]]) -> bytes:
     return b"".join(word.to_bytes(2, "little", signed=True) for pair in words for word in pair)
 
 
-@CHAPTER.rule(
-    "P13",
-    "The first undamaged frame MUST be taken, whatever garbage came right before it.",
-    RECEPTION,
-    presupposes=("P09", "P10", "P14"),
-    broken="a frame right after garbage is lost",
-)
+@CHAPTER.rule("P13", RECEPTION, presupposes="P09 P10 P14", broken="a frame right after garbage is lost")
 def garbage(script: TrialScript) -> None:
+    """The first undamaged frame MUST be taken, whatever garbage came right before it."""
     noise = bytes(int(_CHANCE.uniform(9000 + at) * 256) for at in range(300))
     frame = seal(script.form, bytes(script.form.body_size))
     kinds = (
@@ -304,26 +266,18 @@ def garbage(script: TrialScript) -> None:
     script.wait(12.0)
 
 
-@CHAPTER.rule(
-    "P14",
-    "A window with a wrong CRC MUST cost no frame: a sync in front of a frame is no reason to lose it.",
-    RECEPTION,
-    presupposes=("P07",),
-    broken="a frame after a false sync is lost",
-)
+@CHAPTER.rule("P14", RECEPTION, presupposes="P07", broken="a frame after a false sync is lost")
 def false_syncs(script: TrialScript) -> None:
+    """A window with a wrong CRC MUST cost no frame: a sync in front of a frame is no reason to lose it."""
     for length in range(2, script.form.size, 3):
         lead = SYNC + bytes(range(0x60, 0x60 + length - 2))
         script.obeyed(script.team(what=f"team frame {length} characters after a sync", lead=lead))
 
 
 @CHAPTER.rule(
-    "P15",
-    "Between keyed frames, RXD shows slicer noise: the first frame with its preamble MUST be taken all the same.",
-    FRAME,
-    topologies=(Topology(3, (1,), keyed=True), Topology(5, (3,), keyed=True)),
-    presupposes=("P13",),
+    "P15", FRAME, presupposes="P13", topologies=(Topology(3, (1,), keyed=True), Topology(5, (3,), keyed=True))
 )
 def slicer_noise(script: TrialScript) -> None:
+    """Between keyed frames, RXD shows slicer noise: the first frame with its preamble MUST be taken all the same."""
     for count in range(8):
         script.obeyed(script.team(what="team frame after noise", gap_ms=14.0 + 3.7 * count))

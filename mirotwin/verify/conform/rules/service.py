@@ -23,14 +23,9 @@ def _acceleration(value: int) -> bytes:
     return value.to_bytes(4, "little")
 
 
-@CHAPTER.rule(
-    "P34",
-    "A service frame MUST count as fresh and leave the velocities as they are: a ping does nothing else.",
-    FRAME,
-    presupposes=("P29",),
-    broken="a ping does not do what it has to",
-)
+@CHAPTER.rule("P34", FRAME, presupposes="P29", broken="a ping does not do what it has to")
 def ping(script: TrialScript) -> None:
+    """A service frame MUST count as fresh and leave the velocities as they are: a ping does nothing else."""
     frame = script.team()
     script.obeyed(frame)
     for _ in range(5):
@@ -41,14 +36,9 @@ def ping(script: TrialScript) -> None:
     script.wait(70.0)
 
 
-@CHAPTER.rule(
-    "P35",
-    "Opcode 1 MUST load kp, ki, kd and il into both LM629 and put them in force, at rest and in motion.",
-    FRAME,
-    presupposes=("P21",),
-    broken="filter words are not loaded as they have to be",
-)
+@CHAPTER.rule("P35", FRAME, presupposes="P21", broken="filter words are not loaded as they have to be")
 def filter_words(script: TrialScript) -> None:
+    """Opcode 1 MUST load kp, ki, kd and il into both LM629 and put them in force, at rest and in motion."""
     slot = script.topology.slots[0]
     for words in ((0x0102, 0x0304, 0x0506, 0x0708), (0x7FFF, 0, 1, 0x55AA), (400, 40, 3000, 2000)):
         _filter_taken(script, script.service(slot, Opcode.FILTER, _filter(words), "filter frame"), words)
@@ -80,15 +70,11 @@ def _listed(words: Words | None) -> str:
     return "none" if words is None else ", ".join(map(number, words))
 
 
-@CHAPTER.rule(
-    "P36",
-    "Opcode 2 MUST set the acceleration of both wheels, all 32 bits of it; at rest it is in force from the next"
-    " velocities on.",
-    FRAME,
-    presupposes=("P21",),
-    broken="an acceleration is not set as it has to be",
-)
+@CHAPTER.rule("P36", FRAME, presupposes="P21", broken="an acceleration is not set as it has to be")
 def acceleration(script: TrialScript) -> None:
+    """Opcode 2 MUST set the acceleration of both wheels, all 32 bits of it; at rest it is in force from the next
+    velocities on.
+    """
     for value in (0x0102_0304, 0x3FFF_FFFF, 0x0001_2345, 4000):
         script.service(
             script.topology.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration frame"
@@ -98,14 +84,9 @@ def acceleration(script: TrialScript) -> None:
         script.wait(520.0)  # motors off: at rest in any case
 
 
-@CHAPTER.rule(
-    "P37",
-    "An acceleration that comes in motion MUST wait until the wheels stand: velocities go on with the one before.",
-    FIRMWARE,
-    presupposes=("P31", "P41"),
-    broken="an acceleration in motion does not wait",
-)
+@CHAPTER.rule("P37", FIRMWARE, presupposes="P31 P41", broken="an acceleration in motion does not wait")
 def acceleration_waits(script: TrialScript) -> None:
+    """An acceleration that comes in motion MUST wait until the wheels stand: velocities go on with the one before."""
     slot = script.topology.slots[0]
     script.obeyed(script.team())
     _sent_in_motion(script, 9000)
@@ -150,14 +131,9 @@ def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
     script.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
 
 
-@CHAPTER.rule(
-    "P38",
-    "A setting MUST be made by the addressed robot alone.",
-    FRAME,
-    topologies=(Topology(3, (0, 1, 2)), Topology(5, (0, 4))),
-    presupposes=("P35", "P36"),
-)
+@CHAPTER.rule("P38", FRAME, presupposes="P35 P36", topologies=(Topology(3, (0, 1, 2)), Topology(5, (0, 4))))
 def addressed(script: TrialScript) -> None:
+    """A setting MUST be made by the addressed robot alone."""
     words = (300, 30, 2500, 1500)
     for slot in script.topology.slots:
         others = tuple(other for other in script.topology.slots if other != slot)
@@ -172,13 +148,9 @@ def addressed(script: TrialScript) -> None:
         script.untouched(script.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
 
 
-@CHAPTER.rule(
-    "P39",
-    "A service frame with an unknown opcode MUST be valid and count as fresh, and nothing in it be acted on.",
-    VERSIONS,
-    presupposes=("P31",),
-)
+@CHAPTER.rule("P39", VERSIONS, presupposes="P31")
 def unknown_opcode(script: TrialScript) -> None:
+    """A service frame with an unknown opcode MUST be valid and count as fresh, and nothing in it be acted on."""
     slot = script.topology.slots[0]
     for opcode in (3, 0xFE):
         script.untouched(
@@ -197,14 +169,9 @@ def unknown_opcode(script: TrialScript) -> None:
     _driven_with(script, script.team(), DEFAULT_ACCELERATION)
 
 
-@CHAPTER.rule(
-    "P40",
-    "A frame of type 2 from a host MUST be valid and count as fresh, and nothing in it be acted on or answered.",
-    RECEPTION,
-    presupposes=("P29",),
-    broken="a frame of type 2 is not handled as it has to be",
-)
+@CHAPTER.rule("P40", RECEPTION, presupposes="P29", broken="a frame of type 2 is not handled as it has to be")
 def type_2(script: TrialScript) -> None:
+    """A frame of type 2 from a host MUST be valid and count as fresh, and nothing in it be acted on or answered."""
     frame = script.team()
     script.obeyed(frame)
     for _ in range(3 * script.n):  # each number asks another robot

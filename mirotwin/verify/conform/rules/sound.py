@@ -34,63 +34,60 @@ def nothing_refused(script: TrialScript) -> None:
 
 @CHAPTER.rule(
     "P51",
-    "The LM629s MUST be used as their data sheet says: bus timing, never written while busy, one at a time on the bus,"
-    " and no command that they refuse.",
     FAULTS,
+    presupposes="P52",
     faults=(FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING),
-    presupposes=("P52",),
     broken="LM629s are not used as their data sheet says",
 )
 def lm629(script: TrialScript) -> None:
+    """The LM629s MUST be used as their data sheet says: bus timing, never written while busy, one at a time on the bus,
+    and no command that they refuse.
+    """
     load(script)
     nothing_refused(script)
 
 
 @CHAPTER.rule(
     "P52",
-    "Interrupts MUST leave the main loop time: never all of 10 ms, whatever comes over the air.",
     FAULTS,
+    presupposes="P13 P16 P36",
     faults=(FaultKind.MAIN_LOOP_STARVED,),
-    presupposes=("P13", "P16", "P36"),
     broken="interrupts leave the main loop no time, or frames are lost under load",
 )
 def main_loop(script: TrialScript) -> None:
+    """Interrupts MUST leave the main loop time: never all of 10 ms, whatever comes over the air."""
     load(script)
 
 
 @CHAPTER.rule(
     "P53",
-    "The stack MUST stay clear of data and within internal RAM.",
     FAULTS,
+    presupposes="P52",
     faults=STACK_FAULTS,
-    presupposes=("P52",),
     broken="the stack runs into data, or leaves internal RAM",
 )
 def stack(script: TrialScript) -> None:
+    """The stack MUST stay clear of data and within internal RAM."""
     load(script)
 
 
 @CHAPTER.rule(
     "P54",
-    "The processor MUST execute defined instructions of its own image alone.",
     FAULTS,
+    presupposes="P52",
     faults=(FaultKind.UNDEFINED_OPCODE, FaultKind.OUTSIDE_IMAGE),
-    presupposes=("P52",),
     broken="it executes what is no code of its own",
 )
 def own_code(script: TrialScript) -> None:
+    """The processor MUST execute defined instructions of its own image alone."""
     load(script)
 
 
-@CHAPTER.rule(
-    "P55",
-    f"A reset of the processor MUST do no harm, whenever it comes: {BOOTED_MS:g} ms after it both motors are off, and"
-    " the first frame is taken as after power-on.",
-    POWER_ON,
-    presupposes=("P01", "P41"),
-    broken="a reset of the processor does harm",
-)
+@CHAPTER.rule("P55", POWER_ON, presupposes="P01 P41", broken="a reset of the processor does harm")
 def reset_pin(script: TrialScript) -> None:
+    """A reset of the processor MUST do no harm, whenever it comes: 40 ms after it both motors are off, and the first
+    frame is taken as after power-on.
+    """
     slot = script.topology.slots[0]
     for when, for_ms in (("in motion", 3.0), ("within a frame", 0.05), ("while it answers", 7.0)):
         script.obeyed(script.team(step=1))
@@ -109,13 +106,9 @@ def reset_pin(script: TrialScript) -> None:
         script.answered(script.ask(slot, gap_ms=36.0), slot)
 
 
-@CHAPTER.rule(
-    "P56",
-    "A robot that is switched off and on MUST begin as from power-on, wherever it was.",
-    POWER_ON,
-    presupposes=("P55",),
-)
+@CHAPTER.rule("P56", POWER_ON, presupposes="P55")
 def supply(script: TrialScript) -> None:
+    """A robot that is switched off and on MUST begin as from power-on, wherever it was."""
     slot = script.topology.slots[0]
     for off_ms in (2.0, 60.0):
         script.obeyed(script.team())
@@ -144,14 +137,9 @@ def load(script: TrialScript) -> None:
     script.obeyed(script.team(what="team frame after the load"))
 
 
-@LONG.rule(
-    "P61",
-    "However many frames came, the next one MUST be obeyed and the next question answered.",
-    TURNS,
-    topologies=THREE,
-    presupposes=("P34", "P41"),
-)
+@LONG.rule("P61", TURNS, presupposes="P34 P41", topologies=THREE)
 def many(script: TrialScript) -> None:
+    """However many frames came, the next one MUST be obeyed and the next question answered."""
     slot = script.topology.slots[0]
     for number in range(1, _FRAMES + 1):
         begun = script.now
@@ -164,14 +152,11 @@ def many(script: TrialScript) -> None:
     script.wait(40.0)
 
 
-@LONG.rule(
-    "P62",
-    "After any silence motors MUST stay off, the last frame again MUST NOT be fresh, and one with another seq MUST be.",
-    FRESHNESS,
-    topologies=THREE,
-    presupposes=("P20", "P32"),
-)
+@LONG.rule("P62", FRESHNESS, presupposes="P20 P32", topologies=THREE)
 def ages(script: TrialScript) -> None:
+    """After any silence motors MUST stay off, the last frame again MUST NOT be fresh, and one with another seq MUST
+    be.
+    """
     for silence_ms in _WRAPS_MS:
         last = script.team()
         until = last.end_tick + ms(silence_ms + 40.0)
