@@ -10,15 +10,14 @@ from __future__ import annotations
 LENGTH = 31
 
 
-def pn9(length: int) -> bytes:
-    """`length` bytes of the PN9 sequence x^9 + x^5 + 1 from all ones, low bit of each byte first."""
-    register = 0x1FF
+def pn9(length: int, register: int = 0x1FF, tap: int = 5) -> bytes:
+    """`length` bytes of the PN9 sequence x^9 + x^tap + 1 from `register` on, low bit of each byte first."""
     out = bytearray()
     for _ in range(length):
         byte = 0
         for bit in range(8):
             byte |= (register & 1) << bit
-            register = register >> 1 | ((register ^ register >> 5) & 1) << 8
+            register = register >> 1 | ((register ^ register >> tap) & 1) << 8
         out.append(byte)
     return bytes(out)
 

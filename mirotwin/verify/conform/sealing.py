@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import product, zip_longest
 
 import msgspec
+from crcmod import mkCrcFun
 
-from miro_protocol.crc import INITIAL, POLYNOMIAL, XOR_OUT
+from miro_protocol.crc import INITIAL, POLYNOMIAL, POLYNOMIAL_REFLECTED, XOR_OUT
 from miro_protocol.table import LAYOUT_TEAM, SYNC, TELEMETRY, Format
-from miro_protocol.whitening import LENGTH, STRING
+from miro_protocol.whitening import LENGTH, STRING, pn9
 
 
 class Sealing(msgspec.Struct, frozen=True, kw_only=True):
@@ -46,12 +48,12 @@ class Sealing(msgspec.Struct, frozen=True, kw_only=True):
         return bytes(one ^ other for one, other in zip_longest(data, string, fillvalue=0))
 
     def _crc(self, data: bytes) -> int:
-        register = _turned(self.start, 16) if self.reflected else self.start
-        for byte in data:
-            register ^= (_turned(byte, 8) if self.reflected else byte) << 8
-            for _ in range(8):
-                register = register << 1 ^ (0x10000 | self.polynomial if register & 0x8000 else 0)
-        return (_turned(register, 16) if self.reflected else register) ^ self.end
+        return _crc_of(self.polynomial, self.start, self.end, self.reflected)(data)
+
+
+@cache
+def _crc_of(polynomial: int, start: int, end: int, reflected: bool) -> Callable[[bytes], int]:
+    return mkCrcFun(0x10000 | polynomial, start ^ end, reflected, end)
 
 
 def _turned(value: int, bits: int) -> int:
@@ -59,47 +61,28 @@ def _turned(value: int, bits: int) -> int:
     return int(f"{value:0{bits}b}"[::-1], 2)
 
 
-def _pn9(register: int = 0x1FF, tap: int = 5) -> bytes:
-    """As many bytes of a PN9 sequence as there are in the whitening string."""
-    out = bytearray()
-    for _ in range(LENGTH):
-        byte = 0
-        for bit in range(8):
-            byte |= (register & 1) << bit
-            register = register >> 1 | ((register ^ register >> tap) & 1) << 8
-        out.append(byte)
-    return bytes(out)
+_CRC: dict[str, dict[object, str]] = {
+    "polynomial": {
+        POLYNOMIAL: "",
+        POLYNOMIAL_REFLECTED: "polynomial AC9Ah and not 5935h turned over",
+        **{other: f"polynomial {other:04X}h" for other in (0x1021, 0x8005, 0x3D65)},
+    },
+    "reflected": {True: "", False: "the high bit first"},
+    "start": {INITIAL: "", 0: "0000h and not FFFFh at the start"},
+    "end": {XOR_OUT: "", 0: "no XOR with FFFFh at the end"},
+    "layout": {None: "", -1: "no layout byte"},
+    "high_first": {False: "", True: "high byte sent first"},
+}
+"""The usual mistakes in a CRC: a field of `Sealing`, and what each of its values is called."""
 
 
 def _checks() -> Iterator[tuple[str, Sealing]]:
-    """Every mixture of the usual mistakes in a CRC, those with one mistake first."""
-    polynomials = {POLYNOMIAL: "", _turned(POLYNOMIAL, 16): "polynomial AC9Ah and not 5935h turned over"}
-    polynomials |= {other: f"polynomial {other:04X}h" for other in (0x1021, 0x8005, 0x3D65)}
-    found = []
-    for polynomial, reflected, start, end, layout, high_first in product(
-        polynomials, (True, False), (INITIAL, 0), (XOR_OUT, 0), (None, -1), (False, True)
-    ):
-        mistakes = [
-            polynomials[polynomial],
-            "" if reflected else "the high bit first",
-            "" if start else "0000h and not FFFFh at the start",
-            "" if end else "no XOR with FFFFh at the end",
-            "" if layout is None else "no layout byte",
-            "high byte sent first" if high_first else "",
-        ]
-        named = [one for one in mistakes if one]
-        sealing = Sealing(
-            polynomial=polynomial,
-            start=start,
-            end=end,
-            reflected=reflected,
-            layout=layout,
-            high_first=high_first,
-        )
+    """Every mixture of them, those with one mistake first."""
+    mixtures = [dict(zip(_CRC, values, strict=True)) for values in product(*_CRC.values())]
+    mistakes = [[_CRC[key][value] for key, value in one.items() if _CRC[key][value]] for one in mixtures]
+    for named, mixture in sorted(zip(mistakes, mixtures, strict=True), key=lambda one: len(one[0])):
         if named:
-            found.append((len(named), f"another CRC ({', '.join(named)})", sealing))
-    for _, what, sealing in sorted(found, key=lambda one: one[0]):
-        yield what, sealing
+            yield f"another CRC ({', '.join(named)})", msgspec.convert(mixture, Sealing)
 
 
 MISTAKES = {
@@ -110,9 +93,9 @@ MISTAKES = {
         string=bytes(_turned(byte, 8) for byte in STRING)
     ),
     "whitening that repeats its first byte FFh": Sealing(string=STRING[:1] * LENGTH),
-    "whitening with x^9 + x^4 + 1": Sealing(string=_pn9(tap=4)),
+    "whitening with x^9 + x^4 + 1": Sealing(string=pn9(LENGTH, tap=4)),
     **{
-        f"whitening that begins with register {seed:03X}h and not 1FFh": Sealing(string=_pn9(seed))
+        f"whitening that begins with register {seed:03X}h and not 1FFh": Sealing(string=pn9(LENGTH, seed))
         for seed in (0x001, 0x100, 0x0FF, 0x1FE, 0x055, 0x0AA, 0x155, 0x1AA)
     },
     **{
