@@ -18,7 +18,7 @@ from mirotwin.verify.conform.hints import characters
 from mirotwin.verify.conform.rule import BOTH, Rule, Topology
 from mirotwin.verify.conform.rule_monitor import ObservingMonitor
 from mirotwin.verify.conform.sealing import MISTAKES
-from mirotwin.verify.conform.trial import Trial, make_trial, run_trial, trial_of
+from mirotwin.verify.conform.trial import Trial, run_trial, trial_of
 from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
 
 
@@ -79,10 +79,10 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
         said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
         script.said += other.said
         script.wait_until(other.now)
-        script.expect(script.now, "", lambda observed: None)
+        script.expect(script.now, "", lambda observed: iter(()))
 
     rule = Rule("P24", "", ways, (topology,))
-    (listener,) = listen(make_trial(rule), image, seed)
+    (listener,) = listen(trial_of(rule), image, seed)
     right = said[0][1]
     return (
         _serial_port(listener.events, right)
