@@ -76,26 +76,18 @@ class PortScript(TrialScript):
     def words(self) -> Pairs:
         return ((0, 0),) * self.n if self.standing else super().words()
 
-    def same(self, slot: int, left: int, right: int) -> Pairs:
-        return self.words() if self.standing else super().same(slot, left, right)
+    def same(self, left: int, right: int) -> Pairs:
+        return self.words() if self.standing else super().same(left, right)
 
-    def say(
-        self,
-        kind: int,
-        payload: bytes,
-        step: int = 1,
-        what: str = "frame",
-        words: Pairs = (),
-        **how: Unpack[How],
-    ) -> Frame:
+    def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """The same, where a PC can send it; else nothing, for as long."""
         before = len(self.said)
-        frame = super().say(kind, payload, step, what, words, **how)
+        frame = super().say(kind, payload, what, words, **how)
         if "bad_stop" in how or any(pause < SHORTEST_US for pause in how.get("pauses", {}).values()):
             del self.said[before:]
         elif how.get("fresh", True):
             self.fresh += 1
-        elif step == 1:
+        elif how.get("step", 1) == 1:
             self.seq = frame.seq  # else a robot that takes it would not take the next one, and count right
         return frame
 
@@ -142,13 +134,14 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     slot = topology.slots[0]
     script = PortScript(topology, standing=not port.guard.desk.allow_motion)
     rule.write(script)
-    last = script.ask(slot, gap_ms=36.0)
+    last = script.ask(gap_ms=36.0)
     fresh = script.fresh % 256
 
     def counted(seen: Observed) -> Found:
         said = [one.said for one in seen.answers if one.frame.seq == last.seq and one.said is not None]
         found = f"{said[-1].accepted}" if said else "no answer"
-        return None if found == f"{fresh}" else (seen.end_tick, found)
+        if found != f"{fresh}":
+            yield seen.end_tick, found
 
     script.expect(
         last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", counted, by_answers=True
@@ -175,7 +168,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     for one in script.expected:  # what power-on did is told by now
         if one.by_answers and (not one.slots or slot in one.slots) and "of power-on" not in one.wanted:
-            if (what := one.test(seen)) is not None:
+            if (what := one.found(seen)) is not None:
                 return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
     return None, unsure
 

@@ -16,6 +16,7 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.orders import Orders
 from mirotwin.verify.conform.hints import between, in_words, number
+from mirotwin.verify.conform.observed import within
 from mirotwin.verify.conform.probe import Listener, listen
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.trial import Trial, trial_of
@@ -72,7 +73,7 @@ def _verdicts(trial: Trial, listener: Listener) -> Iterator[Row]:
     for one in trial.expected[listener.subject.network]:
         if one.slots and slot not in one.slots:
             continue
-        found = one.test(listener.observed)
+        found = one.found(listener.observed)
         if found is None:
             yield one.tick, "passed", one.wanted
         else:
@@ -146,7 +147,7 @@ def _characters(run: list[Event]) -> str:
 
 def _answer(run: list[Event], listener: Listener) -> str:
     """What the characters say, if they are an answer."""
-    for answer in listener.observed.answers_in(run[0].tick, run[-1].tick):
+    for answer in within(listener.observed.answers, run[0].tick, run[-1].tick):
         said = answer.said
         if not isinstance(said, TelemetryFrame):
             return ": an answer with unknown contents"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,11 @@ def in_words(order: Order) -> str:
     if order.word is None or not -0x8000 <= order.word <= 0x7FFF:
         return f"{order.velocity / 256:.7g} ({order.velocity & 0xFFFF_FFFF:08X}h in the LM629)"
     return number(order.word)
+
+
+def payload_of(words: Iterable[Pair]) -> bytes:
+    """Of a team frame."""
+    return b"".join(word.to_bytes(2, "little", signed=True) for pair in words for word in pair)
 
 
 def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
@@ -80,7 +85,7 @@ def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
     yield "they are taken as numbers without sign", (left & 0xFFFF, right & 0xFFFF)
     for other, pair in enumerate(frame.words):
         yield f"these are the velocities of robot {other}", pair
-    payload = b"".join(word.to_bytes(2, "little", signed=True) for pair in frame.words for word in pair)
+    payload = payload_of(frame.words)
     for at in range(len(payload) - 3):
         pair = (_word(payload, at), _word(payload, at + 2))
         yield f"these are bytes {at} to {at + 3} of the payload and not {4 * slot} to {4 * slot + 3}", pair

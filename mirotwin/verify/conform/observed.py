@@ -6,7 +6,8 @@ read at the start of each control period.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
 
 import msgspec
 
@@ -24,6 +25,12 @@ READING = frozenset(command.opcode for command in BY_NAME.values() if command.wo
 """Commands that only read."""
 
 Words = tuple[int, ...]
+T = TypeVar("T", Event, Order, "Answer")
+
+
+def within(found: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
+    """Those of them that came in between."""
+    return [one for one in found if after_tick < one.tick <= until_tick]
 
 
 class Answer(msgspec.Struct, frozen=True):
@@ -34,15 +41,11 @@ class Answer(msgspec.Struct, frozen=True):
     said: TelemetryFrame | None
 
 
-class FilterSetting(msgspec.Struct, frozen=True):
-    """The filter words (kp, ki, kd, il) that a chip took at `tick`."""
-
-    tick: int
-    words: Words
-
-
 class Observed:
-    """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: what came later was not told."""
+    """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: what came later was not told.
+
+    `filters`: tick and filter words (kp, ki, kd, il) that a chip took, by side.
+    """
 
     def __init__(self, robots: int, slot: int) -> None:
         self.robots = robots
@@ -51,7 +54,7 @@ class Observed:
         self._orders = Orders()
         self.orders: dict[str, list[Order]] = {side: [Order(-1, side, "off")] for side in SIDES}
         self._filter: dict[str, list[int]] = {side: [0, 0, 0, 0] for side in SIDES}
-        self.filters: dict[str, list[FilterSetting]] = {side: [] for side in SIDES}
+        self.filters: dict[str, list[tuple[int, Words]]] = {side: [] for side in SIDES}
         self.commands: list[Event] = []
         self.heard: list[Event] = []
         self.answers: list[Answer] = []
@@ -102,7 +105,7 @@ class Observed:
                 if control & 8 >> place and words:
                     self._filter[event.side][place] = words.pop(0)
         elif event.opcode == _UDF:
-            self.filters[event.side].append(FilterSetting(event.tick, tuple(self._filter[event.side])))
+            self.filters[event.side].append((event.tick, tuple(self._filter[event.side])))
 
     # ---- asked by the rules --------------------------------------------------------------------------------
 
@@ -116,36 +119,27 @@ class Observed:
 
     def ordered(self, after_tick: int, until_tick: int) -> Iterator[Order]:
         """The orders to either wheel in between, in the order of time."""
-        found = [
-            order for side in SIDES for order in self.orders[side] if after_tick < order.tick <= until_tick
-        ]
+        found = [order for side in SIDES for order in within(self.orders[side], after_tick, until_tick)]
         yield from sorted(found, key=lambda order: order.tick)
 
-    def wrote(self, after_tick: int, until_tick: int) -> Iterator[Event]:
+    def wrote(self, after_tick: int, until_tick: int) -> list[Event]:
         """The commands in between that do more than read."""
-        for event in self.commands:
-            if after_tick < event.tick <= until_tick and event.opcode not in READING:
-                yield event
+        return [
+            event for event in within(self.commands, after_tick, until_tick) if event.opcode not in READING
+        ]
 
     def read_positions(self, side: str, after_tick: int, until_tick: int) -> list[int]:
         """The low words of the real positions that the robot read in between."""
         return [
             int.from_bytes(one.data[-2:], "big")
-            for one in self.commands
-            if one.opcode == _RDRP and one.side == side and after_tick < one.tick <= until_tick
+            for one in within(self.commands, after_tick, until_tick)
+            if one.opcode == _RDRP and one.side == side
         ]
 
     def set_to(self, side: str, tick: int) -> Words | None:
         """The filter words in force at `tick`, None before the first."""
-        found = [setting.words for setting in self.filters[side] if setting.tick <= tick]
+        found = [words for taken_tick, words in self.filters[side] if taken_tick <= tick]
         return found[-1] if found else None
-
-    def spoke(self, after_tick: int, until_tick: int) -> Event | None:
-        """The first character that the PC heard in between."""
-        return next((one for one in self.heard if after_tick < one.tick <= until_tick), None)
-
-    def answers_in(self, after_tick: int, until_tick: int) -> list[Answer]:
-        return [one for one in self.answers if after_tick < one.tick <= until_tick]
 
     def chips(self, after_tick: int, until_tick: int) -> Iterator[tuple[int, str, Axis]]:
         """Tick, side and state of both chips at the start of each control period in between."""

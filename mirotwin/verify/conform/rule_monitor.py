@@ -100,7 +100,7 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
             if not here or expectation.tick >= tick:
                 continue
             self.judged += 1
-            what = expectation.test(self.observed)
+            what = expectation.found(self.observed)
             if what is not None:
                 found.append((what[0], expectation.wanted, what[1]))
         for at, wanted, text in sorted(found, key=lambda one: one[0]):

@@ -11,14 +11,14 @@ tick at which each expectation is over.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypedDict, Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.actions import Action, Power, Reset
-from miro_protocol.frames import asking_step, seal
+from miro_protocol.frames import TelemetryFrame, asking_step, seal
 from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import (
     FAILSAFE_STOP_TICKS,
@@ -39,9 +39,10 @@ from mirotwin.verify.conform.hints import (
     in_words,
     no_answer,
     number,
+    payload_of,
     wheels_instead,
 )
-from mirotwin.verify.conform.observed import Answer, Observed
+from mirotwin.verify.conform.observed import Answer, Observed, Words, within
 from mirotwin.verify.conform.rule import Topology
 
 _LTRJ = BY_NAME["LTRJ"].opcode
@@ -53,8 +54,10 @@ ACTING_MS = ACTING_TICKS / TICKS_PER_MS
 GAP_MS = ACTING_MS + 2.0
 """From the end of a frame to the start of the next, unless a rule says otherwise: time to act."""
 Pairs = tuple[tuple[int, int], ...]
-Found = tuple[int, str] | None
-"""What is wrong: since which tick, and what was found instead. None: nothing."""
+Found = Iterator[tuple[int, str]]
+"""What is wrong: since which tick, and what was found instead. The first one counts."""
+Says = Callable[[TelemetryFrame, Answer, Observed], str]
+"""What is wrong with what an answer says, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,11 @@ class Frame:
         left, right = self.words[slot]
         return saturated(left), saturated(right)
 
+    @property
+    def acted_tick(self) -> int:
+        """When robots have acted on it."""
+        return self.end_tick + ACTING_TICKS
+
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
@@ -91,10 +99,16 @@ class Expectation:
     slots: tuple[int, ...] = ()
     by_answers: bool = False
 
+    def found(self, observed: Observed) -> tuple[int, str] | None:
+        """What is wrong, None for nothing."""
+        return next(self.test(observed), None)
+
 
 class How(TypedDict, total=False):
     """How a frame is said; see `TrialScript.say`."""
 
+    slot: int
+    step: int
     fresh: bool
     lead: bytes
     layout: int
@@ -106,7 +120,8 @@ class How(TypedDict, total=False):
 
 
 class TrialScript:
-    """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame.
+    """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame; `slot`: of its
+    first robot.
 
     `said`, `done` and `expected` are the result.
     """
@@ -114,6 +129,7 @@ class TrialScript:
     def __init__(self, topology: Topology, network: int = 0) -> None:
         self.topology = topology
         self.n = topology.robots
+        self.slot = topology.slots[0]
         self.network = network
         self.form = downlink(topology.robots)
         self.character_ticks = -(-HOST_CHARACTER_TICKS * 1_000_000 // (1_000_000 + topology.baud_offset_ppm))
@@ -147,64 +163,59 @@ class TrialScript:
         return tuple(pairs)
 
     def team(
-        self,
-        words: Pairs | None = None,
-        ask: bool = False,
-        step: int = 1,
-        what: str = "",
-        **how: Unpack[How],
+        self, words: Pairs | None = None, ask: bool = False, what: str = "", **how: Unpack[How]
     ) -> Frame:
         """A team frame."""
         pairs = self.words() if words is None else words
         kind = FrameType.TEAM_ASK if ask else FrameType.TEAM
-        payload = b"".join(word.to_bytes(2, "little", signed=True) for pair in pairs for word in pair)
-        return self.say(kind, payload, step, what or ("question" if ask else "team frame"), pairs, **how)
+        return self.say(kind, payload_of(pairs), what or ("question" if ask else "team frame"), pairs, **how)
 
-    def same(self, slot: int, left: int, right: int) -> Pairs:
-        """New velocities, but for one robot these."""
-        pairs = list(self.words())
-        pairs[slot] = (left, right)
-        return tuple(pairs)
+    def same(self, left: int, right: int) -> Pairs:
+        """New velocities, but for the robots that are there these."""
+        there = self.topology.slots
+        return tuple((left, right) if slot in there else pair for slot, pair in enumerate(self.words()))
 
-    def ask(self, slot: int, what: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
+    def ask(self, what: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
         """A question to the robot in `slot`, with the next number that asks it."""
-        step = asking_step(self.seq, slot, self.n)
-        return self.team(words, ask=True, step=step, what=what or f"question to robot {slot}", **how)
+        slot = how.get("slot", self.slot)
+        how["step"] = asking_step(self.seq, slot, self.n)
+        return self.team(words, ask=True, what=what or f"question to robot {slot}", **how)
 
-    def service(self, slot: int, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:
-        payload = (bytes([slot, opcode]) + data).ljust(self.form.payload_size, b"\0")
-        return self.say(FrameType.SERVICE, payload, 1, what or f"service frame, opcode {opcode}", **how)
+    def service(self, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:
+        payload = (bytes([how.get("slot", self.slot), opcode]) + data).ljust(self.form.payload_size, b"\0")
+        return self.say(FrameType.SERVICE, payload, what or f"service frame, opcode {opcode}", **how)
 
     def ping(self, **how: Unpack[How]) -> Frame:
         """A service frame that changes nothing."""
-        return self.service(self.topology.slots[0], Opcode.PING, what="ping", **how)
+        return self.service(Opcode.PING, what="ping", **how)
+
+    def filter(self, words: Words, what: str = "", **how: Unpack[How]) -> Frame:
+        """kp, ki, kd and il."""
+        return self.service(
+            Opcode.FILTER, b"".join(word.to_bytes(2, "little") for word in words), what, **how
+        )
+
+    def acceleration(self, value: int, what: str = "", **how: Unpack[How]) -> Frame:
+        return self.service(Opcode.ACCELERATION, value.to_bytes(4, "little"), what, **how)
 
     def of_type_2(self, **how: Unpack[How]) -> Frame:
         """A frame that only robots send, with a good CRC."""
-        return self.say(FrameType.TELEMETRY, bytes(self.form.payload_size), 1, "frame of type 2", **how)
+        return self.say(FrameType.TELEMETRY, bytes(self.form.payload_size), "frame of type 2", **how)
 
     def ask_nobody(self, **how: Unpack[How]) -> Frame:
         """A question to a robot that is not there."""
-        absent = next(slot for slot in range(self.n) if slot not in self.topology.slots)
-        return self.ask(absent, **how)
+        how["slot"] = next(slot for slot in range(self.n) if slot not in self.topology.slots)
+        return self.ask(**how)
 
-    def say(
-        self,
-        kind: int,
-        payload: bytes,
-        step: int = 1,
-        what: str = "frame",
-        words: Pairs = (),
-        **how: Unpack[How],
-    ) -> Frame:
+    def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """A frame whose number is `step` past the last fresh one, which it becomes unless `fresh` is false.
 
         Instead of its preamble it may have another `lead`, and another `layout` byte in its CRC. `wrong` turns bits
         over, by place, `bad_stop` is the place of a character with a bad stop bit, and `pauses` (us) come before
         characters: places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it.
-        `sealed`: another way to seal it.
+        `sealed`: another way to seal it. `slot`: whom it asks or sets, if not the first robot.
         """
-        seq = (self.seq + step) % SEQ_MODULUS
+        seq = (self.seq + how.get("step", 1)) % SEQ_MODULUS
         self.seq = seq if how.get("fresh", True) else self.seq
         form = replace(self.form, layout=how.get("layout", self.form.layout))
         sealed = how.get("sealed", seal)(form, bytes([kind * SEQ_MODULUS + seq]) + payload)
@@ -240,18 +251,16 @@ class TrialScript:
 
     def reset(self, tick: int, for_ms: float) -> int:
         """Holds the processor of the network's first robot in reset from `tick` on; returns when it is let go."""
-        return self._do(Reset, tick, for_ms, (1, 0))
+        return self._do(Reset, tick, for_ms, 1)
 
     def switch_off(self, tick: int, for_ms: float) -> int:
         """Takes the supply of the network's first robot away; returns when it is back."""
-        return self._do(Power, tick, for_ms, (0, 1))
+        return self._do(Power, tick, for_ms, 0)
 
-    def _do(self, kind: type[Reset] | type[Power], tick: int, for_ms: float, levels: tuple[int, int]) -> int:
-        slot, end_tick = self.topology.slots[0], tick + ms(for_ms)
-        self.done += [
-            kind(tick, self.network, slot, levels[0]),
-            kind(end_tick, self.network, slot, levels[1]),
-        ]
+    def _do(self, kind: type[Reset] | type[Power], tick: int, for_ms: float, level: int) -> int:
+        end_tick = tick + ms(for_ms)
+        self.done.append(kind(tick, self.network, self.slot, level))
+        self.done.append(kind(end_tick, self.network, self.slot, 1 - level))
         return end_tick
 
     # ---- expecting -----------------------------------------------------------------------------------------
@@ -266,50 +275,46 @@ class TrialScript:
     ) -> None:
         self.expected.append(Expectation(tick, wanted, test, slots, by_answers))
 
-    def obeyed(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
+    def obeyed(self, frame: Frame) -> Frame:
         """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
-        deadline = frame.end_tick + ACTING_TICKS
 
         def test(observed: Observed) -> Found:
-            told = observed.both_told(deadline)
+            told = observed.both_told(frame.acted_tick)
             wanted = frame.for_robot(observed.slot)
-            if all(obeys(order, word) for order, word in zip(told, wanted, strict=True)):
-                return None
-            left, right = map(number, wanted)
-            found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
-            return deadline, found + _instead(observed, frame, told)
+            if not all(map(obeys, told, wanted)):
+                left, right = map(number, wanted)
+                found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
+                yield frame.acted_tick, found + _instead(observed, frame, told)
 
-        self.expect(deadline, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test, slots)
+        self.expect(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test)
+        return frame
 
-    def ignored(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
+    def ignored(self, frame: Frame) -> None:
         """The wheels are told nothing new."""
-        self.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, f"{frame.what} not acted on", slots)
+        self.unchanged(frame.tick, frame.acted_tick, f"{frame.what} not acted on")
 
-    def unchanged(self, after_tick: int, until_tick: int, wanted: str, slots: tuple[int, ...] = ()) -> None:
+    def unchanged(self, after_tick: int, until_tick: int, wanted: str) -> None:
         """In between no wheel is told anything but what it was told last."""
 
         def test(observed: Observed) -> Found:
             for order in observed.ordered(after_tick, until_tick):
                 before = observed.told(order.side, after_tick)
                 if (order.what, order.velocity) != (before.what, before.velocity):
-                    return order.tick, f"the {order.side} wheel told {in_words(order)}"
-            return None
+                    yield order.tick, f"the {order.side} wheel told {in_words(order)}"
 
-        self.expect(until_tick, wanted, test, slots)
+        self.expect(until_tick, wanted, test)
 
     def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
         """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
-        until = frame.end_tick + ACTING_TICKS
 
         def test(observed: Observed) -> Found:
-            for event in observed.wrote(frame.tick, until):
+            for event in observed.wrote(frame.tick, frame.acted_tick):
                 found = str(event).partition(" command ")[2]
-                if since is None or abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) > ms(2.0):
-                    return event.tick, found
-                return event.tick, f"{found}: the failsafe counts on from {since.what}"
-            return None
+                if since is not None and abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) <= ms(2.0):
+                    found += f": the failsafe counts on from {since.what}"
+                yield event.tick, found
 
-        self.expect(until, f"{frame.what} not acted on", test, slots)
+        self.expect(frame.acted_tick, f"{frame.what} not acted on", test, slots)
 
     def chips_keep(
         self, after_tick: int, until_tick: int, wanted: str, wrong: Callable[[str, Axis], str]
@@ -319,31 +324,23 @@ class TrialScript:
         def test(observed: Observed) -> Found:
             for tick, side, chip in observed.chips(after_tick, until_tick):
                 if found := wrong(side, chip):
-                    return tick, found
-            return None
+                    yield tick, found
 
         self.expect(until_tick, wanted, test)
 
-    def answered(
-        self,
-        question: Frame,
-        slot: int,
-        wanted: str = "",
-        says: Callable[[Answer, Observed], str] | None = None,
-    ) -> None:
-        """The robot in `slot` answers in time, and with this number. `says`: what is wrong with what it says, or ""."""
-        deadline = over_by(question)
+    def answered(self, question: Frame, wanted: str = "", says: Says | None = None) -> None:
+        """The robot that it asks answers in time, and with this number."""
+        slot, deadline = question.seq % self.n, over_by(question)
 
         def test(observed: Observed) -> Found:
-            found = observed.answers_in(question.last_tick, deadline)
-            if not found:
-                return deadline, _no_answer(observed, question, deadline)
-            answer = found[0]
-            said = answer.said
-            if said is None or (said.slot, said.seq) != (slot, question.seq):
-                return answer.tick, who(answer)
-            what = says(answer, observed) if says is not None else ""
-            return (answer.tick, what) if what else None
+            answers = within(observed.answers, question.last_tick, deadline)
+            said = answers[0].said if answers else None
+            if not answers:
+                yield deadline, _no_answer(observed, question, deadline)
+            elif said is None or (said.slot, said.seq) != (slot, question.seq):
+                yield answers[0].tick, who(answers[0])
+            elif says is not None and (what := says(said, answers[0], observed)):
+                yield answers[0].tick, what
 
         self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,), by_answers=True)
 
@@ -351,12 +348,9 @@ class TrialScript:
         """The PC hears nothing in between."""
 
         def test(observed: Observed) -> Found:
-            spoke = observed.spoke(after_tick, until_tick)
-            if spoke is None:
-                return None
-            heard = in_a_row([one for one in observed.heard if spoke.tick <= one.tick <= until_tick])
-            answer = next(iter(observed.answers_in(spoke.tick, heard[-1].tick)), None)
-            return spoke.tick, characters(heard) + (f": {who(answer)}" if answer is not None else "")
+            if heard := in_a_row(within(observed.heard, after_tick, until_tick)):
+                answers = within(observed.answers, heard[0].tick, heard[-1].tick)
+                yield heard[0].tick, ": ".join([characters(heard), *map(who, answers[:1])])
 
         self.expect(until_tick, f"silence: {why}", test, by_answers=True)
 
@@ -367,7 +361,7 @@ def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str
         late = _told_late(observed, frame)
         if late is not None:
             return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
-        wrote = observed.wrote(frame.tick, frame.end_tick + ACTING_TICKS)
+        wrote = observed.wrote(frame.tick, frame.acted_tick)
         loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
         return ": loaded, but not started (STT)" if loaded else ": nothing was told"
     what = wheels_instead(told, frame, observed.slot)
@@ -375,9 +369,8 @@ def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str
 
 
 def _told_late(observed: Observed, frame: Frame) -> int | None:
-    deadline = frame.end_tick + ACTING_TICKS
     wanted = frame.for_robot(observed.slot)
-    for order in observed.ordered(deadline, deadline + CONTROL_PERIOD_TICKS):
+    for order in observed.ordered(frame.acted_tick, frame.acted_tick + CONTROL_PERIOD_TICKS):
         if all(map(obeys, observed.both_told(order.tick), wanted)):
             return order.tick
     return None
@@ -390,11 +383,9 @@ def who(answer: Answer) -> str:
 
 
 def _no_answer(observed: Observed, question: Frame, deadline: int) -> str:
-    heard = [one for one in observed.heard if question.last_tick < one.tick <= deadline]
-    late = next(
-        (one for one in observed.answers_in(deadline, observed.end_tick) if one.frame.seq == question.seq),
-        None,
-    )
+    heard = within(observed.heard, question.last_tick, deadline)
+    later = within(observed.answers, deadline, observed.end_tick)
+    late = next((one for one in later if one.frame.seq == question.seq), None)
     if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
         return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"
     if not heard:

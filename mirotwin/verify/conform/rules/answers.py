@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Sequence
+from typing import Unpack
 
 from miro_exact.clock import TICKS_PER_SECOND
-from miro_protocol.table import (
-    BITS_PER_CHARACTER,
-    ROBOT_BIT_TICKS,
-    SYNC,
-    TELEMETRY,
-    Flags,
-    Opcode,
-)
+from miro_protocol.frames import TelemetryFrame
+from miro_protocol.table import BITS_PER_CHARACTER, ROBOT_BIT_TICKS, SYNC, TELEMETRY, Flags
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
-from mirotwin.verify.conform.observed import Answer, Observed
+from mirotwin.verify.conform.observed import Answer, Observed, within
 from mirotwin.verify.conform.rule import BOTH, FRAME, FRESHNESS, RECEPTION, THREE, TURNS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms, over_by
+from mirotwin.verify.conform.trial_script import Found, Frame, How, Says, TrialScript, ms, over_by
 
 CHAPTER = Chapter("Answers")
 BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS
@@ -45,10 +39,10 @@ def in_turn(script: TrialScript) -> None:
     """
     script.seq = 59
     for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
-        question = script.team(ask=True, what="question", gap_ms=36.0)
+        question = script.team(ask=True, gap_ms=36.0)
         asked = question.seq % script.n
         if asked in script.topology.slots:
-            script.answered(question, asked)
+            script.answered(question)
         else:
             script.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
 
@@ -59,11 +53,12 @@ def form(script: TrialScript) -> None:
     whitened, CRC with the layout byte 1Eh.
     """
     for _ in range(3 * script.n):  # whoever it takes itself for
-        _formed(script, script.team(ask=True, what="question", gap_ms=36.0))
+        _formed(script, script.team(ask=True, gap_ms=36.0))
     end = script.now
 
     def any_heard(observed: Observed) -> Found:
-        return None if observed.heard else (end, "none")
+        if not observed.heard:
+            yield end, "none"
 
     script.expect(end, f"an answer to some of {3 * script.n} questions in a row", any_heard)
 
@@ -73,16 +68,16 @@ def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> No
     until = question.end_tick + ms(56.0)
 
     def test(observed: Observed) -> Found:
-        heard = [one for one in observed.heard if question.last_tick < one.tick <= until]
-        heard = heard[: TELEMETRY.wire_size] if then_more else list(in_a_row(heard))
-        what = _badly_formed(heard, question, observed) if heard else ""
-        return (heard[-1].tick, f"{characters(heard)}: {what}") if what else None
+        heard: Sequence[Event] = within(observed.heard, question.last_tick, until)
+        heard = heard[: TELEMETRY.wire_size] if then_more else in_a_row(heard)
+        if heard and (what := _badly_formed(heard, question, observed)):
+            yield heard[-1].tick, f"{characters(heard)}: {what}"
 
     wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
-    script.expect(until, wanted, test, (script.topology.slots[0],))
+    script.expect(until, wanted, test)
 
 
-def _badly_formed(heard: list[Event], question: Frame, observed: Observed) -> str:
+def _badly_formed(heard: Sequence[Event], question: Frame, observed: Observed) -> str:
     if len(heard) != TELEMETRY.wire_size:
         return f"{len(heard)} without a pause"
     found = bytes(one.value for one in heard)[: len(_HEAD)]
@@ -93,7 +88,7 @@ def _badly_formed(heard: list[Event], question: Frame, observed: Observed) -> st
     baud = BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(heard) - 1) / (heard[-1].tick - heard[0].tick)
     if abs(baud - BAUD) > BAUD_TOLERANCE * BAUD:
         return f"{baud:.0f} baud"
-    if not observed.answers_in(heard[0].tick - 1, heard[-1].tick):
+    if not within(observed.answers, heard[0].tick - 1, heard[-1].tick):
         return no_answer(heard, question.seq)
     return ""
 
@@ -103,39 +98,35 @@ def unasked(script: TrialScript) -> None:
     """A robot MUST speak only when it is asked: not on type 0 and 1, not on questions to others, nor on those that are
     not fresh or not valid.
     """
-    slot = script.topology.slots[0]
     script.silent(0, script.now, "nobody asks")
     for _ in range(script.n + 1):
         script.team()
         script.ping()
     for other in range(script.n):
-        if other != slot:
-            script.ask(other)
-    script.ask(slot, fresh=False, wrong={script.form.size - 1: 0x10})
-    script.ask(slot, fresh=False, bad_stop=9)
+        if other != script.slot:
+            script.ask(slot=other)
+    script.ask(fresh=False, wrong={script.form.size - 1: 0x10})
+    script.ask(fresh=False, bad_stop=9)
     script.silent(ms(1.0), script.now, "no question to this robot")
-    question = script.ask(slot, gap_ms=36.0)
-    script.answered(question, slot)
+    script.answered(script.ask(gap_ms=36.0))
     after = script.now
     for _ in range(3):
         script.team(ask=True, step=0, fresh=False)
     script.wait(200.0)
     script.silent(after, script.now, "no fresh question")
-    script.answered(script.ask(slot, gap_ms=36.0), slot)
+    script.answered(script.ask(gap_ms=36.0))
 
 
 @CHAPTER.rule("P44", TURNS, presupposes="P04 P41")
 def full_duplex(script: TrialScript) -> None:
     """A robot MUST hear the next frame while it answers, and what it hears MUST NOT disturb its answer."""
-    slot = script.topology.slots[0]
     for _ in range(3):
-        question = script.ask(slot, gap_ms=0.0)
-        script.answered(question, slot)
+        script.answered(script.ask(gap_ms=0.0))
         script.obeyed(script.team(lead=b"", gap_ms=12.0))
-    question = script.ask(slot, gap_ms=0.0)
-    script.answered(question, slot, "one whole answer to two questions in a row")
+    question = script.ask(gap_ms=0.0)
+    script.answered(question, "one whole answer to two questions in a row")
     _formed(script, question, then_more=True)
-    script.obeyed(script.ask(slot, lead=b"", gap_ms=40.0))
+    script.obeyed(script.ask(lead=b"", gap_ms=40.0))
 
 
 @CHAPTER.rule("P45", FRAME, presupposes="P32 P43")
@@ -157,10 +148,10 @@ def flags(script: TrialScript) -> None:
     script.ask_nobody()
     _says_flags(script, Flags.STOPPED, ", which no answer has told,")
     script.wait(140.0)
-    question = script.ask(script.topology.slots[0], gap_ms=0.0)
+    question = script.ask(gap_ms=0.0)
     first = f"flags {int(Flags.STOPPED):02X}h in the answer to {question.what}, the first of two in a row"
-    script.answered(question, script.topology.slots[0], first, partial(_flagged, Flags.STOPPED))
-    script.ask(script.topology.slots[0], lead=b"", gap_ms=40.0)
+    script.answered(question, first, flagged(Flags.STOPPED))
+    script.ask(lead=b"", gap_ms=40.0)
     _says_flags(script, 0)
     for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
         for _ in range(2):  # what happened twice is told once
@@ -169,21 +160,18 @@ def flags(script: TrialScript) -> None:
         _says_flags(script, wanted)
 
 
-def _says(
-    script: TrialScript, wanted: str, says: Callable[[Answer, Observed], str], gap_ms: float = 36.0
-) -> Frame:
-    question = script.ask(script.topology.slots[0], gap_ms=gap_ms)
-    script.answered(question, script.topology.slots[0], f"{wanted} in the answer to {question.what}", says)
-    return question
+def _says(script: TrialScript, wanted: str, says: Says, **how: Unpack[How]) -> None:
+    question = script.ask(**(How(gap_ms=36.0) | how))
+    script.answered(question, f"{wanted} in the answer to {question.what}", says)
 
 
 def _says_flags(script: TrialScript, wanted: int, since: str = "") -> None:
-    _says(script, f"flags {int(wanted):02X}h{since}", partial(_flagged, wanted))
+    _says(script, f"flags {int(wanted):02X}h{since}", flagged(wanted))
 
 
-def _flagged(wanted: int, answer: Answer, observed: Observed) -> str:
-    assert answer.said is not None
-    return "" if answer.said.flags == wanted else f"{answer.said.flags:02X}h"
+def flagged(wanted: int, among: int = 0xFF) -> Says:
+    """Among these flags those are set that are `wanted`."""
+    return lambda said, *_: "" if said.flags & among == wanted else f"{said.flags:02X}h"
 
 
 @CHAPTER.rule("P46", FRAME, presupposes="P35 P41")
@@ -198,23 +186,19 @@ def status(script: TrialScript) -> None:
     def differ(observed: Observed) -> Found:
         last = observed.periods[-1][1]
         if last.left.status == last.right.status:
-            return end, f"{last.left.status:02X}h in both"
-        return None
+            yield end, f"{last.left.status:02X}h in both"
 
     script.expect(end, "an excessive error in the left LM629 alone", differ)
 
 
 def _run_away(script: TrialScript) -> None:
     """Gains of 0 and a fast left wheel: its desired position runs away from the real one."""
-    slot = script.topology.slots[0]
-    script.service(slot, Opcode.FILTER, bytes(8))
+    script.filter((0, 0, 0, 0))
     for _ in range(8):
-        script.team(script.same(slot, 16000, 50), gap_ms=30.0)
+        script.team(script.same(16000, 50), gap_ms=30.0)
 
 
-def _status(answer: Answer, observed: Observed) -> str:
-    said = answer.said
-    assert said is not None
+def _status(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
     for side, (one, other), others, found in (
@@ -240,30 +224,26 @@ def positions(script: TrialScript) -> None:
     """The positions MUST be the low 16 bits of the real positions of both wheels, as they are when the robot
     answers.
     """
-    slot = script.topology.slots[0]
     for _ in range(10):  # beyond 65536 counts, one wheel forward and one backward
-        script.team(script.same(slot, 13000, -12000), gap_ms=50.0)
+        script.team(script.same(13000, -12000), gap_ms=50.0)
     _says(script, "the real positions", _positions)
     for _ in range(_AT_SPEED):
-        question = script.ask(slot, "question at speed", script.same(slot, 13000, -12000), gap_ms=36.0)
-        script.answered(
-            question, slot, f"positions of one sample each in the answer to {question.what}", _read_at_once
-        )
+        question = script.ask(what="question at speed", words=script.same(13000, -12000), gap_ms=36.0)
+        wanted = f"positions of one sample each in the answer to {question.what}"
+        script.answered(question, wanted, _read_at_once)
     for _ in range(7):
-        script.team(script.same(slot, 0, 0), gap_ms=60.0)
-    _stands(script, slot)
+        script.team(script.same(0, 0), gap_ms=60.0)
+    _stands(script)
     _run_away(script)
-    _stands(script, slot)
+    _stands(script)
 
 
-def _stands(script: TrialScript, slot: int) -> None:
-    question = script.ask(slot, words=script.same(slot, 0, 0), gap_ms=70.0)
-    script.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
+def _stands(script: TrialScript) -> None:
+    question = script.ask(words=script.same(0, 0), gap_ms=70.0)
+    script.answered(question, f"the real positions in the answer to {question.what}", _positions)
 
 
-def _positions(answer: Answer, observed: Observed) -> str:
-    said = answer.said
-    assert said is not None
+def _positions(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left = (before.left.real_position, after.left.real_position)
     right = (before.right.real_position, after.right.real_position)
@@ -280,17 +260,15 @@ def _positions(answer: Answer, observed: Observed) -> str:
     return ""
 
 
-def _read_at_once(answer: Answer, observed: Observed) -> str:
+def _read_at_once(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
-    said = answer.said
-    assert said is not None
     for side, found in (("left", said.position_left), ("right", said.position_right)):
         read = observed.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
         if read and found not in read:
             where = f"{number(found)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
             mixed = any(found in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
             return f"{where}: its bytes are of two samples" if mixed else where
-    return _positions(answer, observed)
+    return _positions(said, answer, observed)
 
 
 def _within(position: int, ends: tuple[int, int]) -> bool:
@@ -305,10 +283,6 @@ def accepted(script: TrialScript) -> None:
     frame counts.
     """
     count = 0
-
-    def counted(wanted: int) -> None:
-        _says(script, f"accepted {number(wanted % 256, 2)}", partial(_counts, "accepted", wanted))
-
     for rows, gap_ms in ((5, 12.0), (122, 0.0), (128, 0.0), (3, 12.0)):
         for _ in range(rows):
             script.team(lead=b"", gap_ms=gap_ms)
@@ -319,13 +293,15 @@ def accepted(script: TrialScript) -> None:
         script.ping(lead=b"")
         script.of_type_2(lead=b"")
         count += rows + 3
-        counted(count)
+        _counts(script, "accepted", count)
 
 
-def _counts(name: str, wanted: int, answer: Answer, observed: Observed) -> str:
-    assert answer.said is not None
-    found = int(getattr(answer.said, name))
-    return "" if found == wanted % 256 else number(found, 2)
+def _counts(script: TrialScript, name: str, count: int) -> None:
+    def wrong(said: TelemetryFrame, *_: object) -> str:
+        found = int(getattr(said, name))
+        return "" if found == count % 256 else number(found, 2)
+
+    _says(script, f"{name} {number(count % 256, 2)}", wrong)
 
 
 @CHAPTER.rule("P49", RECEPTION, presupposes="P06 P13 P41")
@@ -335,15 +311,11 @@ def rejected(script: TrialScript) -> None:
     """
     count = 0
     size = script.form.size
-
-    def counted() -> None:
-        _says(script, f"rejected {number(count % 256, 2)}", partial(_counts, "rejected", count))
-
-    counted()
+    _counts(script, "rejected", count)
     for how in ({size - 1: 1}, {2: 0x80}, {size // 2: 0x18}):
         script.team(fresh=False, wrong=how)
         count += 1
-    counted()
+    _counts(script, "rejected", count)
     script.team(step=0, fresh=False)
     script.team(fresh=False, bad_stop=7, wrong={5: 1})
     script.team(fresh=False, pauses={9: 200.0}, wrong={5: 1})
@@ -351,19 +323,18 @@ def rejected(script: TrialScript) -> None:
     script.team(fresh=False, wrong={1: 0x80})
     script.characters(bytes(40))
     script.wait(12.0)
-    counted()
+    _counts(script, "rejected", count)
     for syncs in (40, 90, 150):  # each sync with a whole window after it is one
         script.characters(SYNC * syncs)
         count += (2 * syncs - size) // 2 + 1
         script.wait(20.0)
-        counted()
+        _counts(script, "rejected", count)
 
 
 @CHAPTER.rule("P50", FRESHNESS, presupposes="P41", topologies=THREE)
 def after_silence(script: TrialScript) -> None:
     """A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it."""
-    slot = script.topology.slots[0]
     for silence_ms in (130.0, 700.0):
-        script.answered(script.ask(slot, gap_ms=36.0), slot)
+        script.answered(script.ask(gap_ms=36.0))
         script.wait(silence_ms)
-    script.answered(script.ask(slot, gap_ms=36.0), slot)
+    script.answered(script.ask(gap_ms=36.0))

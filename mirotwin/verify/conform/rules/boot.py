@@ -33,9 +33,8 @@ def reset_together(script: TrialScript) -> None:
     RSTI 0000h follows, and both show 80h or C0h.
     """
     script.wait(60.0)
-    first = script.team()
-    script.obeyed(first)
-    end = script.now
+    first = script.obeyed(script.team())
+    end, up = script.now, ms(BOOTED_MS)
 
     def shown(side: str, chip: Axis) -> str:
         return f"{chip.status:02X}h of the {side} one" if chip.status not in (0x80, 0xC0) else ""
@@ -44,24 +43,20 @@ def reset_together(script: TrialScript) -> None:
         resets = [(one.tick, one.side) for one in observed.commands if one.opcode == _RESET]
         for tick, side in resets:
             if len([at for at, _ in resets if at == tick]) != len(SIDES):
-                return tick, f"RESET to the {side} one"
-        return None
+                yield tick, f"RESET to the {side} one"
 
     def other_mask(observed: Observed) -> Found:
         for one in observed.commands:
             if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
-                return one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
-        return None
+                yield one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
 
     def apart(observed: Observed) -> Found:
         for tick, left, right in observed.samples:
-            if tick > ms(BOOTED_MS) and NEVER_TICK in (left, right):
-                return tick, "one in reset"
-            if tick > ms(BOOTED_MS) and (left - right) % SAMPLE_TICKS:
-                return tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
-        return None
+            if tick > up and NEVER_TICK in (left, right):
+                yield tick, "one in reset"
+            if tick > up and (left - right) % SAMPLE_TICKS:
+                yield tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
 
-    up = ms(BOOTED_MS)
     script.chips_keep(up, first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
     script.expect(first.tick, "RSTI 0000h", other_mask)
     script.expect(end, "RESET sent to both LM629 or none", alone)
@@ -81,8 +76,7 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
     def ordered(observed: Observed) -> Found:
         for order in observed.ordered(after_tick, until_tick):
             if order.what != "off":
-                return order.tick, f"the {order.side} one told {in_words(order)}"
-        return None
+                yield order.tick, f"the {order.side} one told {in_words(order)}"
 
     def driven(side: str, chip: Axis) -> str:
         if chip.pwm_magnitude:
@@ -110,7 +104,7 @@ def no_slot(script: TrialScript) -> None:
     for _ in range(2):
         for slot in range(script.n):
             script.team()
-            question = script.ask(slot, gap_ms=36.0)
+            question = script.ask(slot=slot, gap_ms=36.0)
             if script.topology.strap is None:  # a robot that is there, beside them
                 script.obeyed(question)
     if script.topology.strap is None:

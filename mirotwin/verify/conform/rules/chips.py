@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
+from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
 from miro_sim.periods import Axis
 from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import FRAME, PORT, POWER_ON, Chapter
+from mirotwin.verify.conform.rules.answers import flagged
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.trial_script import TrialScript
 
@@ -24,12 +24,9 @@ def slow(script: TrialScript) -> None:
     """LM629s that take the data sheet's longest times, 1.5 ms for a reset and 100 us for a command or a word, and that
     show C4h after a reset, MUST be waited for: the robot does as with others.
     """
-    slot = script.topology.slots[0]
     for _ in range(3):
         script.obeyed(script.team())
-        script.answered(
-            script.ask(slot, gap_ms=36.0), slot, "no flag 20h, and status of LM629s that are free", _free
-        )
+        script.answered(script.ask(gap_ms=36.0), "no flag 20h, and status of LM629s that are free", _free)
     nothing_refused(script)
 
 
@@ -50,15 +47,12 @@ def busy(script: TrialScript) -> None:
 
 
 def _tells_of_them(script: TrialScript) -> None:
-    slot = script.topology.slots[0]
     script.team(lead=b"")
-    script.answered(
-        script.ask(slot, gap_ms=36.0), slot, "flag 20h", _says(Flags.INIT_FAILED, Flags.INIT_FAILED)
-    )
+    script.answered(script.ask(gap_ms=36.0), "flag 20h", flagged(Flags.INIT_FAILED, Flags.INIT_FAILED))
     both = Flags.INIT_FAILED | Flags.MOTORS_OFF
     for _ in range(2):
         script.wait(520.0)
-        script.answered(script.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
+        script.answered(script.ask(gap_ms=36.0), f"flags {int(both):02X}h", flagged(both, both))
 
     def driven(side: str, chip: Axis) -> str:
         return f"the {side} one driven" if chip.pwm_magnitude else ""
@@ -66,17 +60,7 @@ def _tells_of_them(script: TrialScript) -> None:
     script.chips_keep(0, script.now, "both motors off", driven)
 
 
-def _free(answer: Answer, observed: Observed) -> str:
-    said = answer.said
-    assert said is not None
+def _free(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     if said.status_left & _BUSY or said.status_right & _BUSY:
         return f"status {said.status_left:02X}h and {said.status_right:02X}h, read while busy (01h)"
-    return _says(0, Flags.INIT_FAILED)(answer, observed)
-
-
-def _says(wanted: int, among: int) -> Callable[[Answer, Observed], str]:
-    def says(answer: Answer, observed: Observed) -> str:
-        assert answer.said is not None
-        return "" if answer.said.flags & among == wanted else f"{answer.said.flags:02X}h"
-
-    return says
+    return flagged(0, Flags.INIT_FAILED)(said, answer, observed)

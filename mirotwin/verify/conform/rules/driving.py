@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
@@ -58,7 +57,7 @@ def words(script: TrialScript) -> None:
     ]  # fmt: skip
     pairs += [(0x55AA >> 2, -0x2AD5), (0, 300), (-300, 0), (4097, 16), (-16633, 16632)]
     for left, right in pairs:
-        script.obeyed(_only(script, left, right))
+        _told(script, left, right)
 
 
 @CHAPTER.rule("P26", FRAME, presupposes="P19")
@@ -75,15 +74,14 @@ def saturation(script: TrialScript) -> None:
         (20000, 100),
         (-100, -20000),
     ):
-        script.obeyed(_only(script, left, right))
+        _told(script, left, right)
 
 
-def _only(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
-    """A frame with these velocities for the robots that are there."""
-    pairs = list(script.words())
-    for slot in script.topology.slots:
-        pairs[slot] = (left, right)
-    return script.team(tuple(pairs), what=f"team frame with {left}, {right}", **how)
+def _told(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
+    """A frame with these velocities, and what is expected of it."""
+    return script.obeyed(
+        script.team(script.same(left, right), what=f"team frame with {left}, {right}", **how)
+    )
 
 
 @CHAPTER.rule("P27", FIRMWARE, presupposes="P32")
@@ -93,7 +91,7 @@ def one_sample(script: TrialScript) -> None:
     script.wait(620.0)
     for frame in frames:
         script.obeyed(frame)
-        _together(script, frame.tick, frame.end_tick + ACTING_TICKS, frame.what)
+        _together(script, frame.tick, frame.acted_tick, frame.what)
     end = frames[-1].end_tick
     _together(script, end + ms(50.0), end + ms(120.0), "the failsafe's stop")
     _together(script, end + ms(450.0), end + ms(510.0), "motors off")
@@ -103,11 +101,10 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) 
     def test(observed: Observed) -> Found:
         left, right = observed.both_told(until_tick)
         if min(left.tick, right.tick) <= after_tick:
-            return until_tick, "a wheel that was told nothing"
+            yield until_tick, "a wheel that was told nothing"
         grid = observed.samples[-1][1]
         if (left.tick - grid) // SAMPLE_TICKS != (right.tick - grid) // SAMPLE_TICKS:
-            return max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
-        return None
+            yield max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
 
     script.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
 
@@ -116,9 +113,8 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) 
 def kept(script: TrialScript) -> None:
     """Between frames the wheels MUST keep their velocities."""
     for sign in (1, -1, 1):
-        frame = _only(script, 300 * sign, -311 * sign, gap_ms=65.0)
-        script.obeyed(frame)
-        script.unchanged(frame.end_tick + ACTING_TICKS, script.now, f"velocities kept after {frame.what}")
+        frame = _told(script, 300 * sign, -311 * sign, gap_ms=65.0)
+        script.unchanged(frame.acted_tick, script.now, f"velocities kept after {frame.what}")
         _reached(script, frame)
 
 
@@ -144,8 +140,7 @@ def _reached(script: TrialScript, frame: Frame) -> None:
         for tick, record in observed.periods:
             found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
             if after_tick <= tick <= until_tick and found != wanted:
-                return tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(observed, tick)}"
-        return None
+                yield tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(observed, tick)}"
 
     assert until_tick - after_tick > CONTROL_PERIOD_TICKS
     script.expect(until_tick, f"both LM629 at the velocities of {frame.what}", test)

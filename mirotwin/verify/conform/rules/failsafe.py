@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.robot_rules import ACTING_TICKS, TOLERANCE_TICKS, SilenceRule
+from miro_protocol.robot_rules import TOLERANCE_TICKS, SilenceRule
 from miro_protocol.table import (
     DEFAULT_ACCELERATION,
     FAILSAFE_OFF_TICKS,
     FAILSAFE_STOP_TICKS,
     SYNC,
     TICKS_PER_MS,
-    Opcode,
 )
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
@@ -45,8 +44,7 @@ def stop(script: TrialScript) -> None:
 @CHAPTER.rule("P30", FRESHNESS, presupposes="P06 P13 P20 P32 P37", broken="the failsafe is put off")
 def not_put_off(script: TrialScript) -> None:
     """Frames that are not fresh, or not valid, and characters that are no frame MUST NOT put off the failsafe."""
-    last = script.team()
-    script.obeyed(last)
+    last = script.obeyed(script.team())
     for count in range(16):
         script.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
         script.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
@@ -66,17 +64,14 @@ def not_put_off(script: TrialScript) -> None:
 
 def _stop_of_a_busy_robot(script: TrialScript) -> None:
     """While one wheel still comes to a stop and an acceleration waits for that, syncs in a row before a frame."""
-    slot = script.topology.slots[0]
     for syncs in (16, 24):
         for _ in range(8):
-            script.team(script.same(slot, 0, 12000))
-        script.team(script.same(slot, 0, 12000), gap_ms=2.0)
-        script.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
+            script.team(script.same(0, 12000))
+        script.team(script.same(0, 12000), gap_ms=2.0)
+        script.acceleration(DEFAULT_ACCELERATION, gap_ms=0.0)
         script.wait(112.0)
         script.characters(SYNC * syncs)
-        last = script.team(what=f"team frame after {syncs} syncs", lead=b"")
-        script.obeyed(last)
-        stops_behind(script, last)
+        stops_behind(script, script.obeyed(script.team(what=f"team frame after {syncs} syncs", lead=b"")))
         script.wait(130.0)
 
 
@@ -86,17 +81,16 @@ def smooth(script: TrialScript) -> None:
     another.
     """
     for acceleration in (DEFAULT_ACCELERATION, 3000):
-        if acceleration != DEFAULT_ACCELERATION:
-            script.service(script.topology.slots[0], Opcode.ACCELERATION, acceleration.to_bytes(4, "little"))
+        changed = acceleration != DEFAULT_ACCELERATION
+        if changed:
+            script.acceleration(acceleration)
         fast = tuple((12000, -12000) for _ in range(script.n))
         until = script.now + ms(12000 * 256 / acceleration * SAMPLE_TICKS / TICKS_PER_MS + 60.0)
         while script.now < until:
             last = script.team(fast, gap_ms=60.0)
         script.obeyed(last)
         stop_tick = last.end_tick + FAILSAFE_STOP_TICKS
-        script.wait_until(
-            last.end_tick + ms(490.0) if acceleration != DEFAULT_ACCELERATION else stop_tick + ms(320.0)
-        )
+        script.wait_until(last.end_tick + ms(490.0) if changed else stop_tick + ms(320.0))
         _slows_down(script, stop_tick + TOLERANCE_TICKS, script.now, acceleration)
         _stays_closed(script, last, script.now)
 
@@ -114,13 +108,12 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
             if side in before and now:  # the last step is a part of one
                 steps += 1
                 if fallen not in (samples * acceleration, (samples + 1) * acceleration):
-                    return tick, f"the {side} one slower by {fallen / samples:.0f} a sample"
+                    yield tick, f"the {side} one slower by {fallen / samples:.0f} a sample"
             before[side] = now
         if not steps:
-            return until_tick, "no wheel that slowed down"
+            yield until_tick, "no wheel that slowed down"
         if any(before.values()):
-            return until_tick, "a wheel that still turns"
-        return None
+            yield until_tick, "a wheel that still turns"
 
     script.expect(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2", test)
 
@@ -129,10 +122,9 @@ def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
     """No abrupt stop, and the motors stay on."""
 
     def test(observed: Observed) -> Found:
-        for order in observed.ordered(last.end_tick + ACTING_TICKS, until_tick):
+        for order in observed.ordered(last.acted_tick, until_tick):
             if order.abrupt or order.what == "off":
-                return order.tick, f"the {order.side} wheel told {in_words(order)}"
-        return None
+                yield order.tick, f"the {order.side} wheel told {in_words(order)}"
 
     script.expect(until_tick, "a smooth stop", test)
 
@@ -159,8 +151,7 @@ def off(script: TrialScript) -> None:
 def back(script: TrialScript) -> None:
     """After a failsafe stop and after motors off the next fresh team frame MUST be obeyed, with both motors on."""
     for silence_ms in (150.0, 600.0, 900.0, 120.0):
-        frame = script.team()
-        script.obeyed(frame)
+        frame = script.obeyed(script.team())
         _turning(script, script.team(frame.words, gap_ms=60.0))
         script.wait(silence_ms - 60.0)
     script.obeyed(script.team())
@@ -177,16 +168,9 @@ def _turning(script: TrialScript, frame: Frame) -> None:
         for side, moved, word in zip(SIDES, (left, right), frame.for_robot(observed.slot), strict=True):
             nominal = word * CONTROL_PERIOD_TICKS / SAMPLE_TICKS / 256
             if abs(moved - nominal) > abs(nominal) / 2:
-                why = (
-                    ""
-                    if observed.set_to(side, until)
-                    else ": no filter was loaded into its LM629 (LFIL, UDF)"
-                )
-                return (
-                    until,
-                    f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}{why}",
-                )
-        return None
+                found = f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}"
+                loaded = observed.set_to(side, until)
+                yield until, found + ("" if loaded else ": no filter was loaded into its LM629 (LFIL, UDF)")
 
     script.expect(until, f"wheels that turn as by {frame.what}", test)
 
@@ -212,17 +196,13 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
 
     def test(observed: Observed) -> Found:
         for side in SIDES:
-            if done(observed, side, earliest):
-                early = observed.told(side, earliest).tick
-                if early <= last.tick:
-                    return (
-                        latest,
-                        f"the {side} one told {in_words(observed.told(side, earliest))} before it already",
-                    )
-                return early, f"the {side} one {in_ms(early - last.end_tick)} after its end"
-        if all(done(observed, side, latest) for side in SIDES):
-            return None
-        return latest, ", ".join(when(observed, side) for side in SIDES)
+            order = observed.told(side, earliest)
+            if done(observed, side, earliest) and order.tick <= last.tick:
+                yield latest, f"the {side} one told {in_words(order)} before it already"
+            elif done(observed, side, earliest):
+                yield order.tick, f"the {side} one {in_ms(order.tick - last.end_tick)} after its end"
+        if not all(done(observed, side, latest) for side in SIDES):
+            yield latest, ", ".join(when(observed, side) for side in SIDES)
 
     def when(observed: Observed, side: str) -> str:
         after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]

@@ -30,8 +30,7 @@ def stale(script: TrialScript) -> None:
     for count, step in enumerate((0, *every)):
         if count % 2 == 0:
             script.obeyed(script.team(lead=b"\xff"))
-        frame = script.team(step=step, what=f"team frame {step} steps on", lead=b"", fresh=False)
-        script.ignored(frame)
+        script.ignored(script.team(step=step, what=f"team frame {step} steps on", lead=b"", fresh=False))
     script.obeyed(script.team())
 
 
@@ -43,19 +42,13 @@ def again(script: TrialScript) -> None:
     """
     for step in (20, 63, 9):
         for after_ms, fresh in ((AGAIN_MS - NEAR_MS, False), (AGAIN_MS + NEAR_MS, True), (400.0, True)):
-            last = script.team()
-            script.obeyed(last)
+            last = script.obeyed(script.team())
             start = last.last_tick + ms(after_ms) - (script.form.wire_size - 1) * script.character_ticks
             if after_ms < 200.0:  # a frame that is not fresh must not count here
                 script.team(step=0, lead=b"", fresh=False)
             script.wait_until(start)
-            frame = script.team(
-                step=step, what=f"team frame {step} steps on after {after_ms:g} ms", fresh=fresh
-            )
-            if fresh:
-                script.obeyed(frame)
-            else:
-                script.ignored(frame)
+            what = f"team frame {step} steps on after {after_ms:g} ms"
+            (script.obeyed if fresh else script.ignored)(script.team(step=step, what=what, fresh=fresh))
 
 
 @CHAPTER.rule(
@@ -88,10 +81,10 @@ def one_counter(script: TrialScript) -> None:
     either.
     """
     script.obeyed(script.team())
-    how = How(fresh=False, lead=b"", gap_ms=12.0)
+    how = How(step=0, fresh=False, lead=b"", gap_ms=12.0)
     for make in (script.ping, script.of_type_2, script.ask_nobody):
         make()
-        script.ignored(script.team(step=0, what="team frame with the seq of another type", **how))
+        script.ignored(script.team(what="team frame with the seq of another type", **how))
         script.obeyed(script.team())
-    script.ignored(script.team(ask=True, step=0, what="question with the seq of a team frame", **how))
+    script.ignored(script.team(ask=True, what="question with the seq of a team frame", **how))
     script.obeyed(script.team())

@@ -11,6 +11,7 @@ from miro_protocol.frames import seal
 from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, FrameType
 from miro_protocol.whitening import whiten
+from mirotwin.verify.conform.hints import payload_of
 from mirotwin.verify.conform.rule import BOTH, FRAME, RECEPTION, VERSIONS, WHY, Chapter, Topology
 from mirotwin.verify.conform.trial_script import Frame, How, TrialScript
 
@@ -187,9 +188,7 @@ def emptied(script: TrialScript) -> None:
             script.obeyed(inner)
         else:
             script.obeyed(outer)
-            script.unchanged(
-                outer.end_tick + ACTING_TICKS, inner.end_tick + ACTING_TICKS, f"{inner.what} not acted on"
-            )
+            script.unchanged(outer.acted_tick, inner.acted_tick, f"{inner.what} not acted on")
         script.obeyed(script.team())
 
 
@@ -201,12 +200,12 @@ def _nested(script: TrialScript, spoilt: bool) -> tuple[Frame, Frame]:
     form = replace(script.form, lead=b"")
     outer_words, inner_words = script.words(), script.words()
     outer_seq, inner_seq = ((script.seq + step) % SEQ_MODULUS for step in (1, 2))
-    inner_payload = bytearray(_payload(inner_words))
+    inner_payload = bytearray(payload_of(inner_words))
     inner_start = SYNC + whiten(bytes([FrameType.TEAM * SEQ_MODULUS + inner_seq]) + bytes(inner_payload[:1]))
     # what the outer payload must be in clear so that its last four characters are these on the air
     clear = whiten(bytes(form.body_size - len(inner_start)) + inner_start)[-len(inner_start) :]
     outer_body = (
-        bytes([FrameType.TEAM * SEQ_MODULUS + outer_seq]) + _payload(outer_words)[: -len(clear)] + clear
+        bytes([FrameType.TEAM * SEQ_MODULUS + outer_seq]) + payload_of(outer_words)[: -len(clear)] + clear
     )
     outer_wire = seal(form, outer_body)
     forced = whiten(bytes(2) + outer_wire[-2:])[2:]  # the outer CRC, as the inner payload says it in clear
@@ -226,10 +225,6 @@ def _nested(script: TrialScript, spoilt: bool) -> tuple[Frame, Frame]:
     script.seq = inner_seq if spoilt else outer_seq
     script.wait(12.0)
     return outer, inner
-
-
-def _payload(words: Iterable[tuple[int, int]]) -> bytes:
-    return b"".join(word.to_bytes(2, "little", signed=True) for pair in words for word in pair)
 
 
 @CHAPTER.rule("P13", RECEPTION, presupposes="P09 P10 P14", broken="a frame right after garbage is lost")

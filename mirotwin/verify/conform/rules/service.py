@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import number
@@ -15,23 +14,14 @@ from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 CHAPTER = Chapter("Service frames and unknown contents")
 
 
-def _filter(words: Words) -> bytes:
-    return b"".join(word.to_bytes(2, "little") for word in words)
-
-
-def _acceleration(value: int) -> bytes:
-    return value.to_bytes(4, "little")
-
-
 @CHAPTER.rule("P34", FRAME, presupposes="P29", broken="a ping does not do what it has to")
 def ping(script: TrialScript) -> None:
     """A service frame MUST count as fresh and leave the velocities as they are: a ping does nothing else."""
-    frame = script.team()
-    script.obeyed(frame)
+    frame = script.obeyed(script.team())
     for _ in range(5):
         last = script.ping(gap_ms=60.0)
         script.untouched(last, since=frame)
-    script.unchanged(frame.end_tick + ACTING_TICKS, script.now, "velocities kept while service frames come")
+    script.unchanged(frame.acted_tick, script.now, "velocities kept while service frames come")
     stops_behind(script, last)
     script.wait(70.0)
 
@@ -39,31 +29,30 @@ def ping(script: TrialScript) -> None:
 @CHAPTER.rule("P35", FRAME, presupposes="P21", broken="filter words are not loaded as they have to be")
 def filter_words(script: TrialScript) -> None:
     """Opcode 1 MUST load kp, ki, kd and il into both LM629 and put them in force, at rest and in motion."""
-    slot = script.topology.slots[0]
     for words in ((0x0102, 0x0304, 0x0506, 0x0708), (0x7FFF, 0, 1, 0x55AA), (400, 40, 3000, 2000)):
-        _filter_taken(script, script.service(slot, Opcode.FILTER, _filter(words), "filter frame"), words)
+        _filter_taken(script, script.filter(words, "filter frame"), words)
     script.obeyed(script.team())
     words = (401, 41, 2900, 1999)
-    frame = script.service(slot, Opcode.FILTER, _filter(words), "filter frame in motion")
+    frame = script.filter(words, "filter frame in motion")
     _filter_taken(script, frame, words)
-    script.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+    script.unchanged(frame.tick, frame.acted_tick, "velocities kept")
     script.obeyed(script.team())
 
 
 def _filter_taken(
-    script: TrialScript, frame: Frame, words: Words, wanted: str = "", slots: tuple[int, ...] = ()
+    script: TrialScript,
+    frame: Frame,
+    words: Words,
+    wanted: str = "kp, ki, kd, il = ",
+    slots: tuple[int, ...] = (),
 ) -> None:
-    deadline = frame.end_tick + ACTING_TICKS
-
     def test(observed: Observed) -> Found:
         for side in SIDES:
-            found = observed.set_to(side, deadline)
+            found = observed.set_to(side, frame.acted_tick)
             if found != words:
-                return deadline, f"{_listed(found)} in the {side} one"
-        return None
+                yield frame.acted_tick, f"{_listed(found)} in the {side} one"
 
-    wanted = wanted or f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}"
-    script.expect(deadline, wanted, test, slots)
+    script.expect(frame.acted_tick, f"{wanted}{_listed(words)} in force after {frame.what}", test, slots)
 
 
 def _listed(words: Words | None) -> str:
@@ -76,9 +65,7 @@ def acceleration(script: TrialScript) -> None:
     velocities on.
     """
     for value in (0x0102_0304, 0x3FFF_FFFF, 0x0001_2345, 4000):
-        script.service(
-            script.topology.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration frame"
-        )
+        script.acceleration(value, "acceleration frame")
         _driven_with(script, script.team(), value)
         script.obeyed(script.team(_standing(script)))
         script.wait(520.0)  # motors off: at rest in any case
@@ -87,7 +74,6 @@ def acceleration(script: TrialScript) -> None:
 @CHAPTER.rule("P37", FIRMWARE, presupposes="P31 P41", broken="an acceleration in motion does not wait")
 def acceleration_waits(script: TrialScript) -> None:
     """An acceleration that comes in motion MUST wait until the wheels stand: velocities go on with the one before."""
-    slot = script.topology.slots[0]
     script.obeyed(script.team())
     _sent_in_motion(script, 9000)
     for words in (script.words(), ((0, 700),) * script.n, ((-700, 0),) * script.n):
@@ -102,15 +88,13 @@ def acceleration_waits(script: TrialScript) -> None:
     _driven_with(script, script.team(what="team frame while one wheel slows down"), 9000)
     script.wait(300.0)  # told to stand by the failsafe
     _driven_with(script, script.team(), 7000)
-    script.answered(script.ask(slot, gap_ms=40.0), slot)
+    script.answered(script.ask(gap_ms=40.0))
     nothing_refused(script)
 
 
 def _sent_in_motion(script: TrialScript, value: int) -> None:
-    frame = script.service(
-        script.topology.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration in motion"
-    )
-    script.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+    frame = script.acceleration(value, "acceleration in motion")
+    script.unchanged(frame.tick, frame.acted_tick, "velocities kept")
 
 
 def _standing(script: TrialScript) -> tuple[tuple[int, int], ...]:
@@ -120,15 +104,13 @@ def _standing(script: TrialScript) -> tuple[tuple[int, int], ...]:
 def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
     """The frame is obeyed, and this acceleration is in force."""
     script.obeyed(frame)
-    deadline = frame.end_tick + ACTING_TICKS
 
     def test(observed: Observed) -> Found:
-        for order in observed.both_told(deadline):
+        for order in observed.both_told(frame.acted_tick):
             if order.acceleration != value:
-                return deadline, f"{number(order.acceleration, 8)} in the {order.side} one"
-        return None
+                yield frame.acted_tick, f"{number(order.acceleration, 8)} in the {order.side} one"
 
-    script.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
+    script.expect(frame.acted_tick, f"acceleration {number(value, 8)} in force with {frame.what}", test)
 
 
 @CHAPTER.rule("P38", FRAME, presupposes="P35 P36", topologies=(Topology(3, (0, 1, 2)), Topology(5, (0, 4))))
@@ -137,33 +119,28 @@ def addressed(script: TrialScript) -> None:
     words = (300, 30, 2500, 1500)
     for slot in script.topology.slots:
         others = tuple(other for other in script.topology.slots if other != slot)
-        for opcode, data in ((Opcode.FILTER, _filter(words)), (Opcode.ACCELERATION, _acceleration(8000))):
-            frame = script.service(slot, opcode, data, f"service frame to robot {slot}, opcode {opcode}")
-            script.untouched(frame, others)
-            if opcode == Opcode.FILTER:
-                _filter_taken(script, frame, words, f"{_listed(words)} in force after {frame.what}", (slot,))
+        what = f"service frame to robot {slot}, opcode "
+        frame = script.filter(words, f"{what}{Opcode.FILTER}", slot=slot)
+        script.untouched(frame, others)
+        _filter_taken(script, frame, words, "", (slot,))
+        script.untouched(script.acceleration(8000, f"{what}{Opcode.ACCELERATION}", slot=slot), others)
     script.obeyed(script.team())
     absent = script.n - 2
     if absent not in script.topology.slots:
-        script.untouched(script.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
+        script.untouched(script.filter(words, "service frame to nobody", slot=absent))
 
 
 @CHAPTER.rule("P39", VERSIONS, presupposes="P31")
 def unknown_opcode(script: TrialScript) -> None:
     """A service frame with an unknown opcode MUST be valid and count as fresh, and nothing in it be acted on."""
-    slot = script.topology.slots[0]
+    data = bytes(range(1, 9))
     for opcode in (3, 0xFE):
-        script.untouched(
-            script.service(slot, opcode, bytes(range(1, 9)), f"service frame at rest, opcode {opcode}")
-        )
-    frame = script.team()
-    script.obeyed(frame)
+        script.untouched(script.service(opcode, data, f"service frame at rest, opcode {opcode}"))
+    frame = script.obeyed(script.team())
     for opcode in (3, 4, 0x7F, 0x81, 0xFF):
-        last = script.service(
-            slot, opcode, bytes(range(1, 9)), f"service frame, opcode {opcode}", gap_ms=50.0
-        )
+        last = script.service(opcode, data, gap_ms=50.0)
         script.untouched(last, since=frame)
-    script.unchanged(frame.end_tick + ACTING_TICKS, script.now, "velocities kept")
+    script.unchanged(frame.acted_tick, script.now, "velocities kept")
     stops_behind(script, last)
     script.wait(150.0)
     _driven_with(script, script.team(), DEFAULT_ACCELERATION)
@@ -172,8 +149,7 @@ def unknown_opcode(script: TrialScript) -> None:
 @CHAPTER.rule("P40", RECEPTION, presupposes="P29", broken="a frame of type 2 is not handled as it has to be")
 def type_2(script: TrialScript) -> None:
     """A frame of type 2 from a host MUST be valid and count as fresh, and nothing in it be acted on or answered."""
-    frame = script.team()
-    script.obeyed(frame)
+    frame = script.obeyed(script.team())
     for _ in range(3 * script.n):  # each number asks another robot
         last = script.of_type_2(gap_ms=40.0)
         script.untouched(last, since=frame)

@@ -5,7 +5,7 @@ about a robot that runs for long.
 from __future__ import annotations
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.table import SYNC, Opcode
+from miro_protocol.table import SYNC
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.periods import Axis
@@ -88,51 +88,46 @@ def reset_pin(script: TrialScript) -> None:
     """A reset of the processor MUST do no harm, whenever it comes: 40 ms after it both motors are off, and the first
     frame is taken as after power-on.
     """
-    slot = script.topology.slots[0]
     for when, for_ms in (("in motion", 3.0), ("within a frame", 0.05), ("while it answers", 7.0)):
-        script.obeyed(script.team(step=1))
+        script.obeyed(script.team())
         if when == "within a frame":
             begun = script.now
             script.team()
             end = script.reset(begun + 15 * script.character_ticks, for_ms)
         else:
-            question = script.ask(slot)
+            question = script.ask()
             end = script.reset(question.end_tick + ms(9.0 if when == "while it answers" else 40.0), for_ms)
-        script.wait_until(end + ms(BOOTED_MS))
-        script.wait(45.0)
-        keeps_off(script, end, script.now)
-        script.seq += 30  # any number is fresh again
-        script.obeyed(script.team(what=f"team frame after a reset {when}"))
-        script.answered(script.ask(slot, gap_ms=36.0), slot)
+        _begins_again(script, end, 30, f"team frame after a reset {when}")
 
 
 @CHAPTER.rule("P56", POWER_ON, presupposes="P55")
 def supply(script: TrialScript) -> None:
     """A robot that is switched off and on MUST begin as from power-on, wherever it was."""
-    slot = script.topology.slots[0]
     for off_ms in (2.0, 60.0):
         script.obeyed(script.team())
-        question = script.ask(slot)
-        end = script.switch_off(question.end_tick + ms(9.0), off_ms)
-        script.wait_until(end + ms(BOOTED_MS))
-        script.wait(45.0)
-        keeps_off(script, end, script.now)
-        script.seq += 20
-        script.obeyed(script.team(what="team frame after the supply was off"))
-        script.answered(script.ask(slot, gap_ms=36.0), slot)
+        end = script.switch_off(script.ask().end_tick + ms(9.0), off_ms)
+        _begins_again(script, end, 20, "team frame after the supply was off")
+
+
+def _begins_again(script: TrialScript, tick: int, step: int, what: str) -> None:
+    """As from power-on, at `tick`: the motors are off, and a frame is fresh however many steps on."""
+    script.wait_until(tick + ms(BOOTED_MS))
+    script.wait(45.0)
+    keeps_off(script, tick, script.now)
+    script.obeyed(script.team(step=step + 1, what=what))
+    script.answered(script.ask(gap_ms=36.0))
 
 
 def load(script: TrialScript) -> None:
     """Everything at once: questions without a pause, settings, garbage full of syncs; then a frame that is obeyed."""
-    slot = script.topology.slots[0]
     for count in range(3):
         for _ in range(4):
             script.team(ask=True, lead=b"", gap_ms=0.0)
-        script.service(slot, Opcode.FILTER, bytes((0x90, 1, 40, 0, 0xB8, 11, 0xD0, 7)), gap_ms=0.0)
-        script.service(slot, Opcode.ACCELERATION, (5973 + count).to_bytes(4, "little"), gap_ms=0.0)
+        script.filter((400, 40, 3000, 2000), gap_ms=0.0)
+        script.acceleration(5973 + count, gap_ms=0.0)
         script.characters(SYNC * 25)
         script.characters(bytes(range(1, 250, 7)))
-        script.obeyed(script.ask(slot, lead=b"", what="question under load"))
+        script.obeyed(script.ask(lead=b"", what="question under load"))
     script.wait(540.0)
     script.obeyed(script.team(what="team frame after the load"))
 
@@ -140,14 +135,13 @@ def load(script: TrialScript) -> None:
 @LONG.rule("P61", TURNS, presupposes="P34 P41", topologies=THREE)
 def many(script: TrialScript) -> None:
     """However many frames came, the next one MUST be obeyed and the next question answered."""
-    slot = script.topology.slots[0]
     for number in range(1, _FRAMES + 1):
         begun = script.now
-        frame = script.ask(slot, gap_ms=0.0) if number % 3 == 0 else script.team(gap_ms=0.0)
+        frame = script.ask(gap_ms=0.0) if number % 3 == 0 else script.team(gap_ms=0.0)
         if number % _EACH < 3 or number > _FRAMES - 6:
             script.obeyed(frame)
             if number % 3 == 0:
-                script.answered(frame, slot)
+                script.answered(frame)
         script.wait_until(begun + CONTROL_PERIOD_TICKS)
     script.wait(40.0)
 
