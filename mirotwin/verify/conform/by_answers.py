@@ -167,7 +167,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     unsure = max(*port.late_ticks[begun:], max(port.delays) - shortest)
 
     for one in script.expected:  # what power-on did is told by now
-        if one.by_answers and (not one.slots or slot in one.slots) and "of power-on" not in one.wanted:
+        if one.by_answers and slot in one.slots and "of power-on" not in one.wanted:
             if (what := one.found(seen)) is not None:
                 return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
     return None, unsure

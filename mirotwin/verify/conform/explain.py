@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from miro_exact.bad_input import amount
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
-from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame, describe
+from miro_protocol.frames import ContentError, TeamFrame, describe
 from miro_protocol.table import TICKS_PER_MS
-from miro_protocol.transmission import DOWN, Transmission, follows
+from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.orders import Orders
-from mirotwin.verify.conform.hints import between, in_words, number
-from mirotwin.verify.conform.observed import within
-from mirotwin.verify.conform.probe import Listener, listen
+from mirotwin.verify.conform.hints import between, in_a_row, in_words, number
+from mirotwin.verify.conform.observed import Observed, within
+from mirotwin.verify.conform.probe import listen
 from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.trial import Trial, trial_of
+from mirotwin.verify.conform.trial import trial_of
+from mirotwin.verify.conform.trial_script import Expectation
 
 Row = tuple[int, str, str]
 """Tick, what, and details."""
@@ -36,22 +37,16 @@ def explain(rule: Rule, image: Image, seed: int = 0) -> tuple[list[str], int, in
     failed = faults = 0
     for listener in listen(trial, image, seed):
         subject = listener.subject
-        verdicts = list(_verdicts(trial, listener))
+        verdicts = [_verdict(one, listener.observed) for one in trial.expected_of(subject)]
         bad = len([row for row in verdicts if row[1] == "FAILED"])
         board = subject.robot.board
         told = [(fault.tick, "fault", str(fault)) for fault in board.faults]
         failed, faults = failed + bad, faults + board.fault_count
-        lines += [
-            "",
-            f"net{subject.network}/robot{subject.slot} (N = {subject.robots}): {_summary(verdicts, bad)}",
-        ]
-        rows = sorted([*_rows(listener), *told, *verdicts], key=lambda row: row[0])
+        summary = amount(len(verdicts), "expectation") + (f", {bad} failed" if bad else " passed")
+        lines += ["", f"net{subject.network}/robot{subject.slot} (N = {subject.robots}): {summary}"]
+        rows = sorted([*_rows(listener.observed), *told, *verdicts], key=lambda row: row[0])
         lines += map(_line, _collapsed(rows))
     return lines, failed, faults
-
-
-def _summary(verdicts: list[Row], bad: int) -> str:
-    return amount(len(verdicts), "expectation") + (f", {bad} failed" if bad else " passed")
 
 
 def _line(row: Row) -> str:
@@ -67,58 +62,48 @@ def _collapsed(rows: list[Row]) -> Iterator[Row]:
         yield same[0][0], what, text + more
 
 
-def _verdicts(trial: Trial, listener: Listener) -> Iterator[Row]:
+def _verdict(expected: Expectation, observed: Observed) -> Row:
     """An expectation that failed stands where it failed, one that was fulfilled where it was over."""
-    slot = listener.subject.slot
-    for one in trial.expected[listener.subject.network]:
-        if one.slots and slot not in one.slots:
-            continue
-        found = one.found(listener.observed)
-        if found is None:
-            yield one.tick, "passed", one.wanted
-        else:
-            yield found[0], "FAILED", f"wanted {one.wanted}, found {found[1]}"
+    found = expected.found(observed)
+    if found is None:
+        return expected.tick, "passed", expected.wanted
+    return found[0], "FAILED", f"wanted {expected.wanted}, found {found[1]}"
 
 
-def _rows(listener: Listener) -> Iterator[Row]:
-    orders, decoder = Orders(), Decoder(listener.subject.robots)
-    for event in listener.events:
+def _rows(observed: Observed) -> Iterator[Row]:
+    orders, decoder = Orders(), Decoder(observed.robots)
+    for event in observed.events:
         if event.what == "sent":
-            yield event.tick, "sent", _sent(event, decoder, listener)
+            yield event.tick, "sent", _sent(event, decoder, observed)
         elif event.what == "frame" and event.frame is not None:
-            yield (
-                event.tick,
-                "received",
-                _frame(event.frame, listener) + (", fresh" if event.value else ", not fresh"),
-            )
+            fresh = "fresh" if event.value else "not fresh"
+            yield event.tick, "received", f"{_frame(event.frame, observed)}, {fresh}"
         elif event.what == "command":
             yield event.tick, "commanded", _command(event, orders)
         elif event.what in ("reset", "power"):
             yield event.tick, event.what, f"{event.value}"
     for what, told in (("received", "received"), ("heard", "answered")):
-        for run in _runs([event for event in listener.events if event.what == what]):
-            answer = _answer(run, listener) if what == "heard" else ""
-            yield run[-1].tick, told, _characters(run) + answer
+        left: Sequence[Event] = [event for event in observed.events if event.what == what]
+        while left:
+            run = in_a_row(left)
+            left = left[len(run) :]
+            yield run[-1].tick, told, _characters(run) + (_answer(run, observed) if what == "heard" else "")
 
 
-def _sent(event: Event, decoder: Decoder, listener: Listener) -> str:
-    frames = [
-        one
-        for one in decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
-        if isinstance(one, Received)
-    ]
-    said = "; ".join(_frame(one, listener) for one in frames)
-    return f"{event.data.hex(' ')}" + (f": {said}" if said else "")
+def _sent(event: Event, decoder: Decoder, observed: Observed) -> str:
+    found = decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
+    frames = [_frame(one, observed) for one in found if isinstance(one, Received)]
+    return ": ".join(filter(None, [event.data.hex(" "), "; ".join(frames)]))
 
 
-def _frame(frame: Received, listener: Listener) -> str:
+def _frame(frame: Received, observed: Observed) -> str:
     try:
-        message = frame.message(listener.subject.robots)
+        message = frame.message(observed.robots)
     except ContentError as error:
         return f"frame of type {frame.type}, seq {frame.seq}, unknown content: {error}"
     if not isinstance(message, TeamFrame):
         return describe(message)
-    left, right = message.velocities[listener.subject.slot]
+    left, right = message.velocities[observed.slot]
     return f"{describe(message)}, this robot {number(left)}, {number(right)}"
 
 
@@ -128,28 +113,16 @@ def _command(event: Event, orders: Orders) -> str:
     return f"{text}: {in_words(order)}" if order is not None and event.opcode == _STT else text
 
 
-def _runs(events: list[Event]) -> Iterator[list[Event]]:
-    """Characters without a pause between them."""
-    run: list[Event] = []
-    for event in events:
-        if run and not follows(run[-1].tick, event.tick):
-            yield run
-            run = []
-        run.append(event)
-    if run:
-        yield run
-
-
-def _characters(run: list[Event]) -> str:
+def _characters(run: Sequence[Event]) -> str:
     shown = " ".join(f"{one.value:02x}" + ("" if one.good_stop else "!") for one in run)
     return f"{amount(len(run), 'character')}, {between(run[0].tick, run[-1].tick)}: {shown}"
 
 
-def _answer(run: list[Event], listener: Listener) -> str:
+def _answer(run: Sequence[Event], observed: Observed) -> str:
     """What the characters say, if they are an answer."""
-    for answer in within(listener.observed.answers, run[0].tick, run[-1].tick):
+    for answer in within(observed.answers, run[0].tick, run[-1].tick):
         said = answer.said
-        if not isinstance(said, TelemetryFrame):
+        if said is None:
             return ": an answer with unknown contents"
         return (
             f": {describe(said)} status={said.status_left:02X}h,{said.status_right:02X}h"

@@ -55,6 +55,7 @@ class Observed:
         self.orders: dict[str, list[Order]] = {side: [Order(-1, side, "off")] for side in SIDES}
         self._filter: dict[str, list[int]] = {side: [0, 0, 0, 0] for side in SIDES}
         self.filters: dict[str, list[tuple[int, Words]]] = {side: [] for side in SIDES}
+        self.events: list[Event] = []
         self.commands: list[Event] = []
         self.heard: list[Event] = []
         self.answers: list[Answer] = []
@@ -64,12 +65,12 @@ class Observed:
     # ---- told by the monitor ------------------------------------------------------------------------------------
 
     def take(self, event: Event) -> None:
-        """An event of the kinds command, heard and answer."""
+        self.events.append(event)
         if event.what == "command":
             self._command(event)
         elif event.what == "heard":
             self.heard.append(event)
-        elif event.frame is not None:
+        elif event.what == "answer" and event.frame is not None:
             try:
                 said = event.frame.message(self.robots)
             except ContentError:

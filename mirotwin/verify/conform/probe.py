@@ -6,20 +6,23 @@ from collections.abc import Sequence
 
 from miro_exact.bad_input import amount
 from miro_protocol.frames import seal
-from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import TICKS_PER_MS
+from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_robot.lm629.commands import BY_NAME
+from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, Monitor, Subject
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.hints import characters
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import BOTH, Rule, Topology
 from mirotwin.verify.conform.rule_monitor import ObservingMonitor
 from mirotwin.verify.conform.sealing import MISTAKES
 from mirotwin.verify.conform.trial import Trial, run_trial, trial_of
 from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
+
+Listener = ObservingMonitor[Check]
 
 
 class Listening(Check, frozen=True, kw_only=True, tag="listening"):
@@ -28,22 +31,7 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
     KIND = "safety"
 
     def monitor(self, subject: Subject) -> Monitor[Check]:
-        return Listener(self, subject)
-
-
-class Listener(ObservingMonitor[Listening]):
-    """`events`: all of one robot and its host, in the order of time; `observed` has what rules ask about."""
-
-    EVENTS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
-
-    def __init__(self, check: Listening, subject: Subject) -> None:
-        super().__init__(check, subject)
-        self.events: list[Event] = []
-
-    def event(self, event: Event) -> None:
-        self.events.append(event)
-        if event.what in ("command", "heard", "answer"):
-            self.observed.take(event)
+        return ObservingMonitor(self, subject)
 
 
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
@@ -52,12 +40,11 @@ def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
     checks = Checks(world, {(robot.network, robot.slot): [Listening()] for robot in world.robots})
     run_trial(world)
     checks.finish()
-    return [monitor for monitor in checks.monitors if isinstance(monitor, Listener)]
+    return [monitor for monitor in checks.monitors if isinstance(monitor, ObservingMonitor)]
 
 
 _SETTLING_MS = 200.0
 _STT = BY_NAME["STT"].opcode
-_KNOWN = frozenset(one.opcode for one in BY_NAME.values())
 _UNHEARD = 4
 """Frames without any command to an LM629, after which a robot counts as hanging."""
 
@@ -70,10 +57,9 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
     def ways(script: TrialScript) -> None:
         script.wait(_SETTLING_MS)
         said.append(("", script.team()))
+        body = bytes(script.form.body_size)
         for what, sealing in MISTAKES.items():
-            if sealing.seal(script.form, bytes(script.form.body_size)) != seal(
-                script.form, bytes(script.form.body_size)
-            ):
+            if sealing.seal(script.form, body) != seal(script.form, body):
                 said.append((f"frames with {what}", script.team(sealed=sealing.seal)))
         other = _other_layout(script)
         said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
@@ -83,11 +69,10 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
 
     rule = Rule("P24", "", ways, (topology,))
     (listener,) = listen(trial_of(rule), image, seed)
-    right = said[0][1]
     return (
-        _serial_port(listener.events, right)
+        _serial_port(listener.observed.events, said[0][1])
         or _begins_again(listener)
-        or _obeyed(listener, said)
+        or _obeyed(listener.observed, said)
         or _chips(listener)
     )
 
@@ -126,28 +111,30 @@ def _serial_port(events: Sequence[Event], frame: Frame) -> str:
 def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
     """Whether a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
     trial = trial_of(rule)
-    if rule.topologies[network].keyed or len(trial.script) > len(trial.transmissions):
+    if rule.topologies[network].keyed or not all(isinstance(one, Transmission) for one in trial.script):
         return ""  # noise, or a robot that was off
-    sent = len(b"".join(one.data for one in trial.transmissions if one.network == network))
+    said = trial.transmissions_of(network)
+    sent = len(b"".join(one.data for one in said))
     for listener in listen(trial, image, seed):
         if listener.subject.network == network:
-            lost = sent - len([one for one in listener.events if one.what == "received"])
-            if lost > 0:
-                return f"its serial port took {sent - lost} of the trial's {sent} characters: off or too slow"
+            received = [one for one in listener.observed.events if one.what == "received"]
+            if len(received) < sent:
+                return (
+                    f"its serial port took {len(received)} of the trial's {sent} characters: off or too slow"
+                )
             if again := _begins_again(listener):
                 return again
             last_tick = max((one.tick for one in listener.observed.commands), default=0)
-            later = [one for one in trial.transmissions if one.network == network and one.tick > last_tick]
+            later = [one for one in said if one.tick > last_tick]
             if last_tick and len(later) > _UNHEARD:
                 when = f"{last_tick / TICKS_PER_MS:.0f} ms"
                 return f"it does nothing after {when}, though {len(later)} frames follow: it hangs"
     return ""
 
 
-def _obeyed(listener: Listener, said: Sequence[tuple[str, Frame]]) -> str:
+def _obeyed(observed: Observed, said: Sequence[tuple[str, Frame]]) -> str:
     for what, frame in said[1:]:
-        told = listener.observed.both_told(frame.end_tick + ACTING_TICKS)
-        if all(map(obeys, told, frame.for_robot(listener.observed.slot))):
+        if all(map(obeys, observed.both_told(frame.acted_tick), frame.for_robot(observed.slot))):
             return f"it obeys {what}"
     return ""
 
@@ -155,11 +142,9 @@ def _obeyed(listener: Listener, said: Sequence[tuple[str, Frame]]) -> str:
 def _chips(listener: Listener) -> str:
     if not listener.subject.robot.board.left.reset_level:
         return "it holds its LM629s in reset (/RST is low)"
-    if not listener.observed.commands:
+    opcodes = {one.opcode for one in listener.observed.commands}
+    if not opcodes:
         return "it tells its LM629s nothing at all"
-    known = {one.opcode for one in listener.observed.commands} & _KNOWN
-    return (
-        ""
-        if known
-        else "it gives its LM629s unknown commands alone: data gone before /WR rises, or wrong pins"
-    )
+    if opcodes.isdisjoint(BY_OPCODE):
+        return "it gives its LM629s unknown commands alone: data gone before /WR rises, or wrong pins"
+    return ""

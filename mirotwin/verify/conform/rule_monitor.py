@@ -7,10 +7,10 @@ trials alone.
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import ClassVar
 
 from miro_exact.bad_input import BadInput
-from miro_protocol.transmission import Transmission
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
@@ -45,11 +45,16 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
 
 class ObservingMonitor(Monitor[C_co]):
-    """Keeps what rules ask about."""
+    """Keeps all of one robot and its host that rules and timelines ask about."""
+
+    EVENTS: tuple[str, ...] = ("sent", "received", "frame", "command", "heard", "answer", "reset", "power")
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         super().__init__(check, subject)
         self.observed = Observed(subject.robots, subject.slot)
+
+    def event(self, event: Event) -> None:
+        self.observed.take(event)
 
     def restarted(self, tick: int) -> None:
         self.observed.restarted(tick)
@@ -69,39 +74,29 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
     def __init__(self, check: ConformsTo, subject: Subject) -> None:
         super().__init__(check, subject)
         self.rule = check.the_rule()
-        trial = trial_of(self.rule)
-        self.foreign = subject.network >= len(trial.expected)
-        self.expected = () if self.foreign else trial.expected[subject.network]
-        self.to_come: list[Transmission] = [
-            one for one in trial.transmissions if one.network == subject.network
-        ][::-1]
+        self.trial = trial_of(self.rule)
+        self.foreign = subject.network >= len(self.trial.expected)
+        self.to_come = self.trial.transmissions_of(subject.network)[::-1]
 
     def event(self, event: Event) -> None:
-        if event.what != "sent":
-            self.observed.take(event)
-            return
-        said = self.to_come.pop() if self.to_come else None
-        if said is None or (said.tick, said.data) != (event.tick, event.data):
-            self.foreign = True
+        super().event(event)
+        if event.what == "sent":
+            said = self.to_come.pop() if self.to_come else None
+            if said is None or (said.tick, said.data) != (event.tick, event.data):
+                self.foreign = True
 
     def fault(self, fault: FirmwareFault) -> None:
         if fault.kind in self.rule.faults:
             self.fail(fault.tick, "no such firmware fault", str(fault), fault=True)
 
     def end(self, tick: int) -> None:
+        super().end(tick)
         if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
             self.failures.clear()
             self.failed = 0
             return
-        super().end(tick)
-        found = []
-        for expectation in self.expected:
-            here = not expectation.slots or self.subject.slot in expectation.slots
-            if not here or expectation.tick >= tick:
-                continue
-            self.judged += 1
-            what = expectation.found(self.observed)
-            if what is not None:
-                found.append((what[0], expectation.wanted, what[1]))
-        for at, wanted, text in sorted(found, key=lambda one: one[0]):
+        judged = [one for one in self.trial.expected_of(self.subject) if one.tick < tick]
+        self.judged += len(judged)
+        found = [(one.wanted, *what) for one in judged if (what := one.found(self.observed)) is not None]
+        for wanted, at, text in sorted(found, key=itemgetter(1)):
             self.fail(at, wanted, text)

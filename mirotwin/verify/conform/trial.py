@@ -19,6 +19,7 @@ from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import of_table
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
+from mirotwin.verify.checks.interface import Subject
 from mirotwin.verify.conform.rule import Rule, Topology
 from mirotwin.verify.conform.trial_script import Expectation, TrialScript
 
@@ -43,9 +44,13 @@ class Trial:
     script: tuple[ScriptItem, ...]
     expected: tuple[tuple[Expectation, ...], ...]
 
-    @property
-    def transmissions(self) -> list[Transmission]:
-        return [one for one in self.script if isinstance(one, Transmission)]
+    def transmissions_of(self, network: int) -> list[Transmission]:
+        """What the host of a network says."""
+        return [one for one in self.script if isinstance(one, Transmission) and one.network == network]
+
+    def expected_of(self, subject: Subject) -> list[Expectation]:
+        """What is expected of a robot."""
+        return [one for one in self.expected[subject.network] if subject.slot in one.slots]
 
 
 @lru_cache(maxsize=128)

@@ -88,16 +88,16 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """`test` says what is wrong. It is over at `tick`: later events change nothing in it. `slots`: () is all robots.
+    """`test` says what is wrong. It is over at `tick`: later events change nothing in it.
 
-    `by_answers`: what the PC hears is all that it needs.
+    `slots`: of the robots that it concerns. `by_answers`: what the PC hears is all that it needs.
     """
 
     tick: int
     wanted: str
     test: Callable[[Observed], Found]
-    slots: tuple[int, ...] = ()
-    by_answers: bool = False
+    slots: tuple[int, ...]
+    by_answers: bool
 
     def found(self, observed: Observed) -> tuple[int, str] | None:
         """What is wrong, None for nothing."""
@@ -273,7 +273,7 @@ class TrialScript:
         slots: tuple[int, ...] = (),
         by_answers: bool = False,
     ) -> None:
-        self.expected.append(Expectation(tick, wanted, test, slots, by_answers))
+        self.expected.append(Expectation(tick, wanted, test, slots or self.topology.slots, by_answers))
 
     def obeyed(self, frame: Frame) -> Frame:
         """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""

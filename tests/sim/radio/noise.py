@@ -22,7 +22,7 @@ def listen(seconds, robots, seed=0):
     (monitor,) = Checks(world, {(0, 0): [Listening()]}).monitors
     while not world.finished:
         robot = world.step().robots[0]
-    heard = [event for event in monitor.events if event.what == "received"]
+    heard = [event for event in monitor.observed.events if event.what == "received"]
     return len(heard), (robot.accepted, robot.rejected, robot.stale)
 
 
