@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -141,17 +142,12 @@ def _where(cause: Outcome) -> str:
 
 def _spans(ids: Sequence[str]) -> str:
     """`P01 to P03, P05`, in the order of the table."""
-    spans: list[list[int]] = []
-    for place, rule in enumerate(EVERY_RULE):
-        if rule.id not in ids:
-            continue
-        if spans and place == spans[-1][-1] + 1:
-            spans[-1].append(place)
-        else:
-            spans.append([place])
-    return ", ".join(
-        " to ".join(dict.fromkeys((EVERY_RULE[one[0]].id, EVERY_RULE[one[-1]].id))) for one in spans
-    )
+    places = [place for place, rule in enumerate(EVERY_RULE) if rule.id in ids]
+    spans = []
+    for _, numbered in groupby(enumerate(places), key=lambda one: one[1] - one[0]):
+        span = [EVERY_RULE[place].id for _, place in numbered]
+        spans.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
+    return ", ".join(spans)
 
 
 @command_of(ConformOptions)
@@ -217,11 +213,10 @@ def conform(options: ConformOptions) -> int:
         _tell(outcomes, rules, options, properties)
     if lost is not None:
         raise lost
-    if any(one.failures or one.cause for one in outcomes):
-        return _report_faults(outcomes) or EXPECTATION_FAILED
-    return _report_faults(outcomes) or (
-        DONE if any(one.verdict == "passed" for one in outcomes) else NOTHING_JUDGED
-    )
+    wrong = any(one.failures or one.cause for one in outcomes)
+    judged = any(one.verdict == "passed" for one in outcomes)
+    code = EXPECTATION_FAILED if wrong else DONE if judged else NOTHING_JUDGED
+    return _report_faults(outcomes) or code
 
 
 def _tell(
@@ -229,7 +224,7 @@ def _tell(
 ) -> None:
     if options.junit is not None:
         with whole_file(options.junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin conform", _test_cases(outcomes, rules), properties))
+            part.write_bytes(junit_xml("mirotwin conform", list(map(_test_case, outcomes)), properties))
     if options.as_json:
         _print_json(outcomes)
         return
@@ -271,54 +266,47 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     show(table)
 
 
-def _test_cases(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[TestCase]:
-    """One a rule, without times: the same image gives the same bytes."""
-    by_id = {rule.id: rule for rule in rules}
-    cases = []
-    for outcome in outcomes:
-        rule = by_id[outcome.rule]
-        case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
-        cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
-        if because := cause or outcome.unsure or outcome.unseen:
-            because = f"{outcome.verdict}: {because}"
-            case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
-        elif outcome.failures:
-            lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
-            case = msgspec.structs.replace(case, verdict="failure", lines=lines)
-        cases.append(case)
-    return cases
+def _test_case(outcome: Outcome) -> TestCase:
+    """Without a time: the same image gives the same bytes."""
+    rule = find(outcome.rule)
+    case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
+    cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
+    if because := cause or outcome.why:
+        because = f"{outcome.verdict}: {because}"
+        return msgspec.structs.replace(case, verdict="skipped", lines=(because,))
+    if outcome.failures:
+        lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
+        return msgspec.structs.replace(case, verdict="failure", lines=lines)
+    return case
 
 
 def _print_json(outcomes: Sequence[Outcome]) -> None:
     for outcome in outcomes:
-        first = outcome.failures[0] if outcome.failures else None
         line = {
             "rule": outcome.rule,
             "verdict": outcome.verdict,
             "cause": outcome.cause or None,
             "hint": outcome.hint or None,
-            "why": outcome.unsure or outcome.unseen or None,
+            "why": outcome.why or None,
             "failures": len(outcome.failures),
-            "first": None if first is None else msgspec.to_builtins(first),
+            "first": outcome.failures[0] if outcome.failures else None,
             "faults": outcome.fault_count,
         }
         click.echo(msgspec.json.encode(line))
 
 
 def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool, everything: bool) -> None:
-    begin = begin_with(outcomes)
-    if begin:
+    if begin := begin_with(outcomes):
         show(begin)
-    names = {rule.id: rule.name for rule in rules}
     table = plain_table("rule", "name", "verdict", "first failure")
     for outcome in causes_first(outcomes):
         if (quiet and not outcome.failures) or (outcome.cause and not everything):
             continue
-        first = failure_text(outcome.failures[0]) if outcome.failures else outcome.unsure or outcome.unseen
+        first = failure_text(outcome.failures[0]) if outcome.failures else outcome.why
         if outcome.hint and outcome.hint not in begin:
             first = f"{outcome.hint}; {first}"
         because = f"presupposes {outcome.cause}, which failed" if outcome.cause else first
-        table.add_row(outcome.rule, names[outcome.rule], outcome.verdict, because)
+        table.add_row(outcome.rule, find(outcome.rule).name, outcome.verdict, because)
     if table.rows:
         show(table)
     if not everything:
@@ -350,14 +338,10 @@ def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:
 
 def _report_faults(outcomes: Sequence[Outcome]) -> int:
     """Says which faults came; returns the exit code."""
-    told = 0
-    count = 0
-    for outcome in outcomes:
-        count += outcome.fault_count
-        for network, slot, fault in outcome.faults:
-            if told < LINES:
-                told += 1
-                complain(f"trial of {outcome.rule}: net{network}/robot{slot}: {fault}")
-    if count > told:
-        complain(f"{amount(count - told, 'more firmware fault')} in these trials")
-    return FIRMWARE_FAULT if count else DONE
+    faults = [(outcome.rule, *fault) for outcome in outcomes for fault in outcome.faults][:LINES]
+    for rule, network, slot, fault in faults:
+        complain(f"trial of {rule}: net{network}/robot{slot}: {fault}")
+    more = sum(outcome.fault_count for outcome in outcomes) - len(faults)
+    if more:
+        complain(f"{amount(more, 'more firmware fault')} in these trials")
+    return FIRMWARE_FAULT if faults else DONE

@@ -22,7 +22,7 @@ from typing import NoReturn
 
 import msgspec
 
-from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
@@ -62,6 +62,11 @@ class Outcome(msgspec.Struct, frozen=True):
         if self.failures:
             return "failed"
         return "not judged" if self.cause or self.unsure else "not observable" if self.unseen else "passed"
+
+    @property
+    def why(self) -> str:
+        """Why a port does not judge it, or ""."""
+        return self.unsure or self.unseen
 
 
 def failure_text(failure: Failure) -> str:
@@ -111,10 +116,14 @@ def _cases(
     if failures and world.finished:
         found.append((own, case_text(world, trace, {"conforms_to": rule.id}, str(failures[0]))))
     if faults:
-        network, slot, fault = min(faults, key=lambda one: one[2].tick)
-        verdict = Failure("no_fault", network, slot, fault.tick, NoFault.WANTED, str(fault), True)
+        first = min(faults, key=lambda one: one[2].tick)
+        verdict = _of_fault("no_fault", NoFault.WANTED, *first)
         found.append((of_fault, case_text(world, trace, {"no_fault": True}, str(verdict))))
     return tuple(found)
+
+
+def _of_fault(check: str, wanted: str, network: int, slot: int, fault: FirmwareFault) -> Failure:
+    return Failure(check, network, slot, fault.tick, wanted, str(fault), True)
 
 
 def _robots(world: World) -> list[RobotId]:
@@ -135,7 +144,9 @@ def try_all(
         outcome = try_rule(rule, image, seed, keep)
         if not outcome.failures:
             return outcome
-        cause = next((forbidden[kind] for kind in _before(outcome) if kind in forbidden), "")
+        first_tick = outcome.failures[0].tick
+        before = [fault.kind for _, _, fault in outcome.faults if fault.tick <= first_tick]
+        cause = next((forbidden[kind] for kind in before if kind in forbidden), "")
         if cause:
             return msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
         place = (outcome.failures[0].network, image, seed)
@@ -165,35 +176,23 @@ def _presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
     return list(ordered.values())
 
 
-def _before(outcome: Outcome) -> list[FaultKind]:
-    """The kinds of fault that came before the rule failed."""
-    return [fault.kind for _, _, fault in outcome.faults if fault.tick <= outcome.failures[0].tick]
-
-
 def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:
     """The outcomes in the order of `rules`, with all trials' firmware faults held against those that forbid them."""
-    kinds = {rule.id: rule.faults for rule in rules}
+    by_id = {outcome.rule: outcome for outcome in outcomes}
     found = []
-    places = [rule.id for rule in rules]
-    for outcome in sorted(outcomes, key=lambda one: places.index(one.rule)):
-        forbidden = _forbidden(outcomes, kinds[outcome.rule])
-        if forbidden:
+    for rule in rules:
+        if rule.id in by_id:  # else a port was lost before
+            forbidden = [
+                _of_fault("conforms_to", f"no such fault (trial of {one.rule})", *told)
+                for one in outcomes
+                for told in one.faults
+                if told[2].kind in rule.faults
+            ]
+            outcome = by_id[rule.id]
+            cause = "" if forbidden else outcome.cause
             failures = (*forbidden, *outcome.failures)
-            outcome = msgspec.structs.replace(outcome, failures=failures, cause="")
-        found.append(outcome)
+            found.append(msgspec.structs.replace(outcome, failures=failures, cause=cause))
     return found
-
-
-def _forbidden(outcomes: Sequence[Outcome], kinds: Sequence[FaultKind]) -> list[Failure]:
-    """A failure for each fault of these kinds."""
-    return [
-        Failure(
-            "conforms_to", network, slot, fault.tick, f"no such fault (trial of {one.rule})", f"{fault}", True
-        )
-        for one in outcomes
-        for network, slot, fault in one.faults
-        if fault.kind in kinds
-    ]
 
 
 FEWEST = 10
