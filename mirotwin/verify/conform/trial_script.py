@@ -56,6 +56,7 @@ GAP_MS = ACTING_MS + 2.0
 Pairs = tuple[tuple[int, int], ...]
 Found = Iterator[tuple[int, str]]
 """What is wrong: since which tick, and what was found instead. The first one counts."""
+Test = Callable[[Observed], Found]
 Says = Callable[[TelemetryFrame, Answer, Observed], str]
 """What is wrong with what an answer says, or ""."""
 
@@ -95,7 +96,7 @@ class Expectation:
 
     tick: int
     wanted: str
-    test: Callable[[Observed], Found]
+    test: Test
     slots: tuple[int, ...]
     by_answers: bool
 
@@ -191,9 +192,8 @@ class TrialScript:
 
     def filter(self, words: Words, what: str = "", **how: Unpack[How]) -> Frame:
         """kp, ki, kd and il."""
-        return self.service(
-            Opcode.FILTER, b"".join(word.to_bytes(2, "little") for word in words), what, **how
-        )
+        data = b"".join(word.to_bytes(2, "little") for word in words)
+        return self.service(Opcode.FILTER, data, what, **how)
 
     def acceleration(self, value: int, what: str = "", **how: Unpack[How]) -> Frame:
         return self.service(Opcode.ACCELERATION, value.to_bytes(4, "little"), what, **how)
@@ -249,16 +249,9 @@ class TrialScript:
 
     # ---- doing ---------------------------------------------------------------------------------------------
 
-    def reset(self, tick: int, for_ms: float) -> int:
-        """Holds the processor of the network's first robot in reset from `tick` on; returns when it is let go."""
-        return self._do(Reset, tick, for_ms, 1)
-
-    def switch_off(self, tick: int, for_ms: float) -> int:
-        """Takes the supply of the network's first robot away; returns when it is back."""
-        return self._do(Power, tick, for_ms, 0)
-
-    def _do(self, kind: type[Reset] | type[Power], tick: int, for_ms: float, level: int) -> int:
-        end_tick = tick + ms(for_ms)
+    def hold(self, kind: type[Reset] | type[Power], tick: int, for_ms: float) -> int:
+        """Resets the network's first robot, or switches it off, from `tick` on; returns when it is let go."""
+        end_tick, level = tick + ms(for_ms), int(kind is Reset)
         self.done.append(kind(tick, self.network, self.slot, level))
         self.done.append(kind(end_tick, self.network, self.slot, 1 - level))
         return end_tick
@@ -266,12 +259,7 @@ class TrialScript:
     # ---- expecting -----------------------------------------------------------------------------------------
 
     def expect(
-        self,
-        tick: int,
-        wanted: str,
-        test: Callable[[Observed], Found],
-        slots: tuple[int, ...] = (),
-        by_answers: bool = False,
+        self, tick: int, wanted: str, test: Test, slots: tuple[int, ...] = (), by_answers: bool = False
     ) -> None:
         self.expected.append(Expectation(tick, wanted, test, slots or self.topology.slots, by_answers))
 

@@ -20,8 +20,6 @@ BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS
 BAUD_TOLERANCE = 0.01
 """A timer's reload that is off by one makes 1.3 %. Chosen."""
 _HEAD = TELEMETRY.lead + SYNC
-
-
 _AT_SPEED = 40
 """Questions while a wheel goes 50 counts in a sample: a carry falls into some of them."""
 

@@ -21,10 +21,6 @@ from mirotwin.verify.conform.rule import FRESHNESS, WHEELS, Chapter
 from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")
-_COUNTED = (
-    "A robot may count from the start or from the end of that frame's last character (1.04 ms apart), and may be 0.5 ms"
-    " off"
-)
 
 
 @CHAPTER.rule(

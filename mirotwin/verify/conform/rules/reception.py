@@ -8,12 +8,11 @@ from dataclasses import replace
 from miro_exact.rng import Stream
 from miro_protocol.crc import POLYNOMIAL_REFLECTED
 from miro_protocol.frames import seal
-from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, FrameType
 from miro_protocol.whitening import whiten
 from mirotwin.verify.conform.hints import payload_of
 from mirotwin.verify.conform.rule import BOTH, FRAME, RECEPTION, VERSIONS, WHY, Chapter, Topology
-from mirotwin.verify.conform.trial_script import Frame, How, TrialScript
+from mirotwin.verify.conform.trial_script import GAP_MS, Frame, How, TrialScript
 
 CHAPTER = Chapter("Reception")
 _CHANCE = Stream(0, "conform/reception")
@@ -31,12 +30,12 @@ def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int 
     for count, (what, how) in enumerate(ways):
         if count % in_a_row == 0:
             if count:
-                script.wait(ACTING_TICKS / 24_000 + 2.0)
+                script.wait(GAP_MS)
             script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
         before = f" after a {what}"
         damaged: How = {"lead": b"", "fresh": False, "gap_ms": 0.0, **how}
         script.ignored(script.team(what=what, **damaged))
-    script.wait(ACTING_TICKS / 24_000 + 2.0)
+    script.wait(GAP_MS)
     script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
 
 
@@ -62,14 +61,12 @@ def preamble(script: TrialScript) -> None:
 @CHAPTER.rule("P05", RECEPTION, presupposes="P04")
 def sync(script: TrialScript) -> None:
     """A frame with any wrong bit in its sync MUST be refused."""
-    refused(
-        script,
-        (
-            (f"frame with bit {bit} of sync byte {at} wrong", How(wrong={at: 1 << bit}))
-            for at in (0, 1)
-            for bit in range(8)
-        ),
+    ways = (
+        (f"frame with bit {bit} of sync byte {at} wrong", How(wrong={at: 1 << bit}))
+        for at in (0, 1)
+        for bit in range(8)
     )
+    refused(script, ways)
 
 
 @CHAPTER.rule("P06", VERSIONS, presupposes="P07", broken="a frame of another layout is taken")
@@ -83,13 +80,11 @@ def layout(script: TrialScript) -> None:
 def crc(script: TrialScript) -> None:
     """All 16 bits of the CRC MUST count: a frame with a wrong CRC is refused."""
     low = script.form.size - 2
-    refused(
-        script,
-        (
-            (f"frame whose CRC leaves bit {bit} wrong", How(wrong={low: d & 0xFF, low + 1: d >> 8}))
-            for bit, d in enumerate(map(leaving, (1 << bit for bit in range(16))))
-        ),
+    ways = (
+        (f"frame whose CRC leaves bit {bit} wrong", How(wrong={low: d & 0xFF, low + 1: d >> 8}))
+        for bit, d in enumerate(map(leaving, (1 << bit for bit in range(16))))
     )
+    refused(script, ways)
 
 
 def leaving(register: int) -> int:
@@ -123,22 +118,15 @@ def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
                 if not wrong.get(at, 0) & bit:
                     wrong[at] = wrong.get(at, 0) | bit
                     bits += 1
-            yield (
-                f"frame with {count} wrong bits in characters {', '.join(map(str, sorted(wrong)))}",
-                How(wrong=wrong),
-            )
+            where = ", ".join(map(str, sorted(wrong)))
+            yield f"frame with {count} wrong bits in characters {where}", How(wrong=wrong)
 
 
 @CHAPTER.rule("P09", RECEPTION, presupposes="P04", broken="a bad stop bit is not handled as it has to be")
 def stop_bits(script: TrialScript) -> None:
     """A frame with a bad stop bit in any of its F characters MUST be refused."""
-    refused(
-        script,
-        (
-            (f"frame with a bad stop bit in character {at}", How(bad_stop=at))
-            for at in range(script.form.size)
-        ),
-    )
+    places = range(script.form.size)
+    refused(script, ((f"frame with a bad stop bit in character {at}", How(bad_stop=at)) for at in places))
 
 
 @CHAPTER.rule(
@@ -169,13 +157,12 @@ def short_pauses(script: TrialScript) -> None:
         script.obeyed(script.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
     if not offset:
         places = range(1, script.form.size)
+        what = f"team frame with {SHORTEST_US:g} us before"
         everywhere = dict.fromkeys(places, SHORTEST_US)
-        script.obeyed(
-            script.team(what=f"team frame with {SHORTEST_US:g} us before each character", pauses=everywhere)
-        )
+        script.obeyed(script.team(what=f"{what} each character", pauses=everywhere))
         for at in places:
-            what = f"team frame with {SHORTEST_US:g} us before character {at}"
-            script.obeyed(script.team(what=what, lead=b"", pauses={at: SHORTEST_US}))
+            pauses = {at: SHORTEST_US}
+            script.obeyed(script.team(what=f"{what} character {at}", lead=b"", pauses=pauses))
 
 
 @CHAPTER.rule("P12", RECEPTION, presupposes="P14 P16")
@@ -200,28 +187,22 @@ def _nested(script: TrialScript, spoilt: bool) -> tuple[Frame, Frame]:
     form = replace(script.form, lead=b"")
     outer_words, inner_words = script.words(), script.words()
     outer_seq, inner_seq = ((script.seq + step) % SEQ_MODULUS for step in (1, 2))
-    inner_payload = bytearray(payload_of(inner_words))
-    inner_start = SYNC + whiten(bytes([FrameType.TEAM * SEQ_MODULUS + inner_seq]) + bytes(inner_payload[:1]))
+    outer_hdr, inner_hdr = (bytes([FrameType.TEAM * SEQ_MODULUS + seq]) for seq in (outer_seq, inner_seq))
+    inner_payload = payload_of(inner_words)
+    inner_start = SYNC + whiten(inner_hdr + inner_payload[:1])
     # what the outer payload must be in clear so that its last four characters are these on the air
     clear = whiten(bytes(form.body_size - len(inner_start)) + inner_start)[-len(inner_start) :]
-    outer_body = (
-        bytes([FrameType.TEAM * SEQ_MODULUS + outer_seq]) + payload_of(outer_words)[: -len(clear)] + clear
-    )
-    outer_wire = seal(form, outer_body)
+    outer_wire = seal(form, outer_hdr + payload_of(outer_words)[: -len(clear)] + clear)
     forced = whiten(bytes(2) + outer_wire[-2:])[2:]  # the outer CRC, as the inner payload says it in clear
-    inner_payload[1:3] = forced
-    inner_wire = seal(form, bytes([FrameType.TEAM * SEQ_MODULUS + inner_seq]) + bytes(inner_payload))
+    inner_wire = seal(form, inner_hdr + inner_payload[:1] + forced + inner_payload[3:])
     wire = bytearray(outer_wire + inner_wire[len(inner_start) + 2 :])
     if spoilt:
         wire[2] ^= 0x02
-    begun = script.now
+    begun, step = script.now, script.character_ticks
     script.characters(bytes(wire))
-    outer_end = begun + form.size * script.character_ticks
-    outer = Frame(begun, outer_end - script.character_ticks, outer_end, outer_seq, outer_words, "outer frame")
-    end = script.now
-    inner = Frame(
-        outer.tick, end - script.character_ticks, end, inner_seq, inner_words, "frame within a frame"
-    )
+    outer_end, end = begun + form.size * step, script.now
+    outer = Frame(begun, outer_end - step, outer_end, outer_seq, outer_words, "outer frame")
+    inner = Frame(begun, end - step, end, inner_seq, inner_words, "frame within a frame")
     script.seq = inner_seq if spoilt else outer_seq
     script.wait(12.0)
     return outer, inner

@@ -5,6 +5,7 @@ about a robot that runs for long.
 from __future__ import annotations
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.actions import Power, Reset
 from miro_protocol.table import SYNC
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
@@ -91,13 +92,10 @@ def reset_pin(script: TrialScript) -> None:
     for when, for_ms in (("in motion", 3.0), ("within a frame", 0.05), ("while it answers", 7.0)):
         script.obeyed(script.team())
         if when == "within a frame":
-            begun = script.now
-            script.team()
-            end = script.reset(begun + 15 * script.character_ticks, for_ms)
+            tick = script.team().tick + 15 * script.character_ticks
         else:
-            question = script.ask()
-            end = script.reset(question.end_tick + ms(9.0 if when == "while it answers" else 40.0), for_ms)
-        _begins_again(script, end, 30, f"team frame after a reset {when}")
+            tick = script.ask().end_tick + ms(9.0 if when == "while it answers" else 40.0)
+        _begins_again(script, script.hold(Reset, tick, for_ms), 30, f"team frame after a reset {when}")
 
 
 @CHAPTER.rule("P56", POWER_ON, presupposes="P55")
@@ -105,7 +103,7 @@ def supply(script: TrialScript) -> None:
     """A robot that is switched off and on MUST begin as from power-on, wherever it was."""
     for off_ms in (2.0, 60.0):
         script.obeyed(script.team())
-        end = script.switch_off(script.ask().end_tick + ms(9.0), off_ms)
+        end = script.hold(Power, script.ask().end_tick + ms(9.0), off_ms)
         _begins_again(script, end, 20, "team frame after the supply was off")
 
 
