@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -13,19 +13,21 @@ from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
+from mirotwin.replay.state_fields import Record
+from mirotwin.shell.debug_files import debugged_image
 
 
-class CodeLocation(msgspec.Struct, frozen=True):
-    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, "" where no debug file tells.
+class CodeLocation(Record, frozen=True):
+    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, None where no debug file tells.
 
-    `symbol` with offset; `source`: what stands in that line, "" where the file is not there; `text` disassembled.
+    `symbol` with offset; `source`: what stands in that line, None where the file is not there; `text` disassembled.
     """
 
     tick: int
     pc: int
     symbol: str
-    line: str
-    source: str
+    line: str | None
+    source: str | None
     text: str
 
     def __str__(self) -> str:
@@ -33,10 +35,6 @@ class CodeLocation(msgspec.Struct, frozen=True):
         source = f" `{self.source}`" if self.source else ""
         at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
         return f"{at}: {self.pc:#06x} in {self.symbol}{line}{source}: {self.text}"
-
-    def as_json(self) -> dict[str, Any]:
-        fields = {name: getattr(self, name) or None for name in ("symbol", "line", "source")}
-        return {"tick": self.tick, "t_s": seconds(self.tick), "pc": self.pc, **fields, "text": self.text}
 
 
 NOWHERE = Path("no-such-folder") / "image.ihx"
@@ -64,8 +62,15 @@ class AnnotatedImage:
     def place(self, pc: int, tick: int) -> CodeLocation:
         line = self.debug.line_at(pc)
         text = " ".join(disassemble(self.image.code, pc, self.names).split())
-        source = "" if line is None else self.sources.text(line)
-        return CodeLocation(tick, pc, self.names.place(pc), "" if line is None else str(line), source, text)
+        location = CodeLocation(tick, pc, self.names.place(pc), None, None, text)
+        if line is None:
+            return location
+        return msgspec.structs.replace(location, line=str(line), source=self.sources.text(line) or None)
+
+
+def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
+    """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
+    return AnnotatedImage(*debugged_image(image, images, sources))
 
 
 def same_layout(one: Image, other: Image) -> bool:

@@ -8,7 +8,7 @@ at the end are listed by when that began, and with the last instruction of each 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -16,11 +16,10 @@ from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation
 from mirotwin.replay.lockstep import WorldPair
-from mirotwin.replay.state_fields import extents
+from mirotwin.replay.state_fields import Record, extents
 
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu
-    from miro_sim.world.robot import Robot
     from miro_sim.world.world import Mark, World
 
 LOOK_TICKS = 12_012
@@ -32,7 +31,7 @@ Found = tuple["VariableDifference", "tuple[Mark, Mark]"]
 """With the marks of the look before."""
 
 
-class VariableDifference(msgspec.Struct, frozen=True):
+class VariableDifference(Record, frozen=True):
     """A variable that differs from the look at `tick` on, and did not at the one before.
 
     Values: of 1, 2 and 4 bytes little-endian numbers, else bytes in hex. `writers`: the instructions that changed it
@@ -50,17 +49,6 @@ class VariableDifference(msgspec.Struct, frozen=True):
     def __str__(self) -> str:
         at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
         return f"{at}: net{self.network}/robot{self.slot}: {self.name}: {self.one}, {self.other}"
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "tick": self.tick,
-            "t_s": seconds(self.tick),
-            "network": self.network,
-            "slot": self.slot,
-            "name": self.name,
-            "values": [self.one, self.other],
-            "writers": [None if place is None else place.as_json() for place in self.writers],
-        }
 
 
 class Builds:
@@ -103,7 +91,8 @@ class Builds:
                 continue
             self.looks += 1
             for name, (first, second, size) in self.places.items():
-                here, there = _bytes(robot, first, size), _bytes(twin, second, size)
+                here = _bytes(robot.board.cpu, first, size)
+                there = _bytes(twin.board.cpu, second, size)
                 key = robot.network, robot.slot, name
                 if here == there:
                     was = self.since.pop(key, None)
@@ -118,17 +107,14 @@ class Builds:
         """The same with the instructions that wrote it."""
         self.pair.go_back(before)
         first, second, size = self.places[found.name]
-        watchers = (Writes(first, size), Writes(second, size))
-        cpus = [
-            world.robot(found.network, found.slot).board.cpu for world in (self.pair.one, self.pair.other)
-        ]
-        for cpu, watcher in zip(cpus, watchers, strict=True):
-            attach(cpu, watcher)
+        watchers = Writes(first, size), Writes(second, size)
+        for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
+            attach(world.robot(found.network, found.slot).board.cpu, watcher)
         try:
             self.pair.run_to(found.tick)
         finally:
-            for cpu, watcher in zip(cpus, watchers, strict=True):
-                detach(cpu, watcher)
+            for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
+                detach(world.robot(found.network, found.slot).board.cpu, watcher)
         writers = [
             None if watcher.last is None else image.place(*watcher.last)
             for image, watcher in zip(self.annotated, watchers, strict=True)
@@ -146,21 +132,17 @@ class Writes(Watcher):
         self.last: tuple[int, int] | None = None
 
     def attached(self, cpu: Cpu) -> None:
-        self.value = self._now(cpu)
+        self.value = _bytes(cpu, self.first, self.size)
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
-        now = self._now(cpu)
+        now = _bytes(cpu, self.first, self.size)
         if now != self.value:
             self.value = now
             self.last = pc, start * CYCLE_TICKS
 
-    def _now(self, cpu: Cpu) -> bytes:
-        return bytes(cpu.peek_iram(self.first + offset) for offset in range(self.size))
 
-
-def _bytes(robot: Robot, first: int, size: int) -> bytes:
-    peek = robot.board.cpu.peek_iram
-    return bytes([peek(first + offset) for offset in range(size)])
+def _bytes(cpu: Cpu, first: int, size: int) -> bytes:
+    return bytes([cpu.peek_iram(first + offset) for offset in range(size)])
 
 
 def _value(data: bytes) -> int | str:

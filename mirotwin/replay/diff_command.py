@@ -24,11 +24,12 @@ from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import RunSource
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.annotated_image import AnnotatedImage
+from mirotwin.replay.annotated_image import AnnotatedImage, annotated_of
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
-from mirotwin.replay.firmwares import FirmwareDifference, annotated_of, first_instruction
+from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
+from mirotwin.replay.state_fields import Record
 from mirotwin.rerun.job import image_if_any, repeating, world_of
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import plain_table, show
@@ -38,15 +39,12 @@ from mirotwin.shell.outputs import file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 
 
-class SourceDifference(msgspec.Struct, frozen=True):
+class SourceDifference(Record, frozen=True):
     """`key`: `seed`, `firmware`, or a key of the scenario as for `--set`. Values as text, "nothing" for none."""
 
     key: str
-    one: str
-    other: str
-
-    def as_json(self) -> dict[str, str]:
-        return {"key": self.key, "a": self.one, "b": self.other}
+    a: str
+    b: str
 
 
 class Made(msgspec.Struct, frozen=True):
@@ -60,10 +58,6 @@ class Made(msgspec.Struct, frozen=True):
     @property
     def source(self) -> RunSource:
         return self.recording.source
-
-    def repeating(self, period: int, scripted: bool) -> World | None:
-        """See `rerun.job.repeating`."""
-        return repeating(self.recording, self.path, period, scripted)
 
 
 def source_differences(one: Made, other: Made) -> Iterator[SourceDifference]:
@@ -114,19 +108,12 @@ def _shown(value: Any) -> str:
 Both = tuple[Made, Made]
 
 
-class ExactDifference(msgspec.Struct, frozen=True):
+class ExactDifference(Record, frozen=True):
     """The result. `period`: the first control period that differs."""
 
     period: int | None = None
     state: StateDifference | None = None
-    firmwares: FirmwareDifference | None = None
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "period": self.period,
-            "state": None if self.state is None else self.state.as_json(),
-            "instruction": None if self.firmwares is None else self.firmwares.as_json(),
-        }
+    instruction: FirmwareDifference | None = None
 
 
 def locate(
@@ -165,16 +152,13 @@ def _first_period(made: Both, period: int) -> int:
 
 
 def _repeating(made: Both, period: int, notes: list[str]) -> tuple[World, World, bool] | None:
+    never = set(WORDS)
     for scripted in (False, True):
-        one, other = (each.repeating(period, scripted) for each in made)
+        one, other = (repeating(each.recording, each.path, period, scripted) for each in made)
         if one is not None and other is not None:
             return one, other, scripted
-    which = " and ".join(
-        word
-        for word, each in zip("AB", made, strict=True)
-        if all(each.repeating(period, scripted) is None for scripted in (False, True))
-    )
-    whose = f"{which} does" if len(which) == 1 else "they do"
+        never -= {word for word, world in zip(WORDS, (one, other), strict=True) if world is not None}
+    whose = f"{never.pop()} does" if len(never) == 1 else "they do"
     notes.append(
         f"no tick within the control period: run again, {whose} not give the recorded digests up to there (another"
         " version of this program recorded, or input was put in beside a controller)"
@@ -268,7 +252,7 @@ def diff(options: DiffOptions) -> int:
     return code
 
 
-def _read(path: str) -> Recording:
+def _made(path: str) -> Made:
     check_no_folder(path)
     data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if not MAGIC.startswith(data[: len(MAGIC)]):
@@ -281,11 +265,6 @@ def _read(path: str) -> Recording:
         raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
     if recording.broken_off:
         complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-    return recording
-
-
-def _made(path: str) -> Made:
-    recording = _read(path)
     scenario = parse_scenario(recording.source.scenario_text, f"{path}: scenario.toml")
     return Made(path, recording, scenario, image_if_any(recording, path))
 
@@ -332,7 +311,7 @@ def _print_sources(sources: Sequence[SourceDifference]) -> None:
         return
     table = plain_table("made from", *WORDS)
     for one in sources:
-        table.add_row(one.key, one.one, one.other)
+        table.add_row(one.key, one.a, one.b)
     show(table)
     show("")
 
@@ -351,8 +330,8 @@ def _verdict(
         complain(f"the recordings differ in control period {exact.period}, {found[0].said(WORDS)}")
         if exact.state is not None:
             complain(f"their states differ from {exact.state} on")
-        if exact.firmwares is not None:
-            print_firmwares(exact.firmwares, WORDS)
+        if exact.instruction is not None:
+            print_firmwares(exact.instruction, WORDS)
     shorter, longer = sorted(periods, key=len)
     if len(shorter) != len(longer) and compare.rule.to_tick is None:
         code = DIVERGENCE

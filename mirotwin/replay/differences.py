@@ -69,7 +69,7 @@ def _print_instruction(what: str, found: InstructionDifference, words: tuple[str
     if (found.one.pc, found.one.text) != (found.other.pc, found.other.text):
         complain(f"  {words[1]} {found.other}")
     values = [
-        f"{one.path}: {words[0]} {shown(one.one)}, {words[1]} {shown(one.other)}" for one in found.values
+        f"{one.name}: {words[0]} {shown(one.one)}, {words[1]} {shown(one.other)}" for one in found.values
     ]
     if values:
         more = f"; {len(values) - LISTED} more" if len(values) > LISTED else ""

@@ -10,25 +10,18 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from difflib import SequenceMatcher
-from typing import Any
 
 import msgspec
 
 from miro_robot.image import Image
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
-from miro_sim.world.conditions import Reached
-from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
-from mirotwin.recording.difference import Difference
 from mirotwin.replay.annotated_image import AnnotatedImage, same_layout
 from mirotwin.replay.builds import Builds, VariableDifference
-from mirotwin.replay.instructions import InstructionDifference, Stepper
-from mirotwin.replay.lockstep import LOOK_TICKS
-from mirotwin.rerun.job import Job
-from mirotwin.shell.debug_files import debugged_image
-from mirotwin.shell.options import plain_parameters
+from mirotwin.replay.instructions import InstructionDifference, Stepper, first_reached
+from mirotwin.replay.state_fields import Record
 
 _OFFSET = re.compile(r"\+(0x[0-9a-f]+|\d+|[0-9A-F]+h)")
 _ADDRESS = re.compile(r"\b([0-9A-F]{4,5})h")
@@ -130,7 +123,7 @@ Make = Callable[[Image], World]
 """Gives a new world at tick 0 that runs an image."""
 
 
-class FirmwareDifference(msgspec.Struct, frozen=True):
+class FirmwareDifference(Record, frozen=True):
     """What two firmwares do otherwise. `changed`, `effect`: of images of the same layout; `mapped`, the first changed
     instruction by symbols, and `variables`: of others.
 
@@ -139,18 +132,9 @@ class FirmwareDifference(msgspec.Struct, frozen=True):
 
     changed: InstructionDifference | None
     effect: InstructionDifference | None
+    mapped: InstructionDifference | None
     variables: tuple[VariableDifference, ...]
     notes: tuple[str, ...]
-    mapped: InstructionDifference | None = None
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "changed": None if self.changed is None else self.changed.as_json(),
-            "effect": None if self.effect is None else self.effect.as_json(),
-            "mapped": None if self.mapped is None else self.mapped.as_json(),
-            "variables": [one.as_json() for one in self.variables],
-            "notes": list(self.notes),
-        }
 
 
 def first_instruction(
@@ -170,7 +154,7 @@ def first_instruction(
             notes.insert(0, "no changed instruction is executed: what differs is data in code memory")
         if effect is None:
             notes.insert(0, "the states are the same each millisecond: no instruction has a lasting effect")
-        return FirmwareDifference(changed, effect, (), tuple(notes))
+        return FirmwareDifference(changed, effect, None, (), tuple(notes))
     mapping = moved(one, other)
     mapped = _first_mapped(worlds(), annotated, mapping, until_tick)
     builds = Builds(*worlds(), annotated)
@@ -180,7 +164,7 @@ def first_instruction(
         notes.insert(0, f"the code lies at other addresses and was mapped by symbols: {mapping}")
     if variables and not builds.since:
         notes.append("when the runs differ no variable does any more; these did for a while before")
-    return FirmwareDifference(None, None, tuple(variables), tuple(notes), mapped)
+    return FirmwareDifference(None, None, mapped, tuple(variables), tuple(notes))
 
 
 def _first_mapped(
@@ -191,25 +175,16 @@ def _first_mapped(
 ) -> InstructionDifference | None:
     """The first changed instruction that the first firmware executes, and the one in its place in the second."""
     one, other = worlds
-    reached = [
-        Reached(address=at, network=robot.network, slot=robot.slot)
-        for robot in one.robots
-        for at in mapping.places
-    ]
-    try:
-        event = one.run_until(reached, until_tick - one.tick) if reached else None
-    except WaitExpired:
-        event = None
+    event = first_reached(one, mapping.places, until_tick)
     if event is None:
         return None
     there = mapping.places[event.address]
-    place = annotated[0].place(event.address, event.tick)
-    try:
-        twin = Reached(address=there, network=event.network, slot=event.slot)
-        tick = other.run_until([twin], until_tick - other.tick).tick
-    except WaitExpired:
-        tick = event.tick
-    return InstructionDifference(event.network, event.slot, place, annotated[1].place(there, tick), ())
+    twin = first_reached(other, [there], until_tick, [other.robot(event.network, event.slot)])
+    places = (
+        annotated[0].place(event.address, event.tick),
+        annotated[1].place(there, event.tick if twin is None else twin.tick),
+    )
+    return InstructionDifference(event.network, event.slot, *places, ())
 
 
 def _compared(builds: Builds) -> str:
@@ -234,16 +209,3 @@ def _missing(annotated: tuple[AnnotatedImage, AnnotatedImage]) -> Iterator[str]:
             yield f"no symbols of {image.path}: {beside}"
         elif not one.debug.lines:
             yield f"no C lines of {image.path}: {beside}"
-
-
-def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
-    """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
-    return AnnotatedImage(*debugged_image(image, images, sources))
-
-
-def firmwares_apart(
-    job: Job, annotated: tuple[AnnotatedImage, AnnotatedImage], found: Sequence[Difference]
-) -> FirmwareDifference | None:
-    """Where the recorded image and the one that ran go apart, up to the first difference."""
-    with plain_parameters(job.file, "replayed"):
-        return first_instruction(job.world_of, *annotated, found[0].tick + LOOK_TICKS)

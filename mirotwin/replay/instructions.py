@@ -8,10 +8,8 @@ within a millisecond is no such effect: what the first changed instruction does 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import msgspec
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
 from miro_exact.state import Flat
@@ -21,11 +19,12 @@ from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
 from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
 from mirotwin.replay.lockstep import LOOK_TICKS, WorldPair
-from mirotwin.replay.state_fields import STACK, FieldDifference, item_differences, name_of_byte
+from mirotwin.replay.state_fields import STACK, Record, Value, item_differences, name_of_byte
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
     from miro_robot.mcs51.cpu import Cpu
+    from miro_sim.world.events import Event
     from miro_sim.world.robot import Robot
     from miro_sim.world.world import World
 
@@ -43,7 +42,15 @@ NOT_TOLD = ("instructions", "idle_cycles", "blocked")
 """Counts that follow from the others."""
 
 
-class InstructionDifference(msgspec.Struct, frozen=True):
+class ValueDifference(Record, frozen=True):
+    """A register or a variable that differs."""
+
+    name: str
+    one: Value
+    other: Value
+
+
+class InstructionDifference(Record, frozen=True):
     """What two firmwares execute otherwise: where, and the registers and variables that differ after it.
 
     `parted`: the instruction, of the first firmware, behind which they go on at different places.
@@ -53,17 +60,8 @@ class InstructionDifference(msgspec.Struct, frozen=True):
     slot: int
     one: CodeLocation
     other: CodeLocation
-    values: tuple[FieldDifference, ...]
+    values: tuple[ValueDifference, ...]
     parted: CodeLocation | None = None
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "network": self.network,
-            "slot": self.slot,
-            "places": [self.one.as_json(), self.other.as_json()],
-            "values": [{"name": value.path, "values": [value.one, value.other]} for value in self.values],
-            "parted": None if self.parted is None else self.parted.as_json(),
-        }
 
 
 class ExecutedInstruction(NamedTuple):
@@ -140,17 +138,8 @@ class Stepper:
     def changed(self, until_tick: int) -> InstructionDifference | None:
         """The first changed instruction that is executed; both worlds stand before it then."""
         one, other = self.pair.one, self.pair.other
-        places = changed_instructions(one.image, other.image)
-        conditions = [
-            Reached(address=place, network=robot.network, slot=robot.slot)
-            for robot in one.robots
-            for place in places
-        ]
-        if not conditions:
-            return None
-        try:
-            event = one.run_until(conditions, until_tick - one.tick)
-        except WaitExpired:
+        event = first_reached(one, changed_instructions(one.image, other.image), until_tick)
+        if event is None:
             return None
         other.run_to(one.tick)
         robot, twin = one.robot(event.network, event.slot), other.robot(event.network, event.slot)
@@ -215,6 +204,21 @@ class Stepper:
         )
 
 
+def first_reached(
+    world: World, addresses: Iterable[int], until_tick: int, robots: Sequence[Robot] | None = None
+) -> Event | None:
+    """Runs to where one of these robots (None: of all) is to execute what lies at one of the addresses."""
+    conditions = [
+        Reached(address=address, network=robot.network, slot=robot.slot)
+        for robot in (robots or world.robots)
+        for address in addresses
+    ]
+    try:
+        return world.run_until(conditions, until_tick - world.tick) if conditions else None
+    except WaitExpired:
+        return None
+
+
 def _lasting(
     one: Sequence[ExecutedInstruction], other: Sequence[ExecutedInstruction]
 ) -> tuple[int, int] | None:
@@ -229,7 +233,7 @@ def _lasting(
     return first, next(parted, -1)
 
 
-def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[FieldDifference]:
+def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[ValueDifference]:
     """Registers and variables that differ, by the names that people have for them; of the first robot's firmware."""
     flat = Flat(robot.board.cpu)
     values, others = flat.decode(one), flat.decode(other)
@@ -240,7 +244,7 @@ def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[Fi
             name = path + item
             if path == "iram":
                 name = _byte_name(image, int(item[1:-1]), values["bank"])
-            yield FieldDifference(REGISTERS.get(name, name), "", here, there)
+            yield ValueDifference(REGISTERS.get(name, name), here, there)
 
 
 def _byte_name(image: Image, address: int, bank: int) -> str:

@@ -9,12 +9,10 @@ differs and is the same again between two looks is not seen: a register, say, th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-import msgspec
+from typing import TYPE_CHECKING
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from mirotwin.replay.state_fields import FieldDifference, differing
+from mirotwin.replay.state_fields import FieldDifference, Record, differing
 
 if TYPE_CHECKING:
     from miro_sim.world.world import Mark, World
@@ -25,7 +23,7 @@ STEPS_TICKS = (1_000, 40, 1)
 NAMED = 3
 
 
-class StateDifference(msgspec.Struct, frozen=True):
+class StateDifference(Record, frozen=True):
     """The states of two worlds differ at `tick`, in control period `period`, and did not a tick before.
 
     `fields` is not empty. Where the worlds were made otherwise, that may be tick 0.
@@ -40,14 +38,6 @@ class StateDifference(msgspec.Struct, frozen=True):
         named = "; ".join(str(field) for field in self.fields[:NAMED])
         rest = f"; and {more} more fields" if more > 0 else ""
         return f"tick {self.tick} ({seconds(self.tick):.6f} s), control period {self.period}: {named}{rest}"
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "tick": self.tick,
-            "t_s": seconds(self.tick),
-            "period": self.period,
-            "fields": [field.as_json() for field in self.fields],
-        }
 
 
 class WorldPair:

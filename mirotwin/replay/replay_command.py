@@ -16,6 +16,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.runner import report_faults
+from mirotwin.replay.annotated_image import annotated_of
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import (
     SHOWN,
@@ -26,21 +27,13 @@ from mirotwin.replay.differences import (
     print_json,
     print_response,
 )
-from mirotwin.replay.firmwares import FirmwareDifference, annotated_of, firmwares_apart
+from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.lockstep import LOOK_TICKS
 from mirotwin.rerun.job import Job, load_job, rerun_job
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
-from mirotwin.shell.options import (
-    ALL,
-    FORCE,
-    OUT,
-    QUIET,
-    SEED,
-    SET,
-    Engine,
-    StackFrom,
-)
+from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom, plain_parameters
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 from mirotwin.shell.progress import ProgressBar
@@ -188,8 +181,9 @@ def replay(options: ReplayOptions) -> int:
     found = differences(job.recorded, replayed, rule)
     apart = None
     if found and job.image is not None and job.image.code != job.runs_on.code:
-        annotated = annotated_of(job.image, images, ()), annotated_of(job.runs_on, (), options.sources)
-        apart = firmwares_apart(job, annotated, found)
+        one, other = annotated_of(job.image, images, ()), annotated_of(job.runs_on, (), options.sources)
+        with plain_parameters(job.file, "replayed"):
+            apart = first_instruction(job.world_of, one, other, found[0].tick + LOOK_TICKS)
 
     if not options.quiet and not compare.as_json:
         print_frames(job, replayed, options.everything, compare.rule.to_tick)
@@ -211,11 +205,10 @@ def replay(options: ReplayOptions) -> int:
             **compare.rule_as_json(),
         }
         firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256}
-        instruction = None if apart is None else apart.as_json()
         document = {"file": file, "seed": job.seed, "firmware": firmwares, **compared}
         result = {
             **differences_as_json(found, options.everything),
-            "instruction": instruction,
+            "instruction": None if apart is None else apart.as_json(),
             "exit_code": code,
         }
         print_json({**document, **result})

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from miro_exact.clock import seconds
 from miro_robot.image import Image
 from miro_robot.image.symbol_files import read_text
 
@@ -73,23 +74,43 @@ _CHAIN = "chain"
 Value = int | float | str | None
 
 
-class FieldDifference(msgspec.Struct, frozen=True):
+class Record(msgspec.Struct, frozen=True):
+    """What was found. As JSON: fields by name, a tick in seconds too, `one` and `other` as a pair."""
+
+    def as_json(self) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        fields = msgspec.structs.asdict(self)
+        for name, value in fields.items():
+            if name == "one":
+                pair = "places" if isinstance(value, Record) else "values"
+                found[pair] = [_as_json(value), _as_json(fields["other"])]
+            elif name != "other":
+                found[name] = _as_json(value)
+            if name == "tick":
+                found["t_s"] = seconds(value)
+        return found
+
+
+def _as_json(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_as_json(one) for one in value]
+    return value.as_json() if isinstance(value, Record) else value
+
+
+class FieldDifference(Record, frozen=True):
     """A field of the state: `path` by the tables, `symbol` where the firmware has a name for it, and both values.
 
     A value is a number, or the text of something longer; None: there is no such item.
     """
 
     path: str
-    symbol: str
+    symbol: str | None
     one: Value
     other: Value
 
     def __str__(self) -> str:
         name = f" ({self.symbol})" if self.symbol else ""
         return f"{self.path}{name}: {_shown(self.one)}, {_shown(self.other)}"
-
-    def as_json(self) -> dict[str, Any]:
-        return {"path": self.path, "symbol": self.symbol or None, "values": [self.one, self.other]}
 
 
 def differing(one: World, other: World) -> Iterator[FieldDifference]:
@@ -102,9 +123,10 @@ def differing(one: World, other: World) -> Iterator[FieldDifference]:
         for item, here, there in item_differences(value, others[path]):
             if path.endswith(_RAM):
                 index = int(item[1:-1])
-                yield FieldDifference(f"{path}[{index:02X}h]", name_of_byte(one.image, index), here, there)
+                symbol = name_of_byte(one.image, index) or None
+                yield FieldDifference(f"{path}[{index:02X}h]", symbol, here, there)
             else:
-                yield FieldDifference(path + item, "", here, there)
+                yield FieldDifference(path + item, None, here, there)
 
 
 def _is_apart(root: Any, path: str) -> bool:

@@ -154,7 +154,7 @@ def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(im
     assert one.source == "if (age == FAILSAFE_STOP_MS) {"
     assert other.source == "if (age == FAILSAFE_STOP_MS + 15) {"
     assert (one.text, other.text) == ("MOV A,#6Eh", "MOV A,#7Dh")
-    assert [(value.path, value.one, value.other) for value in found.changed.values] == [("ACC", 110, 125)]
+    assert [(value.name, value.one, value.other) for value in found.changed.values] == [("ACC", 110, 125)]
     assert found.notes == ()
 
 
