@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
-import tomli_w
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
@@ -19,7 +17,7 @@ from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
-from mirotwin.report.page.run_page import Material, PageHeader, run_page
+from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job, replaying
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -29,7 +27,7 @@ from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
-from mirotwin.verify.cases.case import is_bare_case, tables_of
+from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.expect import expectations_of
 
@@ -146,59 +144,57 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
     again = _reproduced(wanted, job, end_tick)
-    other = job.image is None or job.image.code != image.code
     extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
-    notes = []
+    notes, what = [], "This page's own run of it"
     if extras.broken_off:
         notes.append(
             f"This run was broken off: the page shows what it recorded, {amount(len(recorded), 'control period')}."
         )
-    if other:
+    if job.image is None or job.image.code != image.code:
         recorded = [period for period in again.periods if period.index in shown]
         extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
         notes.append(_played_with(image, "recording", job.image))
-    what = f"Another firmware ({image.path.name})" if other else "This page's own run of it"
+        what = f"Another firmware ({image.path.name})"
     # the state of a controller is not computed again, so that digests of states say nothing here
     found = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
     return Material(
-        about=_about("run", wanted, job, notes),
-        scenario=job.scenario,
-        scenario_text=tomli_w.dumps(tables_of(job.scenario)),
-        periods=recorded,
+        kind="run",
+        job=job,
         again=again,
+        periods=recorded,
         sources=source_folders(image, wanted.sources),
+        command=_command(wanted, job),
+        notes=notes,
         extras=extras,
         replayed=what,
         differences=found,
         steps=None if summary is None else summary.steps,
-        broken_off=extras.broken_off,
     )
 
 
 def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
-    file, image = job.file, job.runs_on
     _, to_tick = window(wanted.from_time, wanted.to_time)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
     again = _reproduced(wanted, job, min(ends, default=None))
-    report = Path(file).with_name(REPORT)
+    report = Path(job.file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
-    notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
-    about = _about("failed test" if text else "case", wanted, job, notes)
     return Material(
-        about=msgspec.structs.replace(
-            about,
-            report=text,
-            name=(name or Path(file).absolute().parent.name) if text else "",
-            verdict="failed" if text and not again.failures else "",
-        ),
-        scenario=job.scenario,
-        scenario_text=tomli_w.dumps(tables_of(job.scenario)),
-        periods=again.periods,
+        kind="failed test" if text else "case",
+        job=job,
         again=again,
-        sources=source_folders(image, wanted.sources),
-        shown=wanted.shown,
+        periods=[period for period in again.periods if period.index in wanted.shown],
+        sources=source_folders(job.runs_on, wanted.sources),
+        command=_command(wanted, job),
+        notes=[*([_played_with(job.runs_on, "case")] if job.case.changed else []), *_said(job, again)],
+        name=(name or Path(job.file).absolute().parent.name) if text else "",
+        report=text,
+        verdict="failed" if text and not again.failures else "",
     )
+
+
+def _command(wanted: ReportOptions, job: Job) -> str:
+    return replay_line(Path(job.file).name, Path(wanted.firmware).name if wanted.firmware else None)
 
 
 def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
@@ -217,19 +213,6 @@ def _said(job: Job, again: Reproduction) -> list[str]:
         return []
     now = f"; now: {again.failures[0]}" if again.failures else " does not fail any more"
     return [f"What was recorded{now}. Recorded: {verdict}"]
-
-
-def _about(kind: str, wanted: ReportOptions, job: Job, notes: Sequence[str]) -> PageHeader:
-    name = Path(job.file).name
-    return PageHeader(
-        kind=kind,
-        file=name,
-        seed=job.seed,
-        firmware=job.runs_on.path.name,
-        firmware_sha256=job.runs_on.sha256 or "",
-        notes=notes,
-        again=(replay_line(name, Path(wanted.firmware).name if wanted.firmware else None),),
-    )
 
 
 def _summary(recording: Path, digest: str) -> Summary | None:

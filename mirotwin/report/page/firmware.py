@@ -23,9 +23,6 @@ from miro_robot.inspect.coverage import (
 )
 from miro_robot.inspect.lcov import FileRecord, Tracefile
 
-SHOWN = 12
-"""Functions that stand in the open; the rest is folded."""
-
 
 class SourceFile(msgspec.Struct, frozen=True):
     """`rows`: number and text of each line, and between them how often it ran, None where it is no code."""

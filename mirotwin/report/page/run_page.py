@@ -8,109 +8,88 @@ import sys
 from array import array
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
+import tomli_w
 
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
 from miro_sim.pitch import ground
-from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
 from mirotwin.recording.track import Column, Postures
 from mirotwin.report.page.document import render
-from mirotwin.report.page.firmware import SHOWN, coverage_rows
+from mirotwin.report.page.firmware import coverage_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
+from mirotwin.rerun.job import Job
+from mirotwin.verify.cases.case import tables_of
 
-FIRST = 200
-"""Failures of checks, and differences, that are listed."""
 SILENT = "silent"
 MARGIN_CM = 3.0
 MOST_POINTS = 4000
 """Of a path; a longer one is drawn with every second point, or every third, and so on."""
 
 
-class PageHeader(msgspec.Struct, frozen=True):
-    """What the header says. `kind`: run, case or failed test; `file`: its name without folders; `name`: of a test.
+class Material(msgspec.Struct, frozen=True, kw_only=True):
+    """All that a page is made from. `kind`: run, case or failed test; `name`: of a test, whose `report` it left.
 
-    `notes`: what is to be known before all else, a line each; `report`: the text that a failed test left; `again`:
-    commands that give it again.
+    `periods`: those that are drawn; `command` gives it again; `notes`: what is to be known before all else, a line
+    each. `replayed`: what is compared with the recorded run, "" for nothing; `differences`: where they differ.
     """
 
     kind: str
-    file: str
-    seed: int
-    firmware: str
-    firmware_sha256: str
-    notes: Sequence[str] = ()
-    report: str = ""
-    again: Sequence[str] = ()
-    verdict: str = ""
-    name: str = ""
-
-
-class Material(msgspec.Struct, frozen=True):
-    """All that a page is made from. `periods`: those that are drawn; `shown`: numbers of the wanted ones.
-
-    `replayed`: what is compared with the recorded run, "" for nothing; `differences`: where they differ.
-    """
-
-    about: PageHeader
-    scenario: Scenario
-    scenario_text: str
-    periods: Sequence[Period]
+    job: Job
     again: Reproduction
+    periods: Sequence[Period]
     sources: Sources
+    command: str
+    notes: Sequence[str] = ()
+    name: str = ""
+    report: str = ""
+    verdict: str = ""
     extras: Extras = Extras()
     replayed: str = ""
     differences: Sequence[Difference] = ()
     steps: StepResults | None = None
-    shown: range | None = None
-    broken_off: bool = False
 
 
 def run_page(material: Material) -> bytes:
     """The page. Raises BadInput where Bokeh is not installed."""
     from mirotwin.report.page.plots import KIND_COLOURS, figures_of  # loads Bokeh
 
-    scenario, again = material.scenario, material.again
+    scenario, again = material.job.scenario, material.again
     steered = [network.host != SILENT for network in scenario.networks]
     delay_frames = getattr(scenario.camera, "delay_frames", 0)
-    tracks = tracks_of(material.periods, steered, delay_frames, material.shown)
+    tracks = tracks_of(material.periods, steered, delay_frames)
     add_samples(tracks, material.extras.samples)
     marks = _within(again.marks, tracks)
     ticks = [*(one.tick for one in again.failures), *(fault.tick for _, _, fault in again.faults)]
     figures = figures_of(tracks, marks, [tick for tick in ticks if _shows(tracks, tick)])
     kinds = {mark.kind for mark in marks}
     values = {
-        "about": material.about,
-        "title": scenario.title,
-        "scenario": scenario.name,
-        "scenario_text": material.scenario_text,
+        "about": material,
+        "file": Path(material.job.file).name,
+        "scenario": scenario,
+        "firmware": material.job.runs_on.path.name,
+        "scenario_text": tomli_w.dumps(tables_of(scenario)),
         "verdict": _verdict(material),
         "told": any(value == value for robot in tracks.robots for value in robot.told_v_m_s),
         "facts": _facts(material, tracks),
         "tracks": tracks,
         "pitch": pitch_of(tracks),
         "again": again,
-        "failures": again.failures[:FIRST],
-        "more_failures": max(0, len(again.failures) - FIRST),
-        "steps": material.steps,
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, _counts(marks, lane)) for lane in lanes_of(marks)],
-        "functions_shown": SHOWN,
         "interrupts": [one for one in again.profile.interrupts if one.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),
-        "replayed": material.replayed,
-        "differences": material.differences,
-        "channels": first_per_channel(material.differences)[:FIRST],
-        "frames": material.extras.frames,
+        "channels": first_per_channel(material.differences),
     }
     return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
 
@@ -170,25 +149,21 @@ def _verdict(material: Material) -> tuple[str, str]:
     )
     if again.faults:
         return "fault", of
-    if material.about.verdict:
-        return material.about.verdict, of
+    if material.verdict:
+        return material.verdict, of
     if failed or (steps is not None and steps.failed):
         return "failed", of
-    return ("broken off" if material.broken_off else "passed"), of
+    return ("broken off" if material.extras.broken_off else "passed"), of
 
 
 def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:
     """Name, what is shown, and the whole of it where that is shortened."""
-    about, digest = material.about, material.again.digest
+    digest, image = material.again.digest, material.job.runs_on
     if material.periods and material.replayed:
         digest = material.periods[-1].digest
     facts = [
-        ("seed", f"{about.seed}", ""),
-        (
-            "firmware",
-            f"{about.firmware_sha256[:12] or 'no file'}",
-            f"{about.firmware} {about.firmware_sha256}",
-        ),
+        ("seed", f"{material.job.seed}", ""),
+        ("firmware", image.sha256[:12] or "no file", f"{image.path.name} {image.sha256}"),
         ("digest", digest[:12], digest),
         ("simulated", f"{len(tracks.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s", ""),
     ]

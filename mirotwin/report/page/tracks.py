@@ -86,23 +86,17 @@ class PageTracks(msgspec.Struct, frozen=True):
         return [tick / TICKS_PER_SECOND for tick in self.ticks]
 
 
-def tracks_of(
-    periods: Sequence[Period], steered: Sequence[bool], delay_frames: int, shown: range | None = None
-) -> PageTracks:
-    """Of the periods with a number in `shown`. `steered`: for each network, whether its host steers."""
+def tracks_of(periods: Sequence[Period], steered: Sequence[bool], delay_frames: int) -> PageTracks:
+    """`steered`: for each network, whether its host steers."""
     robots: dict[RobotId, PageTrack] = {}
-    ticks = []
     for period in periods:
-        if shown is not None and period.index not in shown:
-            continue
-        ticks.append(period.tick)
         for robot in period.robots:
             id = (robot.network, robot.slot)
             if id not in robots:
                 robots[id] = PageTrack(id, steered[robot.network], delay_frames)
             robots[id].add(robot, period.tick)
-    first = ticks[0] // CONTROL_PERIOD_TICKS if ticks else 0
-    return PageTracks(first, ticks, list(robots.values()))
+    first = periods[0].index if periods else 0
+    return PageTracks(first, [period.tick for period in periods], list(robots.values()))
 
 
 def add_samples(tracks: PageTracks, samples: Sequence[tuple[RobotId, SampleMessage]]) -> None:

@@ -82,13 +82,13 @@ def test_a_position_that_overflows_its_register_is_no_jump():
 
 
 def test_a_window_has_the_periods_that_are_wanted():
-    tracks = tracks_of(list(synthetic.periods(10)), [True], 0, range(3, 7))
+    tracks = tracks_of(list(synthetic.periods(10))[3:7], [True], 0)
     assert tracks.first == 3
     assert tracks.ticks == [index * CONTROL_PERIOD_TICKS for index in range(3, 7)]
 
 
 def test_samples_of_a_full_recording_go_to_their_robots():
-    tracks = tracks_of(list(synthetic.periods(4, [(0, 0), (0, 2)])), [True], 0, range(1, 3))
+    tracks = tracks_of(list(synthetic.periods(4, [(0, 0), (0, 2)]))[1:3], [True], 0)
     inside, before = tracks.ticks[0] + 5, tracks.ticks[0] - 5
     samples = [((0, 2), SampleMessage(tick, 1, 2, 65536, 4, 5, 6, 131072, 8)) for tick in (before, inside)]
     add_samples(tracks, samples)
