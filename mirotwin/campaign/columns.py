@@ -15,7 +15,7 @@ Wall times are in a file of their own (`results`), because all the rest is the s
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -71,27 +71,18 @@ class _Run:
         return max((one.rms_position_cm for one in everyone if one.rms_position_cm is not None), default=None)
 
 
-def _in_summary(way: tuple[str, ...], name: str) -> Callable[[_Run], Any]:
-    def value(run: _Run) -> Any:
-        at: Any = run.summary
-        for part in way:
-            at = getattr(at, part) if at is not None else None
-        return None if at is None else getattr(at, name)
-
-    return value
-
-
-def _seen(name: str) -> Callable[[_Run], Any]:
-    return lambda run: getattr(run.seen, name)
+def _at(*way: str) -> Callable[[_Run], Any]:
+    """What stands there: None where a struct on the way is."""
+    return lambda run: reduce(lambda at, part: at and getattr(at, part), way, run)
 
 
 COLUMNS: Mapping[str, tuple[type, Callable[[_Run], Any]]] = {
     "simulated_s": (float, lambda run: run.summary.simulated_s),
     "settled": (bool, lambda run: None if run.first is None else run.first.errors[-1].settled),
     "worst_rms_position_cm": (float, _Run.worst_rms_position_cm),
-    **{name: (float, _seen(name.replace("seen_", "rms_"))) for name in SEEN},
+    **{name: (float, _at("seen", name.replace("seen_", "rms_"))) for name in SEEN},
     **{
-        prefix + name: (kind, _in_summary(way, name))
+        prefix + name: (kind, _at("summary", *way, name))
         for prefix, way, struct in _PARTS
         for name, kind in _kinds(struct)
     },

@@ -1,36 +1,10 @@
-"""The file of a campaign: which runs it consists of, and what is expected of them.
-
-scenario = "fig6"                      a built-in scenario, or a path beside this file
-seeds = "0-99"
-firmware = "mine.ihx"                  an image beside this file; without it, the robot's own
-set = { duration_s = 3.0 }             keys of the scenario, for all runs
-allowed_failed_share = 0.05            so many runs may fail a check before the exit code is 1
-
-[expect]                               checks, beside those of the scenario
-tracks_within_cm = 3.0
-
-[grid]                                 every combination of these values
-network.radio.bit_error_rate = [0.0, 1e-4, 1e-3]
-firmware = ["", "mine.ihx"]            images; "" is the robot's own
-
-[factor.chain]                         a factor whose levels set several keys, as `--set` does
-paper = []
-improved = ["network.robot.controller={law = 'body_frame'}", "network.robot.estimator={kind = 'ekf'}"]
-
-[random]                               so many draws, for each combination of the grid
-count = 200
-seed = 0
-[random.range]
-host.compute_s = { from = 0.001, to = 0.02 }
-network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
-"""
+"""The file of a campaign: which runs it consists of, and what is expected of them; README.md shows one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
@@ -109,107 +83,94 @@ def read(path: Path) -> CampaignFile:
 
 def parse(text: str, path: Path) -> CampaignFile:
     """The campaign of a text that stands at `path`. Raises BadInput with the place of what is wrong."""
-    return _File(path).campaign(text)
+    try:
+        raw = tables(text)
+        check_numbers(raw)
+        found = struct_of(raw, Document)
+        design = _design(found, path)
+    except TomlError as error:
+        raise BadInput(path, error.place, error.what, error.remedy) from None
+    settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
+    settings += [(f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()]
+    return CampaignFile(
+        path=str(path),
+        scenario=beside(str(path), found.scenario),
+        firmware=_image(found.firmware, path),
+        settings=tuple(settings),
+        allowed_failed_share=found.allowed_failed_share,
+        design=design,
+    )
 
 
-class _File:
-    """Reads one file."""
+def _image(name: str, path: Path) -> str:
+    return str((path.parent / name).resolve()) if name else ""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
 
-    def refuse(self, place: str, what: str, remedy: str = "") -> NoReturn:
-        raise BadInput(self.path, place, what, remedy)
+def _design(found: Document, path: Path) -> Design:
+    """Raises TomlError, as all below."""
+    try:
+        seeds = seeds_of(str(found.seeds), MOST_RUNS)
+    except ValueError as error:
+        raise TomlError(f"{error}", place="seeds") from None
+    design = Design(
+        first_seed=seeds[0],
+        seed_count=len(seeds),
+        factors=(*_grid(found.grid, path), *_factors(found.factor)),
+        draws=tuple(_draws(found.random)) if found.random else (),
+        draw_count=found.random.count if found.random else 1,
+        draw_seed=found.random.seed if found.random else 0,
+    )
+    names = design.names
+    for at, name in enumerate(names):
+        if name in names[:at]:
+            raise TomlError("is varied in two ways", "keep one of them", name)
+    if design.runs > MOST_RUNS:
+        raise TomlError(f"has {design.runs} runs; at most {MOST_RUNS}", "take fewer levels or seeds")
+    return design
 
-    def campaign(self, text: str) -> CampaignFile:
+
+def _grid(table: dict[str, Any], path: Path) -> Iterator[Factor]:
+    for key, values in _leaves(table, lambda value: not isinstance(value, dict)):
+        place = f"grid.{key}"
+        if key in NOT_VARIED:
+            raise TomlError("cannot be varied", "name a key below it, or give seeds = ..", place)
+        if not isinstance(values, list) or not values:
+            raise TomlError(f"expected a list of values, got {values!r}", f"write {key} = [..]", place)
+        levels = [_level(key, value, f"{place}[{at}]", path) for at, value in enumerate(values)]
+        if len({repr(level.value) for level in levels}) < len(levels):
+            raise TomlError("has a value twice", "a value once is enough: give more seeds", place)
+        yield Factor(key, _of_one_kind(levels))
+
+
+def _level(key: str, value: Any, place: str, path: Path) -> Level:
+    if key not in (SCENARIO, FIRMWARE):
+        shown = value if isinstance(value, Value) else inline(value)
+        return Level(shown, (f"{key}={inline(value)}",), place=place)
+    if not isinstance(value, str):
+        raise TomlError(f"expected a name or a path, got {value!r}", place=place)
+    if key == SCENARIO:
+        return Level(value, scenario=beside(str(path), value), place=place)
+    return Level(value, firmware=_image(value, path) or "own", place=place)
+
+
+def _factors(table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:
+    for name, levels in table.items():
+        place = f"factor.{name}"
+        if not levels:
+            raise TomlError("has no levels", "give each level a list of KEY=VALUE", place)
+        made = (Level(level, tuple(made), place=f"{place}.{level}") for level, made in levels.items())
+        yield Factor(name, tuple(made))
+
+
+def _draws(random: Random) -> Iterator[Draw]:
+    if not random.range:
+        raise TomlError("says nothing to draw", "give KEY = { from = .., to = .. }", "random.range")
+    for key, value in _leaves(random.range, is_range):
         try:
-            raw = tables(text)
-            check_numbers(raw)
-            found = struct_of(raw, Document)
+            yield draw_of(key, value)
         except TomlError as error:
-            self.refuse(f"{error.place}", error.what, error.remedy)
-        settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
-        settings += [
-            (f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()
-        ]
-        return CampaignFile(
-            path=str(self.path),
-            scenario=beside(str(self.path), found.scenario),
-            firmware=self.image(found.firmware),
-            settings=tuple(settings),
-            allowed_failed_share=found.allowed_failed_share,
-            design=self._design(found),
-        )
-
-    def image(self, name: str) -> str:
-        return str((self.path.parent / name).resolve()) if name else ""
-
-    def _design(self, found: Document) -> Design:
-        try:
-            seeds = seeds_of(str(found.seeds), MOST_RUNS)
-        except ValueError as error:
-            self.refuse("seeds", str(error))
-        factors = [*self._grid(found.grid), *self._factors(found.factor)]
-        draws = self._draws(found.random)
-        design = Design(
-            first_seed=seeds[0],
-            seed_count=len(seeds),
-            factors=tuple(factors),
-            draws=tuple(draws),
-            draw_count=found.random.count if found.random else 1,
-            draw_seed=found.random.seed if found.random else 0,
-        )
-        names = design.names
-        for at, name in enumerate(names):
-            if name in names[:at]:
-                self.refuse(name, "is varied in two ways", "keep one of them")
-        if design.runs > MOST_RUNS:
-            self.refuse("", f"has {design.runs} runs; at most {MOST_RUNS}", "take fewer levels or seeds")
-        return design
-
-    def _grid(self, table: dict[str, Any]) -> Iterator[Factor]:
-        for key, values in _leaves(table, lambda value: not isinstance(value, dict)):
-            place = f"grid.{key}"
-            if key in NOT_VARIED:
-                self.refuse(place, "cannot be varied", "name a key below it, or give seeds = ..")
-            if not isinstance(values, list) or not values:
-                self.refuse(place, f"expected a list of values, got {values!r}", f"write {key} = [..]")
-            levels = [self._level(key, value, f"{place}[{at}]") for at, value in enumerate(values)]
-            if len({repr(level.value) for level in levels}) < len(levels):
-                self.refuse(place, "has a value twice", "a value once is enough: give more seeds")
-            yield Factor(key, _of_one_kind(levels))
-
-    def _level(self, key: str, value: Any, place: str) -> Level:
-        if key not in (SCENARIO, FIRMWARE):
-            shown = value if isinstance(value, Value) else inline(value)
-            return Level(shown, (f"{key}={inline(value)}",), place=place)
-        if not isinstance(value, str):
-            self.refuse(place, f"expected a name or a path, got {value!r}")
-        if key == SCENARIO:
-            return Level(value, scenario=beside(str(self.path), value), place=place)
-        return Level(value, firmware=self.image(value) or "own", place=place)
-
-    def _factors(self, table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:
-        for name, levels in table.items():
-            if not levels:
-                self.refuse(f"factor.{name}", "has no levels", "give each level a list of KEY=VALUE")
-            yield Factor(
-                name,
-                tuple(
-                    Level(level, tuple(settings), place=f"factor.{name}.{level}")
-                    for level, settings in levels.items()
-                ),
-            )
-
-    def _draws(self, random: Random | None) -> list[Draw]:
-        if random is None:
-            return []
-        if not random.range:
-            self.refuse("random.range", "says nothing to draw", "give KEY = { from = .., to = .. }")
-        return [
-            draw_of(key, value, partial(self.refuse, f"random.range.{key}"))
-            for key, value in _leaves(random.range, is_range)
-        ]
+            what = ": ".join(filter(None, (f"{error.place}", error.what)))
+            raise TomlError(what, error.remedy, f"random.range.{key}") from None
 
 
 def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -10,69 +10,51 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any, NoReturn, Protocol
+from typing import Annotated, Any
+
+import msgspec
 
 from miro_exact.domain import MAX_SEED
+from miro_protocol.toml_text import TomlError, struct_of
 from mirotwin.campaign.design import Draw, Value
 from mirotwin.shell.command import Option, Word
 
-KEYS = ("from", "to", "scale", "whole")
 CHOOSE = "choose"
 
 
-class Refuse(Protocol):
-    """Raises BadInput at the place of the range: what, remedy."""
+class Range(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}):
+    """See above."""
 
-    def __call__(self, what: str, remedy: str = "") -> NoReturn: ...
+    low: float
+    high: float
+    scale: str = "linear"
+    whole: bool = False
+
+
+class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    choose: Annotated[tuple[Value, ...], msgspec.Meta(min_length=1)]
 
 
 def is_range(value: Any) -> bool:
     """Whether this stands for a range, and not for keys below it."""
-    return not isinstance(value, dict) or any(key in value for key in (*KEYS[:2], CHOOSE))
+    return not isinstance(value, dict) or any(key in value for key in ("from", "to", CHOOSE))
 
 
-def draw_of(key: str, value: Any, refuse: Refuse) -> Draw:
-    """The draw of the scenario's `key`."""
-    if not isinstance(value, dict):
-        refuse(f"expected a range, got {value!r}", "write { from = .., to = .. }")
-    if CHOOSE in value:
-        return _choice(key, value, refuse)
-    for name in value:
-        if name not in KEYS:
-            refuse(f"{name}: unknown key", f"use {', '.join(KEYS)}, or {CHOOSE} alone")
-    low, high = _number(value, "from", refuse), _number(value, "to", refuse)
-    scale, whole = value.get("scale", "linear"), value.get("whole", False)
+def draw_of(key: str, value: Any) -> Draw:
+    """The draw of the scenario's `key`. Raises TomlError."""
+    if isinstance(value, dict) and CHOOSE in value:
+        return Draw(key, choices=struct_of(value, Choice).choose)
+    found = struct_of(value, Range)
+    low, high, scale, whole = msgspec.structs.astuple(found)
     if scale not in ("linear", "log"):
-        refuse(f"scale: {scale!r} is not one of the choices", "use linear or log")
-    if not isinstance(whole, bool):
-        refuse(f"whole: expected true or false, got {whole!r}")
+        raise TomlError(f"scale: {scale!r} is not one of the choices", "use linear or log")
     if not low < high or not math.isfinite(high - low):
-        refuse(f"{low} to {high} is no range", "give a smaller from than to")
+        raise TomlError(f"{low} to {high} is no range", "give a smaller from than to")
     if scale == "log" and (low <= 0.0 or whole):
-        refuse("scale log needs from > 0, and is not for whole numbers", "leave scale out")
+        raise TomlError("scale log needs from > 0, and is not for whole numbers", "leave scale out")
     if whole and not (low.is_integer() and high.is_integer() and abs(high) + abs(low) < 1 << 53):
-        refuse(f"{low} to {high} are not whole numbers", "give whole ends, or leave whole out")
+        raise TomlError(f"{low} to {high} are not whole numbers", "give whole ends, or leave whole out")
     return Draw(key, low, high, scale, whole)
-
-
-def _choice(key: str, value: dict[str, Any], refuse: Refuse) -> Draw:
-    choices = value[CHOOSE]
-    if len(value) > 1 or not isinstance(choices, list) or not choices:
-        refuse(f"{CHOOSE} stands alone, with a list of values", "write { choose = [..] }")
-    if not all(isinstance(one, Value) for one in choices):
-        refuse("can choose among numbers, words, true and false only")
-    return Draw(key, choices=tuple(choices))
-
-
-def _number(value: dict[str, Any], name: str, refuse: Refuse) -> float:
-    number = value.get(name)
-    if isinstance(number, bool) or not isinstance(number, int | float):
-        what = "this key is missing" if number is None else f"expected a number, got {number!r}"
-        refuse(f"{name}: {what}", "write { from = .., to = .. }")
-    try:
-        return float(number)
-    except OverflowError:
-        refuse(f"{name}: is beyond every float", "give a smaller one")
 
 
 MOST_SEEDS = 1000
