@@ -135,13 +135,10 @@ def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
 
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
     """A word, and the numbers after it."""
-    wrong = [
-        f"{counts[name]} {word}" for name, word in (("failed", "failed"), ("fault", "with a firmware fault"))
-    ]
-    wrong.append(f"{counts['error']} with an error")
-    said = ", ".join(text for text in wrong if not text.startswith("0 "))
-    worst = next((name for name in ("error", "fault", "failed") if counts[name]), "passed")
-    return worst, said or f"{counts['passed']} runs passed"
+    words = {"failed": "failed", "fault": "with a firmware fault", "error": "with an error"}
+    wrong = [name for name in words if counts[name]]
+    said = ", ".join(f"{counts[name]} {words[name]}" for name in wrong)
+    return ["passed", *wrong][-1], said or f"{counts['passed']} runs passed"
 
 
 def _data(rows: ResultRows) -> bytes:

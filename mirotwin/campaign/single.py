@@ -5,8 +5,8 @@ A process keeps images, and scenarios with their settings, so that a run costs l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 
@@ -64,7 +64,11 @@ def _run(job: Work) -> RunOutcome:
     player = player_of(world, steps, job.origin)
     tracks = Tracks(delay_frames=scenario.camera.delay_frames)
     began_s = now_s()
-    with _recorder(job.recording, text, world) as recorder:
+    with ExitStack() as files:
+        recorder = None
+        if job.recording:
+            stream = files.enter_context(Path(job.recording).open("wb"))
+            recorder = files.enter_context(Recorder(stream, source_of(text, world)))
         _move(world, player, tracks, recorder)
     wall_s = now_s() - began_s
     checks.finish()
@@ -83,15 +87,6 @@ def _run(job: Work) -> RunOutcome:
         checks=_verdicts(judges),
         wall_s=wall_s,
     )
-
-
-@contextmanager
-def _recorder(path: str, text: ScenarioText, world: World) -> Iterator[Recorder | None]:
-    if not path:
-        yield None
-        return
-    with Path(path).open("wb") as stream, Recorder(stream, source_of(text, world)) as recorder:
-        yield recorder
 
 
 def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorder | None) -> None:

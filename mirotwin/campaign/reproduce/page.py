@@ -5,7 +5,10 @@ The same rows give the same bytes: no date, no time taken.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import product
+
+from msgspec.structs import astuple
 
 from mirotwin.campaign.reproduce.claims import findings, number, rows_of
 from mirotwin.campaign.reproduce.plan import (
@@ -16,7 +19,6 @@ from mirotwin.campaign.reproduce.plan import (
     LEARNING,
     PAPER,
     STARTS,
-    Start,
 )
 from mirotwin.campaign.reproduce.rows import RunRow, Table, middle, never_settled, percentile, settled
 
@@ -25,6 +27,8 @@ NAMES = {
     IMPROVED: "`body_frame` with `ekf`",
     LEARNING: "the same, with `self_calibration`",
 }
+FIGURES = {f"Fig. {start.figure}": start.figure for start in STARTS[:3]}
+"""Those that other cameras and disturbances are tried on."""
 
 HEAD = """\
 # The paper's section V, run again
@@ -57,17 +61,38 @@ the verdicts above of the runs that settle.
 
 def page(table: Table, seeds: str, folder: str) -> str:
     """The whole text; `folder`: where the pictures are, as links say it."""
-    runs = len([row for rows in table.values() for row in rows])
+    runs = sum(map(len, table.values()))
     parts = _claims(table), _figures(table, folder), _cameras(table), _disturbances(table)
     return "\n".join([HEAD.format(runs=runs, seeds=seeds), *(line for part in parts for line in part)])
 
 
+def _table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    for cells in (names, *rows):
+        yield "".join(f"| {cell} " if cell else "| " for cell in cells) + "|"
+        if cells is names:
+            yield "|---" * len(names) + "|"
+    yield ""
+
+
 def _claims(table: Table) -> Iterator[str]:
     yield "## What the paper claims, and what was measured\n"
-    yield "| figure | claim | criterion | measured | |\n|---|---|---|---|---|"
-    for found in findings(table):
-        yield f"| {found.figure} | {found.claim} | {found.criterion} | {found.measured} | **{found.verdict}** |"
-    yield ""
+    found = [(*words, f"**{verdict}**") for *words, verdict in map(astuple, findings(table))]
+    yield from _table(("figure", "claim", "criterion", "measured", ""), found)
+
+
+COLUMNS: dict[str, Callable[[Sequence[RunRow]], str]] = {
+    "truth cm: median": lambda rows: number(middle(rows, "rms_position_cm")),
+    "95 %": lambda rows: number(percentile(rows, "rms_position_cm", 0.95)),
+    "worst": lambda rows: number(percentile(rows, "rms_position_cm", 1.0)),
+    "camera cm: median": lambda rows: number(middle(rows, "seen_position_cm")),
+    "x / y cm": lambda rows: f"{number(middle(rows, 'rms_x_cm'))} / {number(middle(rows, 'rms_y_cm'))}",
+    "heading deg": lambda rows: number(middle(rows, "rms_theta_deg")),
+    "not settled": lambda rows: f"{never_settled(rows)} of {len(rows)}",
+    "backward": lambda rows: f"{sum(row.reversals > 0 for row in rows)}",
+    "across": lambda rows: f"{sum(row.crossings > 0 for row in rows)}",
+    "chattering m/s2": lambda rows: number(middle(settled(rows), "chattering_m_s2")),
+}
+"""Of a figure's table, but for the controller; READING says what they mean."""
 
 
 def _figures(table: Table, folder: str) -> Iterator[str]:
@@ -77,60 +102,27 @@ def _figures(table: Table, folder: str) -> Iterator[str]:
         errors = f"({start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad)"
         yield f"### Fig. {start.figure}: {start.path}, initial errors {errors}\n"
         yield f"![Fig. {start.figure}: in truth, and as the camera sees it]({folder}/{start.name}.svg)\n"
-        yield (
-            "| controller | truth cm: median | 95 % | worst | camera cm: median | x / y cm | heading deg"
-            " | not settled | backward | across | chattering m/s2 |"
-        )
-        yield "|---|---|---|---|---|---|---|---|---|---|---|"
+        found = []
         for controller in CONTROLLERS:
-            rows = rows_of(table, start.figure, controller)
-            if rows:
-                yield _line(NAMES.get(controller, controller), rows)
-        yield ""
+            if rows := rows_of(table, start.figure, controller):
+                cells = (cell(rows) for cell in COLUMNS.values())
+                found.append((NAMES.get(controller, controller), *cells))
+        yield from _table(("controller", *COLUMNS), found)
 
 
-def _line(name: str, rows: Sequence[RunRow]) -> str:
-    cells = [
-        name,
-        number(middle(rows, "rms_position_cm")),
-        number(percentile(rows, "rms_position_cm", 0.95)),
-        number(percentile(rows, "rms_position_cm", 1.0)),
-        number(middle(rows, "seen_position_cm")),
-        f"{number(middle(rows, 'rms_x_cm'))} / {number(middle(rows, 'rms_y_cm'))}",
-        number(middle(rows, "rms_theta_deg")),
-        f"{never_settled(rows)} of {len(rows)}",
-        f"{sum(row.reversals > 0 for row in rows)}",
-        f"{sum(row.crossings > 0 for row in rows)}",
-        number(middle(settled(rows), "chattering_m_s2")),
-    ]
-    return "| " + " | ".join(cells) + " |"
+def _error(rows: Sequence[RunRow]) -> str:
+    """Its median and the 95 %."""
+    return " / ".join(COLUMNS[name](rows) for name in ("truth cm: median", "95 %"))
 
 
 def _cameras(table: Table) -> Iterator[str]:
     yield "## What the camera decides\n"
     yield "Error in truth in cm, median / 95 %. `1997`: a calibration wrong by up to 2.40 cm, drawn once a seed.\n"
-    shown = STARTS[:3]
-    yield "| camera | controller | " + " | ".join(f"Fig. {start.figure}" for start in shown) + " |"
-    yield "|---|---|---|---|---|"
-    for camera, name in (*((camera, camera) for camera in CAMERAS), ("", "pixels, 1997")):
-        for controller in (PAPER, IMPROVED):
-            yield _camera_line(table, name, controller, camera, shown)
-    yield _camera_line(table, "pixels, 1997", LEARNING, "", shown)
-    yield ""
-
-
-def _error(rows: Sequence[RunRow]) -> str:
-    """Its median and the 95 %."""
-    worst = percentile(rows, "rms_position_cm", 0.95)
-    return f"{number(middle(rows, 'rms_position_cm'))} / {number(worst)}"
-
-
-def _camera_line(table: Table, name: str, controller: str, camera: str, shown: Sequence[Start]) -> str:
-    cells = []
-    for start in shown:
-        rows = rows_of(table, start.figure, controller, camera)
-        cells.append(_error(rows))
-    return f"| {name} | {NAMES[controller]} | " + " | ".join(cells) + " |"
+    found = []
+    for camera, controller in (*product((*CAMERAS, ""), (PAPER, IMPROVED)), ("", LEARNING)):
+        cells = [_error(rows_of(table, figure, controller, camera)) for figure in FIGURES.values()]
+        found.append((camera or "pixels, 1997", NAMES[controller], *cells))
+    yield from _table(("camera", "controller", *FIGURES), found)
 
 
 def _disturbances(table: Table) -> Iterator[str]:
@@ -139,13 +131,9 @@ def _disturbances(table: Table) -> Iterator[str]:
         "The paper's law with what section V-A calls integration error and noise in the control signal, whose bounds it"
         " does not give.\nError in truth in cm of all runs, median / 95 %, and the runs that do not settle.\n"
     )
-    shown = STARTS[:3]
-    yield "| disturbance | " + " | ".join(f"Fig. {start.figure}" for start in shown) + " |"
-    yield "|---|---|---|---|"
+    found = []
     for disturbance in ("", *DISTURBANCES):
-        cells = [disturbance or "none: Euler's rule, words of 16 bits, no noise"]
-        for start in shown:
-            rows = rows_of(table, start.figure, PAPER, "", disturbance)
-            cells.append(f"{_error(rows)} ({never_settled(rows)} of {len(rows)})")
-        yield "| " + " | ".join(cells) + " |"
-    yield ""
+        groups = [rows_of(table, figure, PAPER, "", disturbance) for figure in FIGURES.values()]
+        cells = [f"{_error(rows)} ({COLUMNS['not settled'](rows)})" for rows in groups]
+        found.append((disturbance or "none: Euler's rule, words of 16 bits, no noise", *cells))
+    yield from _table(("disturbance", *FIGURES), found)

@@ -23,7 +23,6 @@ ILLUSTRATIVE = "epsilon, illustrative"
 THEORY = "epsilon, theory"
 RETUNED = "epsilon, retuned"
 EPSILONS = (ILLUSTRATIVE, THEORY, RETUNED)
-CONTROLLERS = (PAPER, *EPSILONS, IMPROVED, LEARNING)
 
 
 class Start(msgspec.Struct, frozen=True):
@@ -55,19 +54,23 @@ STARTS = (
 )
 """Captions of the paper's Figs. 6 to 10."""
 
-EPSILON_SETTINGS = {
+IMPROVED_SETTINGS = (
+    "network.robot.controller={law = 'body_frame'}",
+    "network.robot.estimator={kind = 'ekf'}",
+)
+SETTINGS: Mapping[str, tuple[str, ...]] = {
+    PAPER: (),
     ILLUSTRATIVE: (),  # those of fig9 and fig10
     THEORY: tuple(
         f"network.robot.controller.{gain}={getattr(THEORY_GAINS, gain)}"
         for gain in ("epsilon_rad", "alpha_per_s", "beta_per_s", "length_m", "sigma", "switching")
     ),
     RETUNED: ("network.robot.controller={law = 'epsilon_tracking'}",),  # the defaults of the law
+    IMPROVED: IMPROVED_SETTINGS,
+    LEARNING: (*IMPROVED_SETTINGS, "camera.self_calibration=lines"),
 }
-IMPROVED_SETTINGS = (
-    "network.robot.controller={law = 'body_frame'}",
-    "network.robot.estimator={kind = 'ekf'}",
-)
-LEARN = "camera.self_calibration=lines"
+"""Of each controller; with the scenario's gains where there are none."""
+CONTROLLERS = tuple(SETTINGS)
 CAMERAS = {
     "white noise": "camera={kind = 'gaussian'}",
     "pixels, exact": "camera.calibration=exact",
@@ -118,15 +121,10 @@ class Group(msgspec.Struct, frozen=True):
             f"network.robot.start_error_y_cm={start.y_cm}",
             f"network.robot.start_error_theta_rad={start.theta_rad}",
         ]
-        settings += EPSILON_SETTINGS.get(self.controller, ())
         if self.camera:
             settings.append(CAMERAS[self.camera])
-        if self.disturbance:
-            settings += DISTURBANCES[self.disturbance]
-        if self.controller in (IMPROVED, LEARNING):
-            settings += IMPROVED_SETTINGS
-        if self.controller == LEARNING:
-            settings.append(LEARN)
+        settings += DISTURBANCES.get(self.disturbance, ())
+        settings += SETTINGS[self.controller]
         if self.controller == IMPROVED and self.camera == "white noise":
             settings[-1] = NOISE
         return base, tuple(settings)

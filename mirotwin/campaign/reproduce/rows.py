@@ -53,11 +53,8 @@ def row_of(plan: Plan, outcome: RunOutcome) -> RunRow:
     """The row of a run that was made."""
     point = plan.design.point(outcome.run)
     (level,) = point.levels
-    found: dict[str, Any] = {}
-    for name in RunRow.__struct_fields__:
-        value = outcome.figures.get(_COLUMNS.get(name, name))
-        if value is not None:
-            found[name] = value
+    figures = {name: outcome.figures.get(_COLUMNS.get(name, name)) for name in RunRow.__struct_fields__}
+    found: dict[str, Any] = {name: figure for name, figure in figures.items() if figure is not None}
     return RunRow(
         f"{level.value}", level.scenario, point.seed, error=outcome.error, digest=outcome.digest, **found
     )
@@ -89,10 +86,8 @@ def middle(rows: Sequence[RunRow], name: str) -> float | None:
 def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
     """The smallest value that so large a share of the rows does not exceed (nearest rank)."""
     found = sorted(values(rows, name))
-    if not found:
-        return None
     rank = -(-len(found) * round(share * 1000) // 1000)
-    return found[max(rank, 1) - 1]
+    return found[max(rank, 1) - 1] if found else None
 
 
 def middle_seeds(table: Table) -> dict[str, int]:
