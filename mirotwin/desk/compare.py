@@ -69,37 +69,33 @@ class PortComparison(msgspec.Struct, frozen=True):
     not_judged: int
 
 
-def answers(periods: Sequence[Period], slots: Sequence[int] = range(256)) -> list[TimedAnswer]:
-    """The valid answers that the PC heard of robots in these slots."""
-    decoder, found = TelemetryDecoder(), []
-    for one in on_air(periods, 0, sent=False):
-        for event in decoder.feed(one.data):
-            said = answer_of(event) if isinstance(event, Received) else None
-            if said is not None and said.slot in slots:
-                found.append(TimedAnswer(one.end_tick, f"answer of {said.slot} to {said.seq}", said))
-    return found
-
-
 def compare(
     port: Sequence[Period], twin: Sequence[Period], robots: int, rule: CompareRule = ANSWERS
 ) -> PortComparison:
     """The answers in a recording made at a port, and in that of the twin."""
-    there = sorted({answer.said.slot for answer in answers(port)})
-    silent = {answer.said.slot for answer in answers(twin)} - set(there)
-    sent = _Sent(port, robots)
-    found: list[Difference] = []
-    beside, unsure, open_values = {}, 0, 0
-    for slot in there:
-        both = _side_by_side(answers(port, [slot]), answers(twin, [slot]), port[-1].tick - rule.within_ticks)
-        late = [here.tick - there.tick for here, there in both if here is not None and there is not None]
-        beside[slot], unsure = both, max([unsure, *late])
-        for one in _judged(both, late, slot, sent, rule):
-            if one is None:
-                open_values += 1
-            else:
-                found.append(one)
-    found.sort(key=lambda one: one.tick)
-    return PortComparison(beside, unsure / TICKS_PER_MS, found, tuple(sorted(silent)), open_values)
+    here, there = _by_slot(port), _by_slot(twin)
+    sent, until_tick = _Sent(port, robots), port[-1].tick - rule.within_ticks
+    judged: list[Difference | None] = []
+    beside, unsure = {}, 0
+    for slot, heard in sorted(here.items()):
+        beside[slot] = _side_by_side(heard, there.pop(slot, []), until_tick)
+        late = [one.tick - other.tick for one, other in beside[slot] if one is not None and other is not None]
+        unsure = max([unsure, *late])
+        judged += _judged(beside[slot], late, slot, sent, rule)
+    found = sorted((one for one in judged if one is not None), key=lambda one: one.tick)
+    return PortComparison(beside, unsure / TICKS_PER_MS, found, tuple(sorted(there)), judged.count(None))
+
+
+def _by_slot(periods: Sequence[Period]) -> dict[int, list[TimedAnswer]]:
+    """The valid answers that the PC heard."""
+    decoder, found = TelemetryDecoder(), defaultdict(list)
+    for one in on_air(periods, 0, sent=False):
+        for event in decoder.feed(one.data):
+            said = answer_of(event) if isinstance(event, Received) else None
+            if said is not None:
+                text = f"answer of {said.slot} to {said.seq}"
+                found[said.slot].append(TimedAnswer(one.end_tick, text, said))
+    return found
 
 
 def _side_by_side(
@@ -113,8 +109,7 @@ def _side_by_side(
     for answer in twin:
         ticks = heard[answer.text]
         at = bisect_left(ticks, answer.tick - EARLY_TICKS)
-        if at < len(ticks) and ticks[at] - answer.tick < TOGETHER_TICKS:
-            delays.append(ticks[at] - answer.tick)
+        delays += [tick - answer.tick for tick in ticks[at : at + 1] if tick - answer.tick < TOGETHER_TICKS]
     way = min(delays, default=0)
     shifted = [answer._replace(tick=answer.tick - way) for answer in port]
     both = pairs(shifted, twin, 0, TOGETHER_TICKS)

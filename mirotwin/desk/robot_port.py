@@ -127,20 +127,13 @@ class RobotPort:
         self.delays: list[int] = []
         self._asked: dict[int, int] = {}
         self.began_tick = self.free_tick = 0
-        self.in_period = self.stopped = self.told_to_stop = self.prompt = False
+        self.in_period = self.stopped = self.prompt = False
         self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
         self._heard_tick = self._end_tick = self._recorded = 0
         self._began_ns = time.monotonic_ns()
-        self._open()
-
-    def _open(self) -> None:
         self._serial: Any = _opened(self.url)
         self._virtual = getattr(self._serial, "virtual_tick", None) is not None
-        self._descriptor: int | None = None
-        if not self._virtual:
-            with suppress(OSError, ValueError, AttributeError):
-                self._descriptor = self._serial.fileno()
 
     def __enter__(self) -> RobotPort:
         self.prompt = not self._virtual and realtime_priority()
@@ -247,17 +240,15 @@ class RobotPort:
 
     def stop(self) -> None:
         """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
-        self.told_to_stop = False
         frames = self.guard.stop_frames()
         for _ in range(REOPENINGS):
             with suppress(serial.SerialException, OSError, PortError):
                 if not self._serial.is_open:
-                    self._open()
+                    self._serial = _opened(self.url)
                 self._serial.reset_output_buffer()
                 self._serial.write(frames)
                 if not self._virtual:
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
-                self.told_to_stop = True
                 return
             with suppress(serial.SerialException, OSError):
                 self._serial.close()
@@ -320,14 +311,14 @@ class RobotPort:
         with self._told():
             if self._virtual:
                 port.timeout = wait_s
-                first = port.read(1) if wait_s else b""
-                return bytes(first) + bytes(port.read(port.in_waiting))
-            if self._descriptor is not None:
-                select.select([self._descriptor], [], [], wait_s)
-                return bytes(port.read(READ_BYTES))
+                return bytes(port.read(max(1, port.in_waiting)))
             found = bytes(port.read(READ_BYTES))
             if not found and wait_s:
-                time.sleep(min(wait_s, LOOK_S))
+                try:
+                    select.select([port], [], [], wait_s)
+                except OSError:  # it has no descriptor
+                    time.sleep(min(wait_s, LOOK_S))
+                found = bytes(port.read(READ_BYTES))
             return found
 
     def _take(self, data: bytes) -> None:

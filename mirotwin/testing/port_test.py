@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -74,9 +75,8 @@ def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], fo
     steps = steps_of(text.scenario, path)
     notes = [f"{step}: {NOTED}: {why}" for step in steps if (why := unseen(step))]
     notes += [f"expectation {name}: {NOTED}" for name in text.scenario.expect]
-    seen = [step for step in steps if not unseen(step)]
-    switches = [step.number for step in steps if unseen(step) and not isinstance(step, _PASSED_OVER)]
-    playable = [step for step in seen if not switches or step.number < switches[0]]
+    before_switch = takewhile(lambda step: isinstance(step, _PASSED_OVER) or not unseen(step), steps)
+    playable = [step for step in before_switch if not unseen(step)]
     with ExitStack() as files, RobotPort(desk, text.scenario, path) as port:
         port.greet()
         if folder is not None:

@@ -45,13 +45,6 @@ _REASONS: dict[str, tuple[str, ...]] = {
 }
 NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids}
 """Why a rule cannot be seen at a port."""
-LEFT_OUT = {
-    "bad stop bits": ("P04", "P13", "P43", "P49"),
-    "pauses within a frame of less than 5 ms": ("P04", "P13", "P49"),
-    "the flags of power-on": ("P45",),
-    "a delay that all answers share": ("P41", "P44"),
-}
-"""What no PC can do of a trial -> rules whose other parts can be seen."""
 SHORTEST_US = 5000.0
 """A pause that a PC can make within a frame."""
 SURE_TICKS = 5 * TICKS_PER_MS

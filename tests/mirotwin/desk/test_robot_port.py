@@ -77,17 +77,15 @@ def test_a_port_that_is_closed_has_told_its_robots_to_stop(pty):
     with robots_at(pty.path) as port:
         port.inject(DRIVE)
         assert pty.read() == DRIVE
-    assert port.told_to_stop
     assert stops(DRIVE + pty.read())
 
 
 def broken_off(path, do, error, motion=True):
-    """A talk that ends by an error; the port, and the error's line."""
-    port = robots_at(path, motion)
-    with pytest.raises(error) as caught, port:
+    """A talk that ends by an error; the error's line."""
+    with pytest.raises(error) as caught, robots_at(path, motion) as port:
         do(port)
     assert "\n" not in str(caught.value)
-    return port, str(caught.value)
+    return str(caught.value)
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, SystemExit])
@@ -101,7 +99,7 @@ def test_whatever_ends_a_talk_the_robots_are_told_to_stop_first(pty, error):
 
 
 def test_what_is_not_allowed_is_not_sent(pty):
-    _, said = broken_off(pty.path, lambda port: port.inject(DRIVE), BadInput, False)
+    said = broken_off(pty.path, lambda port: port.inject(DRIVE), BadInput, False)
     assert "--allow-motion" in said
     sent = pty.read()
     assert stops(sent)
@@ -133,9 +131,8 @@ def test_a_port_that_vanishes_is_told_in_one_line(pty):
         pty.close()
         port.run_for(500 * MS)
 
-    port, said = broken_off(pty.path, do, PortError)
+    said = broken_off(pty.path, do, PortError)
     assert re.match(f"{pty.path}: [0-9.]+ s: the port is lost: ", said)
-    assert not port.told_to_stop
 
 
 def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
@@ -149,8 +146,7 @@ def test_a_port_that_comes_back_gets_the_stop_frames(pty, tmp_path):
         pty.close()
         port.run_for(500 * MS)
 
-    port, _ = broken_off(link, do, PortError)
-    assert port.told_to_stop
+    broken_off(link, do, PortError)
     assert stops(other.read())
     other.close()
 
@@ -160,9 +156,9 @@ def test_a_port_that_takes_nothing_more_is_told_and_its_buffer_is_emptied_for_th
         for _ in range(100):
             port.inject(DRIVE * 40)
 
-    port, said = broken_off(pty.path, do, PortError)
+    said = broken_off(pty.path, do, PortError)
     assert "it takes no characters for 1 s; look at its flow control" in said
-    assert (port.told_to_stop, stops(pty.read())) == (True, True)
+    assert stops(pty.read())
 
 
 def test_a_port_of_another_program_is_not_opened(pty):
@@ -237,8 +233,7 @@ def answer_ahead(data, steps):
 )
 def test_what_is_no_robot_is_told_by_what_it_does(pty, answer, said):
     answering(pty, answer)
-    port, told = broken_off(pty.path, RobotPort.greet, BadInput, False)
-    assert port.told_to_stop
+    told = broken_off(pty.path, RobotPort.greet, BadInput, False)
     assert re.search(said, told)
 
 
