@@ -1,23 +1,28 @@
 """Structs of numbers that lie in ranges: what the parameters of a plant and of a radio are."""
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import msgspec
 
-Ranges = dict[str, tuple[float, float]]
-"""Lowest and highest value of numbers, by their names."""
+
+class Within(NamedTuple):
+    """The lowest and the highest value of a number, in its annotation: `Annotated[float, Within(0.0, 1.0)]`."""
+
+    low: float
+    high: float
 
 
 class Ranged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Numbers that are in their range, see WITHIN, or None."""
+    """Numbers that are in their range, which `WITHIN` has by name, or None."""
 
-    WITHIN: ClassVar[Ranges] = {}
+    WITHIN: ClassVar[dict[str, Within]] = {}
+
+    def __init_subclass__(cls) -> None:
+        metadata = {name: getattr(kind, "__metadata__", ()) for name, kind in cls.__annotations__.items()}
+        cls.WITHIN = cls.WITHIN | {name: found[0] for name, found in metadata.items() if found}
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
+        for name, (low, high) in self.WITHIN.items():
             value = getattr(self, name)
-            if value is None or name not in self.WITHIN:
-                continue
-            low, high = self.WITHIN[name]
-            if not low <= value <= high:
+            if value is not None and not low <= value <= high:
                 raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")

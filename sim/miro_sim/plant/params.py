@@ -5,11 +5,9 @@ the 11 ms time constant follow from them); ST L298 data sheet, total saturation 
 cube of 7.5 cm and 0.5 kg.
 """
 
-from __future__ import annotations
+from typing import Annotated
 
-from typing import ClassVar
-
-from miro_sim.ranges import Ranged, Ranges
+from miro_sim.ranges import Ranged, Within
 
 GRAVITY_M_S2 = 9.81
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
@@ -20,19 +18,13 @@ MIN_MOTOR_S = 1e-4
 class Motor(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A DC motor with precious-metal commutation: Faulhaber 2224 006 SR."""
 
-    WITHIN: ClassVar[Ranges] = {
-        "resistance_ohm": (0.01, 1e3),
-        "inductance_h": (1e-9, 1.0),
-        "torque_constant_nm_a": (1e-5, 10.0),
-        "rotor_inertia_kg_m2": (1e-13, 1e-2),
-        "friction_nm": (0.0, 1.0),
-    }
-
-    resistance_ohm: float = 1.94
-    inductance_h: float = 45e-6
-    torque_constant_nm_a: float = 6.92e-3  # also V s / rad
-    rotor_inertia_kg_m2: float = 2.7e-7
-    friction_nm: float = 0.2e-3  # Coulomb, at the motor shaft: torque constant times 29 mA
+    resistance_ohm: Annotated[float, Within(0.01, 1e3)] = 1.94
+    inductance_h: Annotated[float, Within(1e-9, 1.0)] = 45e-6
+    torque_constant_nm_a: Annotated[float, Within(1e-5, 10.0)] = 6.92e-3  # also V s / rad
+    rotor_inertia_kg_m2: Annotated[float, Within(1e-13, 1e-2)] = 2.7e-7
+    friction_nm: Annotated[float, Within(0.0, 1.0)] = (
+        0.2e-3  # Coulomb, at the shaft: torque constant times 29 mA
+    )
 
 
 class Bridge(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -46,63 +38,43 @@ class Bridge(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     within 2.5 % of that of the two switches one by one, from 4/128 on.
     """
 
-    WITHIN: ClassVar[Ranges] = {
-        "drop_v": (0.0, 10.0),
-        "drop_ohm": (0.0, 1e3),
-        "diode_v": (0.0, 10.0),
-        "on_delay_s": (0.0, 20e-6),
-        "off_delay_s": (0.0, 20e-6),
-    }
-
-    drop_v: float = 1.4
-    drop_ohm: float = 1.15  # 2.55 V at 1 A, 3.7 V at 2 A
-    diode_v: float = 1.0  # each of the two that conduct
-    on_delay_s: float = 0.3e-6
-    off_delay_s: float = 2.6e-6
+    drop_v: Annotated[float, Within(0.0, 10.0)] = 1.4
+    drop_ohm: Annotated[float, Within(0.0, 1e3)] = 1.15  # 2.55 V at 1 A, 3.7 V at 2 A
+    diode_v: Annotated[float, Within(0.0, 10.0)] = 1.0  # each of the two that conduct
+    on_delay_s: Annotated[float, Within(0.0, 20e-6)] = 0.3e-6
+    off_delay_s: Annotated[float, Within(0.0, 20e-6)] = 2.6e-6
 
 
 class Battery(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Six NiCd cells. Each motor sees the internal resistance by itself (no mutual sag)."""
 
-    WITHIN: ClassVar[Ranges] = {
-        "voltage_v": (1e-3, 100.0),
-        "resistance_ohm": (1e-9, 1e3),
-    }
-
-    voltage_v: float = 7.2
-    resistance_ohm: float = 0.15
+    voltage_v: Annotated[float, Within(1e-3, 100.0)] = 7.2
+    resistance_ohm: Annotated[float, Within(1e-9, 1e3)] = 0.15
 
 
 class Chassis(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Two driven wheels on one axle through the centre of mass, two low-friction skids."""
 
-    WITHIN: ClassVar[Ranges] = {
-        "mass_kg": (1e-3, 1e3),
-        "yaw_inertia_kg_m2": (1e-6, 1e3),
-        "track_m": (1e-3, 10.0),
-        "wheel_radius_m": (1e-3, 1.0),
-        "left_radius_factor": (0.1, 10.0),
-        "right_radius_factor": (0.1, 10.0),
-        "gear_ratio": (0.1, 1e3),
-        "gear_efficiency": (0.01, 1.0),
-        "rolling_resistance": (0.0, 10.0),
-        "stiction_ratio": (1.0, 10.0),
-        "gear_backlash_rad": (0.0, 0.2),
-        "gear_load_friction": (0.0, 0.5),
-    }
-
-    mass_kg: float = 0.5
-    yaw_inertia_kg_m2: float = 4.7e-4  # 0.5 kg * (0.075**2 + 0.075**2) / 12
-    track_m: float = 0.068
-    wheel_radius_m: float = 0.020
-    left_radius_factor: float = 1.0  # real radius of this wheel / wheel_radius_m
-    right_radius_factor: float = 1.0
-    gear_ratio: float = 8.0
-    gear_efficiency: float = 0.8  # acts on the rolling resistance only
-    rolling_resistance: float = 0.03  # force / weight
-    stiction_ratio: float = 1.0  # friction of a shaft that stands / of one that turns
-    gear_backlash_rad: float = 0.0  # how far a wheel turns while its motor shaft is held
-    gear_load_friction: float = 0.0  # friction / torque through the gear, both torques at the motor shaft
+    mass_kg: Annotated[float, Within(1e-3, 1e3)] = 0.5
+    yaw_inertia_kg_m2: Annotated[float, Within(1e-6, 1e3)] = 4.7e-4  # 0.5 kg * (0.075**2 + 0.075**2) / 12
+    track_m: Annotated[float, Within(1e-3, 10.0)] = 0.068
+    wheel_radius_m: Annotated[float, Within(1e-3, 1.0)] = 0.020
+    left_radius_factor: Annotated[float, Within(0.1, 10.0)] = (
+        1.0  # real radius of this wheel / wheel_radius_m
+    )
+    right_radius_factor: Annotated[float, Within(0.1, 10.0)] = 1.0
+    gear_ratio: Annotated[float, Within(0.1, 1e3)] = 8.0
+    gear_efficiency: Annotated[float, Within(0.01, 1.0)] = 0.8  # acts on the rolling resistance only
+    rolling_resistance: Annotated[float, Within(0.0, 10.0)] = 0.03  # force / weight
+    stiction_ratio: Annotated[float, Within(1.0, 10.0)] = (
+        1.0  # friction of a shaft that stands / of one that turns
+    )
+    gear_backlash_rad: Annotated[float, Within(0.0, 0.2)] = (
+        0.0  # how far a wheel turns while its motor shaft is held
+    )
+    gear_load_friction: Annotated[float, Within(0.0, 0.5)] = (
+        0.0  # friction / torque in the gear, at the motor shaft
+    )
 
 
 class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -111,22 +83,16 @@ class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     With `index_pulse` it has a third channel, low for the one count in a turn that begins it (A = B = 0 there).
     """
 
-    WITHIN: ClassVar[Ranges] = {
-        "lines": (16, 100_000),
-    }
-
-    lines: int = 512
+    lines: Annotated[int, Within(16, 100_000)] = 512
     index_pulse: bool = False
 
 
 class Tyre(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
 
-    WITHIN: ClassVar[Ranges] = {
-        "grip": (0.01, 10.0),
-    }
-
-    grip: float | None = None  # coefficient of friction; rubber on a painted board about 0.8
+    grip: Annotated[float | None, Within(0.01, 10.0)] = (
+        None  # of friction; rubber on a painted board about 0.8
+    )
 
 
 class RollingBall(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -135,15 +101,11 @@ class RollingBall(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
     It carries `load_share` of the weight, which the wheels then do not press with. 0.03 m and a fifth: chosen.
     """
 
-    WITHIN: ClassVar[Ranges] = {
-        "friction": (0.0, 10.0),
-        "load_share": (0.0, 0.9),
-        "behind_m": (-0.1, 0.1),
-    }
-
-    friction: float = 0.0  # force / load of the ball, whichever way it goes
-    load_share: float = 0.2
-    behind_m: float = 0.03  # behind the axle, on the middle line; negative: in front
+    friction: Annotated[float, Within(0.0, 10.0)] = 0.0  # force / load of the ball, whichever way it goes
+    load_share: Annotated[float, Within(0.0, 0.9)] = 0.2
+    behind_m: Annotated[float, Within(-0.1, 0.1)] = (
+        0.03  # behind the axle, on the middle line; negative: in front
+    )
 
 
 class Disturbance(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -152,23 +114,13 @@ class Disturbance(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
     Added up: a constant, a sine from tick 0 on, and noise, which is drawn again every period within +- the bound.
     """
 
-    WITHIN: ClassVar[Ranges] = {
-        "force_n": (-5.0, 5.0),
-        "torque_nm": (-0.1, 0.1),
-        "sine_force_n": (0.0, 5.0),
-        "sine_torque_nm": (0.0, 0.1),
-        "noise_force_n": (0.0, 5.0),
-        "noise_torque_nm": (0.0, 0.1),
-        "period_s": (0.001, 3600.0),
-    }
-
-    force_n: float = 0.0
-    torque_nm: float = 0.0
-    sine_force_n: float = 0.0
-    sine_torque_nm: float = 0.0
-    noise_force_n: float = 0.0
-    noise_torque_nm: float = 0.0
-    period_s: float = 1.0  # of the sine, and how long a draw holds
+    force_n: Annotated[float, Within(-5.0, 5.0)] = 0.0
+    torque_nm: Annotated[float, Within(-0.1, 0.1)] = 0.0
+    sine_force_n: Annotated[float, Within(0.0, 5.0)] = 0.0
+    sine_torque_nm: Annotated[float, Within(0.0, 0.1)] = 0.0
+    noise_force_n: Annotated[float, Within(0.0, 5.0)] = 0.0
+    noise_torque_nm: Annotated[float, Within(0.0, 0.1)] = 0.0
+    period_s: Annotated[float, Within(0.001, 3600.0)] = 1.0  # of the sine, and how long a draw holds
 
     def is_on(self) -> bool:
         """Whether there is any force or torque."""

@@ -3,22 +3,14 @@
 Chances are thresholds of a 32-bit draw: a probability times 2^32.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from miro_exact import clock
-from miro_sim.radio.probability import (
-    error_threshold,
-    fsk_threshold,
-    mean_threshold,
-    rate_threshold,
-    threshold,
-)
-from miro_sim.ranges import Ranged, Ranges
+from miro_sim.radio.probability import fsk_threshold, threshold
+from miro_sim.ranges import Ranged, Within
 
 LinkState = Literal["up", "down", "noise"]
 UP, DOWN, NOISE = 0, 1, 2
@@ -30,46 +22,26 @@ down    the transmitters are off: receivers hear no carrier, which is mark if sq
 noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
 """
 
-
-BIT_S = 1 / 9600
+BIT_S = Fraction(clock.HOST_BIT_TICKS, clock.TICKS_PER_SECOND)
 BIT_ERROR_RATE = 1e-4
 """What holds when a scenario names neither a bit-error rate nor Eb/N0."""
 SLICER_ONE = 65_536
 """Half the distance of mark and space at the discriminator, in the units of the slicer's threshold."""
 
 ProfileName = Annotated[str, msgspec.Meta(max_length=40)]
+Delay = Annotated[float, Within(0.0, 0.030)]
+Chance = Annotated[float, Within(0.0, 1.0)]
+ErrorRate = Annotated[float, Within(0.0, 0.5)]
+Mean = Annotated[float, Within(0.000105, 1e6)]
+Offset = Annotated[int, Within(-50_000, 50_000)]
 
 
-class _OfRadio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Parameters of a radio; a name means the same in each of its tables."""
-
-    WITHIN: ClassVar[Ranges] = {
-        "latency_s": (0.0, 0.030),
-        "jitter_s": (0.0, 0.030),
-        "keyup_s": (0.0, 0.030),
-        "bit_error_rate": (0.0, 0.5),
-        "eb_n0_db": (-20.0, 60.0),
-        "channel": (0, 999),
-        "baud_offset_ppm": (-50_000, 50_000),
-        "crystal_offset_ppm": (-50_000, 50_000),
-        "false_starts_hz": (0.0, 9600.0),
-        "lost_character_rate": (0.0, 1.0),
-        "lost_frames": (0.0, 1.0),
-        "good_to_bad": (0.0, 1.0),
-        "bad_to_good": (0.0, 1.0),
-        "every_s": (0.000105, 1e6),
-        "length_s": (0.000105, 1e6),
-        "settle_s": (0.000105, 1.0),
-        "offset": (-1.0, 1.0),
-    }
-
-
-class Bursts(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Bursts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Gilbert-Elliott: chances a bit time of going bad and good again, and the error rate while it is bad."""
 
-    good_to_bad: float
-    bad_to_good: float
-    bit_error_rate: float = 0.5
+    good_to_bad: Chance
+    bad_to_good: Chance
+    bit_error_rate: ErrorRate = 0.5
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -90,36 +62,36 @@ class Bursts(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return threshold(self.bad_to_good)
 
 
-class Dropouts(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Dropouts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Times without a carrier: mean time from the end of one to the next, and mean length."""
 
-    every_s: float
-    length_s: float
+    every_s: Mean
+    length_s: Mean
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if BIT_S / self.every_s + BIT_S / self.length_s >= 1.0:
             raise ValueError(
                 f"every_s: {self.every_s} and length_s {self.length_s} are too short together;"
-                f" one of them must last more than a bit ({BIT_S:.6f} s)"
+                f" one of them must last more than a bit ({float(BIT_S):.6f} s)"
             )
 
     @property
     def enter(self) -> int:
         """Chance of losing the carrier in a bit time."""
-        return mean_threshold(self.every_s)
+        return threshold(BIT_S / clock.exact(self.every_s))
 
     @property
     def leave(self) -> int:
         """Chance of its coming back in a bit time."""
-        return mean_threshold(self.length_s)
+        return threshold(BIT_S / clock.exact(self.length_s))
 
 
-class SlicerParams(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SlicerParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An AC-coupled slicer: its time constant, and the offset of the carriers in units of the deviation."""
 
-    settle_s: float = 0.004
-    offset: float = 0.0
+    settle_s: Annotated[float, Within(0.000105, 1.0)] = 0.004
+    offset: Annotated[float, Within(-1.0, 1.0)] = 0.0
 
     @property
     def gain(self) -> int:
@@ -132,7 +104,7 @@ class SlicerParams(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return (2 * Fraction(repr(float(self.offset))) * SLICER_ONE + 1) // 2
 
 
-class Radio(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
 
     `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
@@ -143,20 +115,20 @@ class Radio(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """
 
     profile: ProfileName | tuple[ProfileName, ...] = ()
-    latency_s: float = 0.0
-    jitter_s: float = 0.0
-    bit_error_rate: float | None = None
-    eb_n0_db: float | None = None
+    latency_s: Delay = 0.0
+    jitter_s: Delay = 0.0
+    bit_error_rate: Annotated[float | None, Within(0.0, 0.5)] = None
+    eb_n0_db: Annotated[float | None, Within(-20.0, 60.0)] = None
     carrier: Literal["keyed", "on"] = "keyed"
-    keyup_s: float = 0.001
+    keyup_s: Delay = 0.001
     squelch: bool = False
     telemetry: bool = True
-    channel: int | None = None
-    baud_offset_ppm: int = 0
-    crystal_offset_ppm: int = 0
-    false_starts_hz: float = 0.0
-    lost_character_rate: float = 0.0
-    lost_frames: float = 0.0
+    channel: Annotated[int | None, Within(0, 999)] = None
+    baud_offset_ppm: Offset = 0
+    crystal_offset_ppm: Offset = 0
+    false_starts_hz: Annotated[float, Within(0.0, 9600.0)] = 0.0
+    lost_character_rate: Chance = 0.0
+    lost_frames: Chance = 0.0
     bursts: Bursts | None = None
     dropouts: Dropouts | None = None
     slicer: SlicerParams | None = None
@@ -174,7 +146,7 @@ class Radio(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
             raise ValueError("eb_n0_db: sets the same as bit_error_rate; give one of the two")
 
     @classmethod
-    def ideal(cls) -> Radio:
+    def ideal(cls) -> "Radio":
         """A wire: no latency, no errors, mark level while idle."""
         return cls(bit_error_rate=0.0, keyup_s=0.0, squelch=True)
 
@@ -203,17 +175,17 @@ class Radio(_OfRadio, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Chance of a wrong bit."""
         if self.eb_n0_db is not None:
             return fsk_threshold(self.eb_n0_db)
-        return error_threshold(self.bit_error_rate or 0.0)
+        return threshold(self.bit_error_rate or 0.0)
 
     @property
     def burst_threshold(self) -> int:
         """Chance of a wrong bit in a burst."""
-        return error_threshold(self.bursts.bit_error_rate) if self.bursts else 0
+        return threshold(self.bursts.bit_error_rate) if self.bursts else 0
 
     @property
     def false_start_threshold(self) -> int:
         """Chance that a bit time of idle carrier is a space."""
-        return rate_threshold(self.false_starts_hz)
+        return threshold(clock.exact(self.false_starts_hz) * BIT_S)
 
     @property
     def lost_threshold(self) -> int:

@@ -9,40 +9,20 @@ from miro_exact import clock
 ONE = 1 << 32
 """The threshold that every draw is below."""
 
-BIT_S = Fraction(clock.HOST_BIT_TICKS, clock.TICKS_PER_SECOND)
 LN10_TENTH = 0.23025850929940458
 MARGIN_STEPS = 128
 """Entries of `margin_table` in a margin of 1."""
 
 
-def threshold(probability: float | Fraction, name: str = "probability") -> int:
+def threshold(probability: float | Fraction) -> int:
     """A probability as the number of the 2^32 values of a draw that mean "yes", rounded half up.
 
-    The float stands for the decimal number that it prints as, as in `clock.ticks`. Raises ValueError
-    outside 0 .. 1, naming it `name`.
+    The float stands for the decimal number that it prints as, as in `clock.ticks`. Raises ValueError outside 0 .. 1.
     """
     exact = clock.exact(probability)
     if not 0 <= exact <= 1:
-        raise ValueError(f"{name} {probability} is outside 0 .. 1")
+        raise ValueError(f"the probability {probability} is outside 0 .. 1")
     return (2 * exact * ONE + 1) // 2
-
-
-def error_threshold(bit_error_rate: float | Fraction) -> int:
-    """`threshold` of a bit-error rate."""
-    return threshold(bit_error_rate, "bit_error_rate")
-
-
-def rate_threshold(per_s: float) -> int:
-    """`threshold` of an event in one bit time (1/9600 s) that comes `per_s` times a second."""
-    return threshold(Fraction(repr(float(per_s))) * BIT_S, f"{per_s}/s in a bit time: the probability")
-
-
-def mean_threshold(mean_s: float) -> int:
-    """`threshold` of an end in one bit time of something that lasts `mean_s` seconds on average."""
-    exact = Fraction(repr(float(mean_s)))
-    if exact < BIT_S:
-        raise ValueError(f"a mean of {mean_s} s is shorter than a bit (1/9600 s)")
-    return threshold(BIT_S / exact)
 
 
 def _exp(x: float) -> float:

@@ -8,14 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_sim.radio.params import Dropouts, Radio
-from miro_sim.radio.probability import (
-    ONE,
-    error_threshold,
-    fsk_threshold,
-    margin_table,
-    mean_threshold,
-    rate_threshold,
-)
+from miro_sim.radio.probability import ONE, fsk_threshold, margin_table, threshold
 
 
 def test_units_become_ticks_and_a_threshold():
@@ -26,15 +19,15 @@ def test_units_become_ticks_and_a_threshold():
 RATES = [(0, 0), (1, 2**32), (0.5, 2**31), (Fraction(1, 2**33), 1), (1e-10, 0)]
 
 
-@pytest.mark.parametrize(("rate", "threshold"), RATES)
-def test_a_rate_becomes_the_nearest_threshold(rate, threshold):
-    assert error_threshold(rate) == threshold
+@pytest.mark.parametrize(("rate", "nearest"), RATES)
+def test_a_rate_becomes_the_nearest_threshold(rate, nearest):
+    assert threshold(rate) == nearest
 
 
 @pytest.mark.parametrize("rate", [-1e-9, 1.0001, float("nan")])
 def test_a_rate_that_is_no_probability_is_refused(rate):
-    with pytest.raises(ValueError, match=r"bit_error_rate|Fraction"):
-        error_threshold(rate)
+    with pytest.raises(ValueError, match=r"outside 0 .. 1|Fraction"):
+        threshold(rate)
 
 
 def test_an_ideal_band_is_a_wire():
@@ -74,20 +67,6 @@ def test_a_margin_of_one_is_no_penalty():
 
 
 def test_times_become_chances_a_bit():
-    assert rate_threshold(9600.0) == ONE
-    assert rate_threshold(0.0) == 0
-    assert mean_threshold(1.0) == round(ONE / 9600)
+    assert [Radio(false_starts_hz=hz).false_start_threshold for hz in (0.0, 9600.0)] == [0, ONE]
     dropouts = Dropouts(every_s=2.0, length_s=0.02)
     assert (dropouts.enter, dropouts.leave) == (round(ONE / 19_200), round(ONE / 192))
-
-
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: rate_threshold(9601.0), "9601.0/s in a bit time"),
-        (lambda: mean_threshold(0.0001), "shorter than a bit"),
-    ],
-)
-def test_what_cannot_be_is_refused(make, text):
-    with pytest.raises(ValueError, match=text):
-        make()
