@@ -41,7 +41,7 @@ class SilenceRule:
     last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of the last character.
     """
 
-    NOT_STATE = ("after_ticks", "tolerance_ticks", "last_tick", "received_tick")
+    NOT_STATE = ("*",)
 
     def __init__(self, after_ticks: int, tolerance_ticks: int = TOLERANCE_TICKS) -> None:
         self.after_ticks = after_ticks
@@ -95,7 +95,7 @@ class DrivingRule:
     `fresh_tick`: of the last fresh frame, -1 before the first; `deadline`: of the first team frame that waits.
     """
 
-    NOT_STATE = ("within_ticks", "fresh_tick", "deadline", "waiting")
+    NOT_STATE = ("*",)
 
     def __init__(self, within_ticks: int = ACTING_TICKS) -> None:
         self.within_ticks = within_ticks
@@ -142,7 +142,7 @@ class DrivingRule:
 class OriginRule:
     """Velocities are those of one team frame of the last `within_ticks`; 0 for both is always allowed to stop."""
 
-    NOT_STATE = ("within_ticks", "frames")
+    NOT_STATE = ("*",)
 
     def __init__(self, within_ticks: int) -> None:
         self.within_ticks = within_ticks
@@ -174,7 +174,7 @@ class AnswerRule:
     that may still be sent.
     """
 
-    NOT_STATE = ("within_ticks", "asked_tick", "asked_seq", "last_seq", "before_seq", "allowed")
+    NOT_STATE = ("*",)
 
     def __init__(self, within_ticks: int = ANSWER_TICKS) -> None:
         self.within_ticks = within_ticks

@@ -19,10 +19,7 @@ _STEPS = 6
 class Lens:
     """A camera as geometry. Constant: nothing of it is state."""
 
-    NOT_STATE = (
-        *("parameters", "x_m", "y_m", "height_m", "focal_u", "focal_v", "centre_u", "centre_v", "k1"),
-        *("xa", "xb", "xc", "ya", "yb", "yc", "za", "zb", "zc", "out_x", "out_y"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, parameters: CameraParameters) -> None:
         self.parameters = parameters

@@ -29,12 +29,7 @@ class Patches:
     of its two patches; `out_team_area`, `out_identity_area`: their areas in px.
     """
 
-    NOT_STATE = (
-        *("lens", "regions", "z_m", "least_m", "most_m", "least_area", "most_area"),
-        *("count", "index", "x_m", "y_m", "left", "top", "expected", "expect_x", "expect_y"),
-        *("out_pairs", "out_team", "out_identity", "out_off_m", "out_next_m", "out_contested", "out_gap_m"),
-        *("out_team_area", "out_identity_area"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(
         self,

@@ -40,21 +40,7 @@ class Region(NamedTuple):
 class Regions:
     """The regions of the window that was looked at last: `count` of them, by `region(index)`."""
 
-    NOT_STATE = (
-        *(
-            "table",
-            "width",
-            "height",
-            "runs",
-            "count",
-            "run_kind",
-            "run_row",
-            "run_start",
-            "run_end",
-            "parent",
-        ),
-        *("label", "kind", "area", "left", "top", "right", "bottom", "sum_u", "sum_v", "touches"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, table: bytes) -> None:
         """`table`: class of a pixel by Y >> 4, Cb >> 2, Cr >> 2 (4, 6, 6 bits); 0 is none. ValueError: wrong size."""

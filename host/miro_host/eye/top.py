@@ -21,7 +21,7 @@ class Top:
     at which pixels are evaluated. `area_px`, `side_px`: of a patch under the camera.
     """
 
-    NOT_STATE = ("pattern", "lens", "angle_rad", "distance_m", "z_m", "area_px", "side_px")
+    NOT_STATE = ("*",)
 
     def __init__(self, pattern: PatternName, calibration: Calibration) -> None:
         self.pattern = pattern

@@ -45,7 +45,7 @@ CONTESTED_M = 0.025
 class Pair:
     """A robot as found: its sighting, distance from what was expected, the centroids of both patches in the picture."""
 
-    NOT_STATE = ("sighting", "off_m", "u", "v", "identity_u", "identity_v")
+    NOT_STATE = ("*",)
 
     def __init__(
         self, sighting: Sighting, off_m: float, u: float, v: float, identity_u: float, identity_v: float
@@ -77,7 +77,7 @@ class Notes:
     `tick`: of its exposure, -1 before the first. `pairs`: by slot, None: lost.
     """
 
-    NOT_STATE = ("tick", "windows", "pairs")
+    NOT_STATE = ("*",)
 
     def __init__(self) -> None:
         self.begin(-1)

@@ -37,17 +37,7 @@ class Weighing:
     team's patch [0] and the identity's [1]: the centroid is out_u / (2 out_weight).
     """
 
-    NOT_STATE = (
-        "gain_cb",
-        "gain_cr",
-        "least",
-        "out_weight",
-        "out_u",
-        "out_v",
-        "rival_u",
-        "rival_v",
-        "rivals",
-    )
+    NOT_STATE = ("*",)
 
     def __init__(
         self, team: tuple[int, int], identity: tuple[int, int], floor: tuple[int, int] | None = None

@@ -139,10 +139,7 @@ class YangKimControl:
     inputs u1 [m/s2], u2 [rad/s2] of equation (16).
     """
 
-    NOT_STATE = (
-        "gamma1", "gamma2", "q1", "q2", "p1", "p2", "smooth", "layer_derivative", "cosine_guard", "rho_floor",
-        "layer_s1", "layer_s2", "layer_theta", "rho_e_m", "phi_e_rad", "theta_e_rad", "s1", "s2", "u1", "u2",
-    )  # fmt: skip
+    NOT_STATE = ("*",)
 
     def __init__(self, gains: Gains) -> None:
         self.gamma1, self.gamma2 = gains.gamma1_per_s, gains.gamma2_per_s

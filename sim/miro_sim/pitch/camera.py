@@ -61,18 +61,7 @@ class Camera:
     may be read, in any order. Nothing of it is state: a frame is a function of where things stand and its number.
     """
 
-    NOT_STATE = (
-        *("parameters", "settings", "pattern", "rays", "scene", "sensor", "width", "height", "sets"),
-        *("field_sets", "fields", "instants", "after_s", "side", "black"),
-        *("robots", "team_paint", "identity_paint"),
-        *("x", "y", "cos", "sin", "shift_u", "shift_v", "edges", "drift_um", "span_first", "span_end"),
-        *("corner_u", "corner_v", "line_least_u", "line_most_u", "line_least_v", "line_most_v"),
-        *("least_u", "most_u", "least_v", "most_v"),
-        *("stood", "changes", "changed", "scene_changed", "place", "covers"),
-        *("covered", "covered_first", "covered_end", "total", "first", "samples", "upper", "lower"),
-        *("lanes", "times", "above", "below", "fall_u", "fall_v", "low_u", "high_u", "low_v", "high_v"),
-        *("u", "v", "seen", "height_um"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(
         self, parameters: CameraParameters, settings: PictureSettings, pattern: Pattern, stream: Stream

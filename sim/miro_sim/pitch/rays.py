@@ -34,10 +34,7 @@ class Rays:
     rounding included. `stride_um`: nor are the middles of two neighbours from each other, at the top.
     """
 
-    NOT_STATE = (
-        *("slope_x", "slope_y", "top_x", "top_y", "middle_x", "middle_y", "fall_x", "fall_y"),
-        *("x_um", "y_um", "height_um", "spread_um", "stride_um"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, parameters: CameraParameters) -> None:
         """Raises ValueError for a camera that looks near to the horizon, or at what its lens cannot draw."""

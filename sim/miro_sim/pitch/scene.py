@@ -56,11 +56,7 @@ class Scene:
     `y`, `cb`, `cr`: what the sensor makes of it in the light of scale `lit`, in each line between two columns.
     """
 
-    NOT_STATE = (
-        *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
-        *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
-        *("falloff", "light", "lit", "lit_first", "lit_end", "y", "cb", "cr"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, rays: Rays, picture: PictureSettings, ball: tuple[int, int] | None) -> None:
         self.rays = rays

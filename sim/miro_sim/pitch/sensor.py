@@ -87,10 +87,7 @@ def _levels(bits: int) -> bytes:
 class Sensor:
     """Sensor, cable and grabber of one camera. `stream` is the source of its noise. Holds one line; no state."""
 
-    NOT_STATE = (
-        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "levels"),
-        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr", "words"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
         self.settings = settings

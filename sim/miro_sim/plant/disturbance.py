@@ -16,10 +16,7 @@ TICKS_PER_S = 24e6
 class DisturbingForce:
     """`at` puts force (N, forward) and torque (Nm, counter-clockwise) of a tick into `force_n` and `torque_nm`."""
 
-    NOT_STATE = (
-        *("force_n", "torque_nm", "stream", "period_ticks"),
-        *("constant_n", "constant_nm", "sine_n", "sine_nm", "noise_n", "noise_nm", "is_on", "varies"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self, params: Disturbance, stream: Stream) -> None:
         self.stream = stream

@@ -40,7 +40,7 @@ _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 class Decay:
     """What share of a current is left after each number of ticks, through diodes and then through transistors."""
 
-    NOT_STATE = ("share",)
+    NOT_STATE = ("*",)
 
     def __init__(self, taus: tuple[float, float]) -> None:
         self.share = [dmath.exp(-ticks / tau) for tau in taus for ticks in range(LONGEST_STEP + 1)]

@@ -24,7 +24,7 @@ _ONE = 1 << 32
 class Chain:
     """The chain of one stream. It has no state: slot and answer of the last call are a cache."""
 
-    NOT_STATE = ("stream", "enter", "stay", "slot", "answer")
+    NOT_STATE = ("*",)
 
     def __init__(self, params: Bursts | Dropouts, seed: int, name: str) -> None:
         self.stream = Stream(seed, name)

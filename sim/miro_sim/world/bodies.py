@@ -22,7 +22,7 @@ Pair = tuple[Robot, Robot]
 class Bodies:
     """All robots of a world. `touching`: the pairs that touched at the last look."""
 
-    NOT_STATE = ("robots", "pairs", "next_ticks", "next_tick", "looks", "touching")
+    NOT_STATE = ("*",)
 
     def __init__(self, robots: Sequence[Robot]) -> None:
         self.robots = list(robots)

@@ -91,7 +91,7 @@ class HostLog:
     known whose start bit began at a tick. `robots`: of the network.
     """
 
-    NOT_STATE = ("network", "robots", "known_tick", "end", "kept", "rare")
+    NOT_STATE = ("*",)
 
     def __init__(self, network: int, known_tick: Callable[[int], int], robots: int) -> None:
         self.network = network
@@ -188,7 +188,7 @@ def of_action(action: Action) -> Event:
 class RobotLog:
     """The events of a robot's board, read as those of a PC are."""
 
-    NOT_STATE = ("log", "network", "slot")
+    NOT_STATE = ("*",)
 
     def __init__(self, log: EventLog, network: int, slot: int) -> None:
         self.log = log
@@ -226,7 +226,7 @@ _KINDS = {
 class Cursor:
     """Who reads a log on, from now: `next` is the serial number of the first event that was not read."""
 
-    NOT_STATE = ("log", "next")
+    NOT_STATE = ("*",)
 
     def __init__(self, log: HostLog | RobotLog) -> None:
         self.log = log

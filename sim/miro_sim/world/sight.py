@@ -180,7 +180,7 @@ class StaticField:
     It depends on the posture and nothing else.
     """
 
-    NOT_STATE = ("lens", "top")
+    NOT_STATE = ("*",)
 
     def __init__(self, true: CameraParameters, calibration: Calibration, pattern: PatternName) -> None:
         self.lens = Lens(true)
