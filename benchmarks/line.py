@@ -5,6 +5,7 @@ Arrays are uint8 and hold one line a column, so that a step of all UARTs is a fe
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -107,10 +108,15 @@ def decode_lines(
     ticks = symbols.line * spacing + symbols.place * HOST_BIT_TICKS
     bad_stop = symbols.bad_stop if strict else np.zeros_like(symbols.bad_stop)
     scanner = Scanner(form) if strict else Scanner(form, tolerance_ticks=50 * HOST_BIT_TICKS)
-    events = scanner.feed_columns(symbols.data, bad_stop, ticks)
+    events = scanner.feed_symbols(rows(symbols.data, bad_stop, ticks))
     return compare(
         ((event.start_tick // spacing, event) for event in events if type(event) is Received), body
     )
+
+
+def rows(data: np.ndarray, bad_stop: np.ndarray, ticks: np.ndarray) -> Iterable[tuple[int, bool, int]]:
+    """Columns of characters one by one, as a decoder takes them."""
+    return zip(data.tolist(), (bad_stop == 0).tolist(), ticks.tolist(), strict=True)
 
 
 def compare(received: object, body: np.ndarray) -> Verdict:

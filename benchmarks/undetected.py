@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.interval import clopper_pearson
-from benchmarks.line import Verdict, compare, decode_lines, flip, line_bits, random_frames, receive
+from benchmarks.line import Verdict, compare, decode_lines, flip, line_bits, random_frames, receive, rows
 from benchmarks.weights import undetected_probability
 from miro_protocol.decoder import Received
 from miro_protocol.scan import Scanner
@@ -81,7 +81,7 @@ def noise(form: Format, seconds: int, rng: np.random.Generator) -> tuple[int, in
     symbols = receive(rng.integers(0, 2, (length, lines), np.uint8))
     ticks = (symbols.line * (length + 100) + symbols.place) * HOST_BIT_TICKS
     scanner = Scanner(form)
-    scanner.feed_columns(symbols.data, symbols.bad_stop, ticks)
+    scanner.feed_symbols(rows(symbols.data, symbols.bad_stop, ticks))
     return len(symbols.data), scanner.valid
 
 

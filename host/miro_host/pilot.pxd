@@ -14,8 +14,7 @@ cdef class Pilot:
     @cython.locals(at_s=double)
     cpdef update(self, measured, double t_s, telemetry=*)
     cpdef reference_at(self, double t_s)
-    cdef _estimate(self, given)
-    cdef _ask(self, given)
+    cdef _answered(self, str word, plugin, given)
 
 
 cpdef check_answer(answer, tuple inner)

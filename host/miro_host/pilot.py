@@ -115,16 +115,16 @@ class Pilot:
         z, units = self.integrator, self.units_per_m_s
         v_m_s, w_rad_s = z.v_m_s, z.w_rad_s
         left_m_s, right_m_s = self.command.left / units, self.command.right / units
-        estimate = self._estimate(
-            EstimatorInput(
-                t_s, z.period_s, measured, v_m_s, w_rad_s, left_m_s, right_m_s, telemetry, self.dead_s
-            )
+        given = EstimatorInput(
+            t_s, z.period_s, measured, v_m_s, w_rad_s, left_m_s, right_m_s, telemetry, self.dead_s
         )
+        estimate: Estimate | None = self._answered("estimator", self.estimator, given)
         if estimate is None:
             return self.command
         at_s = estimate.t_s + self.reference_lead_s
         path, reference, posture = self.reference, self.reference_at(at_s), estimate.posture
-        answer = self._ask(LawInput(at_s, z.period_s, reference, path, posture, v_m_s, w_rad_s, telemetry))
+        asked = LawInput(at_s, z.period_s, reference, path, posture, v_m_s, w_rad_s, telemetry)
+        answer: Answer = self._answered("law", self.law, asked)
         inner = _in_order(answer.inner, self.law.INNER)
         if isinstance(answer, Accelerations):
             z.step(answer.v_dot_m_s2, answer.w_dot_rad_s2)  # equation (15)
@@ -145,29 +145,19 @@ class Pilot:
             self._asked_s = t_s
         return self._asked
 
-    def _estimate(self, given: EstimatorInput) -> Estimate | None:
-        """The estimator's answer, checked like a law's."""
+    def _answered(self, word: str, plugin: Law[Any] | Estimator[Any], given: Any) -> Any:
+        """What a plug-in answers, checked: what it says and what it remembers are finite and as it declares."""
         try:
-            estimate = self.estimator.step(given)
-            if estimate is not None:
-                check_estimate(estimate, self.estimator.INNER)
-            self.estimator.check_memory()
+            answer = plugin.step(given)
+            if plugin is self.law:
+                check_answer(answer, plugin.INNER)
+            elif answer is not None:
+                check_estimate(answer, plugin.INNER)
+            plugin.check_memory()
         except PluginError:  # of the reference, which the plug-in may have asked
             raise
         except (Exception, SystemExit) as error:
-            raise _failure("estimator", self.estimator, error) from error
-        return estimate
-
-    def _ask(self, given: LawInput) -> Answer:
-        """The law's answer, checked: what it says and what it remembers are finite and as it declares."""
-        try:
-            answer = self.law.step(given)
-            check_answer(answer, self.law.INNER)
-            self.law.check_memory()
-        except PluginError:  # of the reference, which the plug-in may have asked
-            raise
-        except (Exception, SystemExit) as error:
-            raise _failure("law", self.law, error) from error
+            raise _failure(word, plugin, error) from error
         return answer
 
     def after_load(self) -> None:

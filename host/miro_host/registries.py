@@ -4,22 +4,35 @@
 in its table. They are plain classes, because msgspec reads a struct as itself and never as one derived from it.
 """
 
+from typing import Any
+
 from miro_host.plugins import Registry
 
 
-class Controller:
+class Parameters:
+    """Parameters of any plug-in."""
+
+    __slots__ = ()
+
+    @classmethod
+    def name(cls: Any) -> str:
+        """The plug-in's name in scenario files."""
+        return str(cls.__struct_config__.tag)
+
+
+class Controller(Parameters):
     """Parameters of any law."""
 
     __slots__ = ()
 
 
-class AnyEstimator:
+class AnyEstimator(Parameters):
     """Parameters of any estimator."""
 
     __slots__ = ()
 
 
-class AnyReference:
+class AnyReference(Parameters):
     """Parameters of any reference."""
 
     __slots__ = ()

@@ -39,9 +39,6 @@ class VisionErrors(msgspec.Struct, frozen=True):
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
 
 
-NO_ERRORS = VisionErrors(position_m=0.0, heading_rad=0.0, pixel_m=0.0)
-
-
 def error_of(normal: float, bound: float) -> float:
     """A standard normal scaled so that `bound` is 3 sigma, and cut off there: the paper gives a bound."""
     return bound * (min(max(normal, -_SIGMAS), _SIGMAS) / _SIGMAS)
@@ -64,17 +61,11 @@ def measure(true: Posture, normals: tuple[float, float, float], errors: VisionEr
     axis, and by at most the heading bound.
     """
     right, up, turn = normals
-    return _measured(true.x_m, true.y_m, true.theta_rad, right, up, turn, errors)
-
-
-def _measured(
-    x_m: float, y_m: float, theta_rad: float, right: float, up: float, turn: float, errors: VisionErrors
-) -> Posture:
     position_m, pixel_m = errors.position_m, errors.pixel_m
     return Posture(
-        to_grid(x_m + error_of(right, position_m), pixel_m),
-        to_grid(y_m + error_of(up, position_m), pixel_m),
-        dmath.wrap_pi(theta_rad + error_of(turn, errors.heading_rad)),
+        to_grid(true.x_m + error_of(right, position_m), pixel_m),
+        to_grid(true.y_m + error_of(up, position_m), pixel_m),
+        dmath.wrap_pi(true.theta_rad + error_of(turn, errors.heading_rad)),
     )
 
 
@@ -103,19 +94,12 @@ class Vision:
         )
 
     def expose(self, true: tuple[float, float, float], noise: Stream, frame: int) -> Posture | None:
-        """As `frame`, of a robot at this position and heading, with the draws of frame number `frame`."""
-        x_m, y_m, theta_rad = true
-        first = 3 * frame
-        right, up, turn = noise.gauss(first), noise.gauss(first + 1), noise.gauss(first + 2)
-        self.under_way.append(_measured(x_m, y_m, theta_rad, right, up, turn, self.errors))
-        return self.under_way.popleft()
+        """Exposes a robot at this position and heading, with the draws of frame number `frame`.
 
-    def frame(self, true: Posture | None, normals: tuple[float, float, float]) -> Posture | None:
-        """Expose one frame; returns what the host gets at this tick: an older frame, or None.
-
-        `true` = None is a frame in which the robot was not found. The first `delay_frames` answers are None.
+        Returns what the host gets at this tick: an older frame. The first `delay_frames` answers are None.
         """
-        self.under_way.append(None if true is None else measure(true, normals, self.errors))
+        normals = noise.gauss(3 * frame), noise.gauss(3 * frame + 1), noise.gauss(3 * frame + 2)
+        self.under_way.append(measure(Posture(*true), normals, self.errors))
         return self.under_way.popleft()
 
     def after_load(self) -> None:

@@ -62,10 +62,6 @@ class Wheels(msgspec.Struct, frozen=True):
         half = 0.5 * self.track_m * w_rad_s
         return v_m_s - half, v_m_s + half
 
-    def limit(self, left_m_s: float, right_m_s: float) -> tuple[float, float]:
-        """Both speeds scaled by one factor so that none exceeds the limit: the path keeps its curvature."""
-        return _limited(left_m_s, right_m_s, self.limit_m_s)
-
     def counts(self, speed_m_s: float) -> int:
         """A rim speed in 1/256 count per sample, rounded half away from zero; in short words, to a multiple of a step.
 
@@ -80,28 +76,11 @@ class Wheels(msgspec.Struct, frozen=True):
 
         A wheel whose radius is the nominal one times a factor has to turn slower by that factor.
         """
-        return _words(
-            v_m_s,
-            w_rad_s,
-            left_factor,
-            right_factor,
-            self.track_m,
-            self.limit_m_s,
-            self.radius_m,
-            self.word_bits,
-        )
+        return _words(self, v_m_s, w_rad_s, left_factor, right_factor)
 
 
 def _units_per_m_s(radius_m: float) -> float:
     return _PER_TURN / (2.0 * PI * radius_m)
-
-
-def _limited(left: float, right: float, limit_m_s: float) -> tuple[float, float]:
-    greatest = max(abs(left), abs(right))
-    if greatest <= limit_m_s:
-        return left, right
-    # the quotient first: the greater one becomes +-1 exactly, hence never above the limit
-    return limit_m_s * (left / greatest), limit_m_s * (right / greatest)
 
 
 def _counts(speed_m_s: float, limit_m_s: float, units_per_m_s: float, word_bits: int) -> int:
@@ -114,16 +93,15 @@ def _counts(speed_m_s: float, limit_m_s: float, units_per_m_s: float, word_bits:
 
 
 def _words(
-    v_m_s: float,
-    w_rad_s: float,
-    left_factor: float,
-    right_factor: float,
-    track_m: float,
-    limit_m_s: float,
-    radius_m: float,
-    word_bits: int,
+    wheels: Wheels, v_m_s: float, w_rad_s: float, left_factor: float, right_factor: float
 ) -> tuple[int, int]:
-    half = 0.5 * track_m * w_rad_s
-    left, right = _limited((v_m_s - half) / left_factor, (v_m_s + half) / right_factor, limit_m_s)
-    units = _units_per_m_s(radius_m)
-    return _counts(left, limit_m_s, units, word_bits), _counts(right, limit_m_s, units, word_bits)
+    limit_m_s, half = wheels.limit_m_s, 0.5 * wheels.track_m * w_rad_s
+    left, right = (v_m_s - half) / left_factor, (v_m_s + half) / right_factor
+    greatest = max(abs(left), abs(right))
+    if not greatest <= limit_m_s:  # one factor for both: the path keeps its curvature
+        # The quotient first: the greater one becomes +-1 exactly, hence never above the limit.
+        left, right = limit_m_s * (left / greatest), limit_m_s * (right / greatest)
+    units = _units_per_m_s(wheels.radius_m)
+    return _counts(left, limit_m_s, units, wheels.word_bits), _counts(
+        right, limit_m_s, units, wheels.word_bits
+    )

@@ -29,9 +29,6 @@ cdef class Scanner:
     cpdef list feed(self, data, start_tick=*)
     @cython.locals(tick='long long')
     cpdef list feed_symbols(self, symbols)
-    @cython.locals(bytes_view='const unsigned char[::1]', stop_view='const unsigned char[::1]',
-                   tick_view='const long long[::1]')
-    cpdef list feed_columns(self, data, bad_stop, ticks)
     cdef bint _is_apart(self, long long tick) noexcept
     cdef int _put_symbol(self, int byte, bint bad_stop, long long tick) noexcept
     cdef inline void _keep(self, int byte, int flaws, long long tick) noexcept

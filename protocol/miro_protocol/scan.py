@@ -165,26 +165,6 @@ class Scanner:
                 self._give_out(found, events)
         return events
 
-    def feed_columns(self, data: bytes, bad_stop: bytes, ticks: memoryview[int]) -> list[Event]:
-        """The same as `feed_symbols` for many characters, column by column.
-
-        `bad_stop` holds 0 for a good stop bit, `ticks` 64-bit integers (`array("q")` or numpy's int64);
-        ValueError unless all three are of one length.
-        """
-        events: list[Event] = []
-        length = len(data)
-        if len(bad_stop) != length or len(ticks) != length:
-            raise ValueError(f"columns of {length}, {len(bad_stop)} and {len(ticks)} characters")
-        bytes_view, stop_view, tick_view = memoryview(data), memoryview(bad_stop), memoryview(ticks)
-        for place in range(length):
-            tick = tick_view[place]
-            if tick < -_LIMIT or tick > _LIMIT - self._step:
-                checked_tick(tick, self._step)
-            found = self._put_symbol(bytes_view[place], stop_view[place] != 0, tick)
-            if found:
-                self._give_out(found, events)
-        return events
-
     def gap(self) -> None:
         """The line paused for a character's time: what comes next does not follow what came before."""
         if not self._paused:

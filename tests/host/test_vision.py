@@ -10,12 +10,13 @@ from miro_exact.dmath import wrap_pi
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
 from miro_host.posture import Posture
-from miro_host.vision import NO_ERRORS, Vision, VisionErrors, measure, to_grid
+from miro_host.vision import Vision, VisionErrors, measure, to_grid
 
 ERRORS = VisionErrors()
 POSTURES = st.builds(Posture, st.floats(-0.2, 1.3), st.floats(-0.2, 0.9), st.floats(-50.0, 50.0))
 NORMALS = st.tuples(*[st.floats(-9.0, 9.0)] * 3)
-ZERO = (0.0, 0.0, 0.0)
+NO_ERRORS = VisionErrors(position_m=0.0, heading_rad=0.0, pixel_m=0.0)
+NOISE = Stream(1997, "camera")
 
 
 @given(POSTURES, NORMALS)
@@ -51,14 +52,8 @@ def test_three_sigma_is_the_bound_and_one_sigma_a_third_of_it():
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_a_frame_arrives_so_many_frames_later(delay):
     vision = Vision(NO_ERRORS, delay)
-    seen = [vision.frame(Posture(float(k), 0.0, 0.0), ZERO) for k in range(6)]
+    seen = [vision.expose((float(k), 0.0, 0.0), NOISE, k) for k in range(6)]
     assert [p and p.x_m for p in seen] == [None] * delay + [float(k) for k in range(6 - delay)]
-
-
-def test_a_frame_without_robot_arrives_as_none():
-    vision = Vision(NO_ERRORS, 1)
-    seen = [vision.frame(p, ZERO) for p in (Posture(1.0, 0.0, 0.0), None, Posture(2.0, 0.0, 0.0), None)]
-    assert [p and p.x_m for p in seen] == [None, 1.0, None, 2.0]
 
 
 @pytest.mark.parametrize("name", ["position_m", "heading_rad", "pixel_m"])
@@ -70,11 +65,10 @@ def test_errors_name_what_is_wrong_with_them(name):
 
 
 @given(POSTURES, st.integers(0, 10**6))
-def test_an_exposure_is_a_frame_with_the_three_draws_of_its_number(true, number):
-    noise, exposed, framed = Stream(1997, "camera"), Vision(ERRORS, 0), Vision(ERRORS, 0)
-    draws = tuple(noise.gauss(3 * number + axis) for axis in range(3))
-    seen = exposed.expose((true.x_m, true.y_m, true.theta_rad), noise, number)
-    assert seen == framed.frame(true, draws)
+def test_an_exposure_is_measured_with_the_three_draws_of_its_number(true, number):
+    draws = tuple(NOISE.gauss(3 * number + axis) for axis in range(3))
+    seen = Vision(ERRORS, 0).expose((true.x_m, true.y_m, true.theta_rad), NOISE, number)
+    assert seen == measure(true, draws, ERRORS)
 
 
 @pytest.mark.parametrize("x", [math.inf, -math.inf, math.nan])

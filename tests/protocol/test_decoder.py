@@ -3,7 +3,6 @@
 The hot scanner inside gives the same events and states as the source that it was compiled from, and is fast enough.
 """
 
-from array import array
 from itertools import pairwise
 
 import pytest
@@ -265,25 +264,6 @@ def test_bytes_with_and_without_a_tick_give_the_same_in_both(parts, form):
     for data, tick in [*parts, (FRAMES[3], None)]:
         assert fast.feed(data, tick) == slow.feed(data, tick)
         assert snapshot(fast) == snapshot(slow)
-
-
-@pytest.mark.slow
-@given(streams)
-def test_columns_give_the_same_as_symbols(stream):
-    heard, telemetry = stream
-    form = form_for(heard, telemetry)
-    rows, columns = Scanner(form), Scanner(form)
-    data = bytes(byte for byte, *_ in heard.symbols)
-    bad_stop = bytes(not good for _, good, _ in heard.symbols)
-    ticks = array("q", [tick for *_, tick in heard.symbols])
-    assert columns.feed_columns(data, bad_stop, ticks) == rows.feed_symbols(heard.symbols)
-    assert snapshot(columns) == snapshot(rows)
-
-
-@pytest.mark.parametrize("kind", [Scanner, Twin])
-def test_columns_of_different_lengths_are_refused(kind):
-    with pytest.raises(ValueError, match="columns of 2, 1 and 0 characters"):
-        kind(FORMATS[0]).feed_columns(b"ab", b"\0", array("q"))
 
 
 @pytest.mark.parametrize("kind", [Scanner, Twin])

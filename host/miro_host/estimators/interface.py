@@ -63,11 +63,6 @@ class EstimatorParameters(
         """A new estimator with these parameters, as it is before its first period."""
         raise NotImplementedError(f"{type(self).__name__} has no method `estimator`")
 
-    @classmethod
-    def name(cls) -> str:
-        """The estimator's name in scenario files."""
-        return str(cls.__struct_config__.tag)
-
 
 P = TypeVar("P", bound=EstimatorParameters, covariant=True)
 

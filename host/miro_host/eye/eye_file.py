@@ -1,7 +1,10 @@
-"""TOML files of the eye: calibrations and colour classes, with errors that name file, place and remedy."""
+"""Files of the eye: TOML and CSV, with errors that name file, place and remedy."""
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,6 +36,27 @@ def text_of(path: str | Path) -> str:
         raise EyeError(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
     except ValueError:
         raise EyeError(path, "", "not UTF-8 text", "give a text file") from None
+
+
+def csv_rows(text: str, origin: str, *columns: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Line number, and cells by column, of each row of CSV text that has one of these sets of `columns`.
+
+    Raises EyeError with the line for other columns and for a row without them.
+    """
+    reader = csv.reader(io.StringIO(text))
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        if sorted(header) not in map(sorted, columns):
+            remedy = f"they must be {' or '.join(', '.join(names) for names in columns)}"
+            raise EyeError(origin, 1, f"the columns are {', '.join(header)}", remedy)
+        for row in filter(None, reader):
+            if len(row) != len(header):
+                raise EyeError(
+                    origin, reader.line_num, f"{len(row)} cells", f"a line must have {len(header)}"
+                )
+            yield reader.line_num, dict(zip(header, row, strict=True))
+    except csv.Error as error:
+        raise EyeError(origin, reader.line_num, f"is no CSV: {error}", "mend the line") from None
 
 
 def parse(text: str, kind: type[T], origin: str) -> T:

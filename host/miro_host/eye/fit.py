@@ -14,23 +14,18 @@ The method is Gauss and Newton's, damped (Levenberg 1944, Marquardt 1963): plain
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
 from miro_host.eye.calibration import Calibration, Residuals
 from miro_host.eye.camera_parameters import CameraParameters
-from miro_host.eye.eye_file import EyeError, text_of
+from miro_host.eye.eye_file import EyeError, csv_rows, text_of
 from miro_host.eye.least_squares import NoConvergenceError, minimised
 from miro_host.eye.lens import Lens
-
-if TYPE_CHECKING:
-    from _csv import Reader  # `csv` does not name it in every version
 
 COLUMNS = ("x_cm", "y_cm", "height_cm", "u_px", "v_px")
 IN_PLANE = ("x_m", "y_m", "focal_px", "pixel_aspect", "tilt_x_rad", "tilt_y_rad", "turn_rad", "k1")
@@ -66,29 +61,10 @@ def read_points(path: str | Path) -> list[ControlPoint]:
 
 def parse_points(text: str, origin: str) -> list[ControlPoint]:
     """The points in CSV text. Raises EyeError with the line for wrong columns and for what is no number."""
-    reader = csv.reader(io.StringIO(text))
-    try:
-        return _points(reader, origin)
-    except csv.Error as error:
-        raise EyeError(origin, reader.line_num, f"is no CSV: {error}", "mend the line") from None
+    return [_point(cells, origin, line) for line, cells in csv_rows(text, origin, COLUMNS)]
 
 
-def _points(reader: Reader, origin: str) -> list[ControlPoint]:
-    header = [name.strip() for name in next(reader, [])]
-    if sorted(header) != sorted(COLUMNS):
-        raise EyeError(
-            origin, 1, f"the columns are {', '.join(header)}", f"they must be {', '.join(COLUMNS)}"
-        )
-    points = []
-    for row in reader:
-        if row:
-            points.append(_point(dict(zip(header, row, strict=False)), len(row), origin, reader.line_num))
-    return points
-
-
-def _point(cells: dict[str, str], count: int, origin: str, line: int) -> ControlPoint:
-    if count != len(COLUMNS):
-        raise EyeError(origin, line, f"{count} cells", f"a line must have {len(COLUMNS)}")
+def _point(cells: dict[str, str], origin: str, line: int) -> ControlPoint:
     numbers = []
     for name in COLUMNS:
         try:

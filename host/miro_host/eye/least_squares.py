@@ -59,10 +59,10 @@ def minimised(residuals: Residuals, first: Sequence[float]) -> list[float]:
 def _step(residuals: Residuals, values: list[float], off: list[float], damping: float) -> list[float]:
     """Solves (J'J + damping diag(J'J)) step = -J'r."""
     columns = [_derivative(residuals, values, index) for index in range(len(values))]
-    matrix = [[_product(one, other) for other in columns] for one in columns]
+    matrix = [[product(one, other) for other in columns] for one in columns]
     for index, row in enumerate(matrix):
         row[index] += damping * row[index] + 1e-12
-    return solved(matrix, [0.0 - _product(column, off) for column in columns])
+    return solved(matrix, [0.0 - product(column, off) for column in columns])
 
 
 def _derivative(residuals: Residuals, values: list[float], index: int) -> list[float]:
@@ -99,7 +99,8 @@ def solved(matrix: list[list[float]], right: list[float]) -> list[float]:
     return x
 
 
-def _product(one: Sequence[float], other: Sequence[float]) -> float:
+def product(one: Sequence[float], other: Sequence[float]) -> float:
+    """The scalar product, added in this order."""
     total = 0.0
     for left, right in zip(one, other, strict=True):
         total += left * right
@@ -107,4 +108,4 @@ def _product(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def _squares(values: Sequence[float]) -> float:
-    return _product(values, values)
+    return product(values, values)

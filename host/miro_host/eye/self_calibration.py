@@ -27,6 +27,7 @@ from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.grabber import Pixels
+from miro_host.eye.least_squares import product
 from miro_host.eye.lens import Lens
 from miro_host.eye.mark_finder import expected, find
 from miro_host.eye.pitch_marks import MARKS, Mark
@@ -112,8 +113,8 @@ class SelfCalibration:
         if off_px is None:
             return
         p, noise_px = self.covariance, WALL_NOISE_PX if mark.height_m > 0.0 else LINE_NOISE_PX
-        ph = [_dot(p[row * _SIZE : (row + 1) * _SIZE], slopes) for row in range(_SIZE)]
-        variance = _dot(slopes, ph) + noise_px * noise_px
+        ph = [product(p[row * _SIZE : (row + 1) * _SIZE], slopes) for row in range(_SIZE)]
+        variance = product(slopes, ph) + noise_px * noise_px
         if off_px * off_px > GATE * GATE * variance:
             self.refused += 1
             return
@@ -162,10 +163,3 @@ def slopes_of(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
 
 def _hides(robot: Track, mark: Mark) -> bool:
     return robot.seen > 0 and abs(robot.x_m - mark.x_m) < NEAR_M and abs(robot.y_m - mark.y_m) < NEAR_M
-
-
-def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    total = 0.0
-    for left, right in zip(one, other, strict=True):
-        total += left * right
-    return total

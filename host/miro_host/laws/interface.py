@@ -86,11 +86,6 @@ class LawParameters(
         """A new law with these parameters, as it is before its first period."""
         raise NotImplementedError(f"{type(self).__name__} has no method `law`")
 
-    @classmethod
-    def name(cls) -> str:
-        """The law's name in scenario files."""
-        return str(cls.__struct_config__.tag)
-
 
 P = TypeVar("P", bound=LawParameters, covariant=True)
 

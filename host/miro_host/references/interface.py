@@ -84,11 +84,6 @@ class ReferenceParameters(
         """The reference for a run of `duration_s`, which begins at 0 s. ValueError if these parameters give none."""
         raise NotImplementedError(f"{type(self).__name__} has no method `trajectory`")
 
-    @classmethod
-    def name(cls) -> str:
-        """The reference's name in scenario files."""
-        return str(cls.__struct_config__.tag)
-
 
 class CheckedReference:
     """A trajectory of another distribution: what it gives is finite, and what it raises names it.

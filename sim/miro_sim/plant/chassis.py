@@ -169,13 +169,6 @@ class Body:
         right_m_s = self.right_m_rad * self.right_rad_s
         return (0.5 * (left_m_s + right_m_s), (right_m_s - left_m_s) / self.track_m)
 
-    def kinetic_energy_j(self) -> float:
-        """Energy of translation, rotation and both rotors."""
-        left = self.left_rad_s
-        right = self.right_rad_s
-        both = self.mass_ll * left * left + 2.0 * self.mass_lr * left * right + self.mass_rr * right * right
-        return 0.5 * both
-
     def __repr__(self) -> str:
         v, w = self.velocity()
         return f"Body(x={self.x_m!r} y={self.y_m!r} theta={self.theta_rad!r} v={v!r} w={w!r})"

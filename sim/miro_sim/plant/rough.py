@@ -351,13 +351,6 @@ class RoughBody(Body):
         """(m/s forward, rad/s counter-clockwise) of the chassis, whatever the wheels do."""
         return (self.v_m_s, self.w_rad_s)
 
-    def kinetic_energy_j(self) -> float:
-        """Energy of translation, rotation and both rotors."""
-        rotors = self.left_rad_s * self.left_rad_s + self.right_rad_s * self.right_rad_s
-        moving = self.v_m_s * self.v_m_s + self.u_m_s * self.u_m_s
-        turning = self.yaw_kg_m2 * self.w_rad_s * self.w_rad_s
-        return 0.5 * (self.rotor_kg_m2 * rotors + self.mass_kg * moving + turning)
-
     def slips_m_s(self) -> tuple[float, float]:
         """By how much the chassis runs ahead of its left and right wheel, along the wheel."""
         left = self.v_m_s - self.half_track_m * self.w_rad_s - self.left_m_rad * self.left_rad_s

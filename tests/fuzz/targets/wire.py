@@ -1,7 +1,5 @@
 """The wire: the window decoder by each way of feeding it, frames, the PC's receiver of telemetry."""
 
-from array import array
-
 from miro_exact.state import snapshot
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol import scan
@@ -98,25 +96,21 @@ def _columns():
         draw = Draws(data)
         form, limit, cut = forms[draw.below(3)], _LIMITS[draw.below(4)], 1 + draw.below(40)
         symbols = rows(draw, form)
-        whole, parts, columns, twin = (kind(form, limit) for kind in (Scanner, Scanner, Scanner, Twin))
+        whole, parts, twin = (kind(form, limit) for kind in (Scanner, Scanner, Twin))
         good = 0
         for _byte, _stop_good, tick in symbols:  # up to the first that cannot be taken
             if not -(1 << 62) <= tick <= (1 << 62) - form.character_ticks:
                 break
             good += 1
-        data_of = bytes(byte for byte, _, _ in symbols[:good])
-        stops = bytes(not stop_good for _, stop_good, _ in symbols[:good])
-        ticks = memoryview(array("q", [tick for _, _, tick in symbols[:good]]))
         events = whole.feed_symbols(symbols[:good])
         found = [
             *parts.feed_symbols(symbols[: min(cut, good)]),
             *parts.feed_symbols(symbols[min(cut, good) : good]),
         ]
         assert events == found, "cut elsewhere, the events differ"
-        assert events == columns.feed_columns(data_of, stops, ticks), "by columns, the events differ"
         assert events == twin.feed_symbols(symbols[:good]), "the twins differ"
-        states = [snapshot(one) for one in (whole, parts, columns, twin)]
-        assert states == states[:1] * 4, "the states differ"
+        states = [snapshot(one) for one in (whole, parts, twin)]
+        assert states == states[:1] * 3, "the states differ"
         frames = sum(hasattr(event, "body") for event in events)
         if good < len(symbols):
             for one in (whole, parts, twin):
@@ -128,7 +122,9 @@ def _columns():
                     raise AssertionError(f"takes tick {symbols[good][2]}")
             return outcome
         events += whole.flush()
-        assert b"".join(event.data for event in events) == data_of, "the events are not the characters fed"
+        assert b"".join(event.data for event in events) == bytes(byte for byte, _, _ in symbols[:good]), (
+            "the events are not the characters fed"
+        )
         return f"{form.name}: {min(frames, 3)} frames, {min(whole.rejected, 3)} rejected"
 
     return run

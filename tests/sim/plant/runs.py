@@ -3,8 +3,24 @@
 from miro_exact.state import Flat
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Chassis, Disturbance, DriveParams, RollingBall, Tyre
+from miro_sim.plant.rough import RoughBody
 
 PERIOD = 2048
+
+
+def kinetic_energy_j(body):
+    """Energy of translation, rotation and both rotors."""
+    left, right = body.left_rad_s, body.right_rad_s
+    if not isinstance(body, RoughBody):
+        return 0.5 * (
+            body.mass_ll * left * left + 2.0 * body.mass_lr * left * right + body.mass_rr * right * right
+        )
+    moving = body.mass_kg * (body.v_m_s * body.v_m_s + body.u_m_s * body.u_m_s)
+    return 0.5 * (
+        body.rotor_kg_m2 * (left * left + right * right)
+        + moving
+        + body.yaw_kg_m2 * body.w_rad_s * body.w_rad_s
+    )
 
 
 def pwm(drive, left, right, periods):

@@ -14,7 +14,7 @@ from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor, 
 from tests.children import uncompiled
 from tests.naive.plant import NaiveDrive
 from tests.robot.lm629.bench import Bench
-from tests.sim.plant.runs import TRACED, pwm, trace
+from tests.sim.plant.runs import TRACED, kinetic_energy_j, pwm, trace
 
 PARAMS = DriveParams()
 PROMPT = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))  # a bridge without delays
@@ -115,7 +115,7 @@ def test_tiny_euler_steps_go_the_same_way(magnitudes):
 
 def energy_j(drive):
     currents = (drive.left_winding.current_a, drive.right_winding.current_a)
-    return drive.body.kinetic_energy_j() + sum(0.5 * 45e-6 * i * i for i in currents)
+    return kinetic_energy_j(drive.body) + sum(0.5 * 45e-6 * i * i for i in currents)
 
 
 @settings(max_examples=30)
