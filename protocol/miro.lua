@@ -1,112 +1,110 @@
 -- Wireshark dissector of the Mirotwin radio frames. Written by `python -m miro_protocol.dissector`; do not edit.
 -- tshark -X lua_script:protocol/miro.lua -d rtacser.data,miro -r run.pcapng
 
-local miro = Proto("miro", "Mirotwin radio")
-
 local SYNC = "\x2D\xD4"
-local RESIDUE, XOR_OUT = 0x36E6, 0xFFFF
-local SEQ_MODULUS, SLOT_MASK = 64, 7
-local WHITE = {
-  0xFF, 0xE1, 0x1D, 0x9A, 0xED, 0x85, 0x33, 0x24, 0xEA, 0x7A, 0xD2, 0x39, 0x70, 0x97, 0x57, 0x0A,
-  0x54, 0x7D, 0x2D, 0xD8, 0x6D, 0x0D, 0xBA, 0x8F, 0x67, 0x59, 0xC7, 0xA2, 0xBF, 0x34, 0xCA,
-}
-local CRC_TABLE = {
-  0x0000, 0x7956, 0xF2AC, 0x8BFA, 0xBC6D, 0xC53B, 0x4EC1, 0x3797, 0x21EF, 0x58B9, 0xD343, 0xAA15, 0x9D82, 0xE4D4, 0x6F2E, 0x1678,
-  0x43DE, 0x3A88, 0xB172, 0xC824, 0xFFB3, 0x86E5, 0x0D1F, 0x7449, 0x6231, 0x1B67, 0x909D, 0xE9CB, 0xDE5C, 0xA70A, 0x2CF0, 0x55A6,
-  0x87BC, 0xFEEA, 0x7510, 0x0C46, 0x3BD1, 0x4287, 0xC97D, 0xB02B, 0xA653, 0xDF05, 0x54FF, 0x2DA9, 0x1A3E, 0x6368, 0xE892, 0x91C4,
-  0xC462, 0xBD34, 0x36CE, 0x4F98, 0x780F, 0x0159, 0x8AA3, 0xF3F5, 0xE58D, 0x9CDB, 0x1721, 0x6E77, 0x59E0, 0x20B6, 0xAB4C, 0xD21A,
-  0x564D, 0x2F1B, 0xA4E1, 0xDDB7, 0xEA20, 0x9376, 0x188C, 0x61DA, 0x77A2, 0x0EF4, 0x850E, 0xFC58, 0xCBCF, 0xB299, 0x3963, 0x4035,
-  0x1593, 0x6CC5, 0xE73F, 0x9E69, 0xA9FE, 0xD0A8, 0x5B52, 0x2204, 0x347C, 0x4D2A, 0xC6D0, 0xBF86, 0x8811, 0xF147, 0x7ABD, 0x03EB,
-  0xD1F1, 0xA8A7, 0x235D, 0x5A0B, 0x6D9C, 0x14CA, 0x9F30, 0xE666, 0xF01E, 0x8948, 0x02B2, 0x7BE4, 0x4C73, 0x3525, 0xBEDF, 0xC789,
-  0x922F, 0xEB79, 0x6083, 0x19D5, 0x2E42, 0x5714, 0xDCEE, 0xA5B8, 0xB3C0, 0xCA96, 0x416C, 0x383A, 0x0FAD, 0x76FB, 0xFD01, 0x8457,
-  0xAC9A, 0xD5CC, 0x5E36, 0x2760, 0x10F7, 0x69A1, 0xE25B, 0x9B0D, 0x8D75, 0xF423, 0x7FD9, 0x068F, 0x3118, 0x484E, 0xC3B4, 0xBAE2,
-  0xEF44, 0x9612, 0x1DE8, 0x64BE, 0x5329, 0x2A7F, 0xA185, 0xD8D3, 0xCEAB, 0xB7FD, 0x3C07, 0x4551, 0x72C6, 0x0B90, 0x806A, 0xF93C,
-  0x2B26, 0x5270, 0xD98A, 0xA0DC, 0x974B, 0xEE1D, 0x65E7, 0x1CB1, 0x0AC9, 0x739F, 0xF865, 0x8133, 0xB6A4, 0xCFF2, 0x4408, 0x3D5E,
-  0x68F8, 0x11AE, 0x9A54, 0xE302, 0xD495, 0xADC3, 0x2639, 0x5F6F, 0x4917, 0x3041, 0xBBBB, 0xC2ED, 0xF57A, 0x8C2C, 0x07D6, 0x7E80,
-  0xFAD7, 0x8381, 0x087B, 0x712D, 0x46BA, 0x3FEC, 0xB416, 0xCD40, 0xDB38, 0xA26E, 0x2994, 0x50C2, 0x6755, 0x1E03, 0x95F9, 0xECAF,
-  0xB909, 0xC05F, 0x4BA5, 0x32F3, 0x0564, 0x7C32, 0xF7C8, 0x8E9E, 0x98E6, 0xE1B0, 0x6A4A, 0x131C, 0x248B, 0x5DDD, 0xD627, 0xAF71,
-  0x7D6B, 0x043D, 0x8FC7, 0xF691, 0xC106, 0xB850, 0x33AA, 0x4AFC, 0x5C84, 0x25D2, 0xAE28, 0xD77E, 0xE0E9, 0x99BF, 0x1245, 0x6B13,
-  0x3EB5, 0x47E3, 0xCC19, 0xB54F, 0x82D8, 0xFB8E, 0x7074, 0x0922, 0x1F5A, 0x660C, 0xEDF6, 0x94A0, 0xA337, 0xDA61, 0x519B, 0x28CD,
-}
-local NIBBLE_XOR = {
-  0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15,
-  1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 15, 14,
-  2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13,
-  3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12,
-  4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11,
-  5, 4, 7, 6, 1, 0, 3, 2, 13, 12, 15, 14, 9, 8, 11, 10,
-  6, 7, 4, 5, 2, 3, 0, 1, 14, 15, 12, 13, 10, 11, 8, 9,
-  7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8,
-  8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7,
-  9, 8, 11, 10, 13, 12, 15, 14, 1, 0, 3, 2, 5, 4, 7, 6,
-  10, 11, 8, 9, 14, 15, 12, 13, 2, 3, 0, 1, 6, 7, 4, 5,
-  11, 10, 9, 8, 15, 14, 13, 12, 3, 2, 1, 0, 7, 6, 5, 4,
-  12, 13, 14, 15, 8, 9, 10, 11, 4, 5, 6, 7, 0, 1, 2, 3,
-  13, 12, 15, 14, 9, 8, 11, 10, 5, 4, 7, 6, 1, 0, 3, 2,
-  14, 15, 12, 13, 10, 11, 8, 9, 6, 7, 4, 5, 2, 3, 0, 1,
-  15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0,
-}
-
+local RESIDUE = 14054
+local XOR_OUT = 65535
+local SEQ_MODULUS = 64
+local SLOT_MASK = 7
+local ROBOT_COUNTS = { 3, 5 }
+local WHITE = { 255, 225, 29, 154, 237, 133, 51, 36, 234, 122, 210, 57, 112, 151, 87, 10, 84, 125, 45, 216, 109, 13, 186,
+  143, 103, 89, 199, 162, 191, 52, 202 }
+local CRC_TABLE = { 0, 31062, 62124, 35834, 48237, 50491, 20161, 14231, 8687, 22713, 54083, 43541, 40322, 58580, 28462, 5752,
+  17374, 14984, 45426, 51236, 65459, 34533, 3359, 29769, 25137, 7015, 37021, 59851, 56924, 42762, 11504,
+  21926, 34748, 65258, 29968, 3142, 15313, 17031, 51581, 45099, 42579, 57093, 21759, 11689, 6718, 25448,
+  59538, 37316, 50274, 48436, 14030, 20376, 30735, 345, 35491, 62453, 58765, 40155, 5921, 28279, 23008, 8374,
+  43852, 53786, 22093, 12059, 42209, 56759, 59936, 37750, 6284, 25050, 30626, 3828, 34062, 64600, 52175,
+  45721, 14691, 16437, 5523, 27845, 59199, 40553, 43518, 53416, 23378, 8708, 13436, 19754, 50896, 49030,
+  34833, 61767, 31421, 1003, 53745, 43175, 9053, 23051, 28060, 5322, 40752, 58982, 61470, 35144, 690, 31716,
+  19571, 13605, 48863, 51081, 37423, 60281, 24707, 6613, 11842, 22292, 56558, 42424, 46016, 51862, 16748,
+  14394, 4013, 30459, 64769, 33879, 44186, 54732, 24118, 10080, 4343, 27041, 57947, 39693, 36213, 62499,
+  32729, 1679, 12568, 18510, 50100, 47842, 61252, 38418, 7656, 25790, 21289, 10879, 41349, 55507, 52907,
+  47101, 15367, 17745, 29382, 2960, 32874, 63804, 11046, 21104, 55690, 41180, 38731, 60957, 26087, 7345, 2761,
+  29599, 63589, 33075, 46756, 53234, 17416, 15710, 26872, 4526, 39508, 58114, 54421, 44483, 9785, 24431,
+  18711, 12353, 48059, 49901, 62842, 35884, 2006, 32384, 64215, 33665, 2171, 28973, 18106, 16364, 46102,
+  52544, 56120, 41582, 10644, 20674, 26453, 7683, 38393, 60591, 47369, 49247, 19365, 13043, 1380, 31794,
+  63432, 36510, 39142, 57776, 27210, 4892, 9355, 24029, 54823, 44913, 32107, 1085, 36807, 63121, 49414, 47184,
+  13226, 19196, 23684, 9682, 44584, 55166, 57577, 39359, 4677, 27411, 16053, 18403, 52249, 46415, 33496,
+  64398, 28788, 2338, 8026, 26124, 60918, 38048, 41783, 55905, 20891, 10445 }
+local NIBBLE_XOR = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 15, 14,
+  2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13, 3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12,
+  4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11, 5, 4, 7, 6, 1, 0, 3, 2, 13, 12, 15, 14, 9, 8, 11, 10,
+  6, 7, 4, 5, 2, 3, 0, 1, 14, 15, 12, 13, 10, 11, 8, 9, 7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8,
+  8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7, 9, 8, 11, 10, 13, 12, 15, 14, 1, 0, 3, 2, 5, 4, 7, 6,
+  10, 11, 8, 9, 14, 15, 12, 13, 2, 3, 0, 1, 6, 7, 4, 5, 11, 10, 9, 8, 15, 14, 13, 12, 3, 2, 1, 0, 7, 6, 5, 4,
+  12, 13, 14, 15, 8, 9, 10, 11, 4, 5, 6, 7, 0, 1, 2, 3, 13, 12, 15, 14, 9, 8, 11, 10, 5, 4, 7, 6, 1, 0, 3, 2,
+  14, 15, 12, 13, 10, 11, 8, 9, 6, 7, 4, 5, 2, 3, 0, 1, 15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0 }
 local DIRECTIONS = { [1] = ">", [3] = ">", [2] = "<", [4] = "<" }
 local TYPES = { [0] = "team", [1] = "service", [2] = "telemetry", [3] = "team_ask" }
 local FORMATS = {
-  { name = "host to robot, N=3", robots = 3, direction = ">", lead = "\x55\x55\x55\x55\x55\xFF",
-    size = 17, body = 13, register = 0xE016, types = { [0] = true, [1] = true, [3] = true } },
-  { name = "host to robot, N=5", robots = 5, direction = ">", lead = "\x55\x55\x55\x55\x55\xFF",
-    size = 25, body = 21, register = 0xAED7, types = { [0] = true, [1] = true, [3] = true } },
-  { name = "robot to host", robots = 0, direction = "<", lead = "\x55\x55\x55\x55\xFF",
-    size = 14, body = 10, register = 0x04C2, types = { [2] = true } },
+  { name = "host to robot, N=3", robots = 3, direction = ">", lead = "\x55\x55\x55\x55\x55\xFF", size = 17, body = 13, register = 57366, types = { [0] = true, [1] = true, [3] = true } },
+  { name = "host to robot, N=5", robots = 5, direction = ">", lead = "\x55\x55\x55\x55\x55\xFF", size = 25, body = 21, register = 44759, types = { [0] = true, [1] = true, [3] = true } },
+  { name = "robot to host", robots = 0, direction = "<", lead = "\x55\x55\x55\x55\xFF", size = 14, body = 10, register = 1218, types = { [2] = true } },
 }
+local VELOCITY = {
+  { name = "left", label = "left [1/256 count per LM629 sample]", size = 2, kind = "int16" },
+  { name = "right", label = "right [1/256 count per LM629 sample]", size = 2, kind = "int16" },
+}
+local SERVICE = {
+  { name = "slot", label = "slot", size = 1, kind = "uint8" },
+  { name = "opcode", label = "opcode", size = 1, kind = "uint8" },
+}
+local OPCODES = { [0] = { name = "ping", fields = {  } }, [1] = { name = "filter", fields = { { name = "kp", label = "kp", size = 2, kind = "uint16" }, { name = "ki", label = "ki", size = 2, kind = "uint16" }, { name = "kd", label = "kd", size = 2, kind = "uint16" }, { name = "il", label = "il", size = 2, kind = "uint16" } } }, [2] = { name = "acceleration", fields = { { name = "acceleration", label = "acceleration [1/65536 count per sample^2]", size = 4, kind = "uint32" } } } }
+local FLAGS = {
+  { name = "stopped", label = "since its last answer: 110 ms without a fresh frame, smooth stop", mask = 8 },
+  { name = "motors_off", label = "since its last answer: 500 ms without a fresh frame, motors off", mask = 16 },
+  { name = "init_failed", label = "an LM629 did not come out of reset as it should; its motor stays off", mask = 32 },
+}
+local TELEMETRY = {
+  { name = "slot_flags", label = "slot_flags", size = 1, kind = "uint8" },
+  { name = "status_left", label = "status_left", size = 1, kind = "uint8" },
+  { name = "status_right", label = "status_right", size = 1, kind = "uint8" },
+  { name = "position_left", label = "position_left [count]", size = 2, kind = "uint16" },
+  { name = "position_right", label = "position_right [count]", size = 2, kind = "uint16" },
+  { name = "accepted", label = "accepted", size = 1, kind = "uint8" },
+  { name = "rejected", label = "rejected", size = 1, kind = "uint8" },
+}
+
+local miro = Proto("miro", "Mirotwin radio")
 
 local fields = {
   robots = ProtoField.uint8("miro.robots", "Robots in the network"),
-  type = ProtoField.uint8("miro.type", "Type", base.DEC, { [0] = "team", [1] = "service", [2] = "telemetry", [3] = "team_ask" }, 0xC0),
-  seq = ProtoField.uint8("miro.seq", "Sequence number", base.DEC, nil, 0x3F),
+  type = ProtoField.uint8("miro.type", "Type", base.DEC, TYPES, 256 - SEQ_MODULUS),
+  seq = ProtoField.uint8("miro.seq", "Sequence number", base.DEC, nil, SEQ_MODULUS - 1),
   crc = ProtoField.uint16("miro.crc", "CRC", base.HEX),
   crc_calculated = ProtoField.uint16("miro.crc.calculated", "CRC calculated", base.HEX),
   crc_status = ProtoField.uint8("miro.crc.status", "CRC status", base.DEC, { [0] = "Bad", [1] = "Good" }),
   damage = ProtoField.string("miro.damage", "Damage"),
 }
 
-local function keep(field) fields[#fields + 1] = field; return field end
-local VELOCITIES = {
-  { { size = 2, field = keep(ProtoField.int16("miro.slot0.left", "left [1/256 count per LM629 sample]")) }, { size = 2, field = keep(ProtoField.int16("miro.slot0.right", "right [1/256 count per LM629 sample]")) } },
-  { { size = 2, field = keep(ProtoField.int16("miro.slot1.left", "left [1/256 count per LM629 sample]")) }, { size = 2, field = keep(ProtoField.int16("miro.slot1.right", "right [1/256 count per LM629 sample]")) } },
-  { { size = 2, field = keep(ProtoField.int16("miro.slot2.left", "left [1/256 count per LM629 sample]")) }, { size = 2, field = keep(ProtoField.int16("miro.slot2.right", "right [1/256 count per LM629 sample]")) } },
-  { { size = 2, field = keep(ProtoField.int16("miro.slot3.left", "left [1/256 count per LM629 sample]")) }, { size = 2, field = keep(ProtoField.int16("miro.slot3.right", "right [1/256 count per LM629 sample]")) } },
-  { { size = 2, field = keep(ProtoField.int16("miro.slot4.left", "left [1/256 count per LM629 sample]")) }, { size = 2, field = keep(ProtoField.int16("miro.slot4.right", "right [1/256 count per LM629 sample]")) } },
-}
-local SERVICE = {
-  { size = 1, field = keep(ProtoField.uint8("miro.service.slot", "slot")) },
-  { size = 1, field = keep(ProtoField.uint8("miro.service.opcode", "opcode")) },
-}
-local OPCODES = {
-  [0] = { name = "ping", fields = {
-  } },
-  [1] = { name = "filter", fields = {
-  { size = 2, field = keep(ProtoField.uint16("miro.service.kp", "kp")) },
-  { size = 2, field = keep(ProtoField.uint16("miro.service.ki", "ki")) },
-  { size = 2, field = keep(ProtoField.uint16("miro.service.kd", "kd")) },
-  { size = 2, field = keep(ProtoField.uint16("miro.service.il", "il")) },
-  } },
-  [2] = { name = "acceleration", fields = {
-  { size = 4, field = keep(ProtoField.uint32("miro.service.acceleration", "acceleration [1/65536 count per sample^2]")) },
-  } },
-}
-local TELEMETRY = {
-  { size = 1, parts = {
-    keep(ProtoField.uint8("miro.telemetry.slot", "slot", base.DEC, nil, 0x07)),
-    keep(ProtoField.bool("miro.telemetry.stopped", "since its last answer: 110 ms without a fresh frame, smooth stop", 8, nil, 0x08)),
-    keep(ProtoField.bool("miro.telemetry.motors_off", "since its last answer: 500 ms without a fresh frame, motors off", 8, nil, 0x10)),
-    keep(ProtoField.bool("miro.telemetry.init_failed", "an LM629 did not come out of reset as it should; its motor stays off", 8, nil, 0x20)),
-  } },
-  { size = 1, field = keep(ProtoField.uint8("miro.telemetry.status_left", "status_left")) },
-  { size = 1, field = keep(ProtoField.uint8("miro.telemetry.status_right", "status_right")) },
-  { size = 2, field = keep(ProtoField.uint16("miro.telemetry.position_left", "position_left [count]")) },
-  { size = 2, field = keep(ProtoField.uint16("miro.telemetry.position_right", "position_right [count]")) },
-  { size = 1, field = keep(ProtoField.uint8("miro.telemetry.accepted", "accepted")) },
-  { size = 1, field = keep(ProtoField.uint8("miro.telemetry.rejected", "rejected")) },
-}
+local function keep(field)
+  fields[#fields + 1] = field
+  return field
+end
+
+-- Gives each field of a payload its ProtoField, miro.PREFIX.NAME.
+local function kept(prefix, list)
+  local found = {}
+  for place, row in ipairs(list) do
+    local field = ProtoField[row.kind]("miro." .. prefix .. "." .. row.name, row.label)
+    found[place] = { size = row.size, field = keep(field) }
+  end
+  return found
+end
+
+local VELOCITIES = {}
+for slot = 0, math.max(ROBOT_COUNTS[1], ROBOT_COUNTS[2]) - 1 do
+  VELOCITIES[slot + 1] = kept("slot" .. slot, VELOCITY)
+end
+SERVICE = kept("service", SERVICE)
+for _, opcode in pairs(OPCODES) do opcode.fields = kept("service", opcode.fields) end
+local parts = { keep(ProtoField.uint8("miro.telemetry.slot", "slot", base.DEC, nil, SLOT_MASK)) }
+for _, flag in ipairs(FLAGS) do
+  parts[#parts + 1] = keep(ProtoField.bool("miro.telemetry." .. flag.name, flag.label, 8, nil, flag.mask))
+end
+local first = table.remove(TELEMETRY, 1)
+TELEMETRY = kept("telemetry", TELEMETRY)
+table.insert(TELEMETRY, 1, { size = first.size, parts = parts })
 miro.fields = fields
 
 local damaged = ProtoExpert.new("miro.damaged", "Damaged", expert.group.CHECKSUM, expert.severity.WARN)
@@ -114,7 +112,9 @@ local unknown_content = ProtoExpert.new("miro.content", "Unknown content", exper
 miro.experts = { damaged, unknown_content }
 local PAYLOADS
 
-miro.prefs.robots = Pref.enum("Robots in the network", 0, "Decides how long a damaged frame was", { { 1, "whatever makes the CRC good", 0 }, { 3, "3", 3 }, { 5, "5", 5 } }, false)
+local choices = { { 1, "whatever makes the CRC good", 0 } }
+for _, robots in ipairs(ROBOT_COUNTS) do choices[#choices + 1] = { robots, tostring(robots), robots } end
+miro.prefs.robots = Pref.enum("Robots in the network", 0, "Decides how long a damaged frame was", choices, false)
 
 local event_type = Field.new("rtacser.eventtype")
 

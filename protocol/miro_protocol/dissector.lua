@@ -1,3 +1,54 @@
+local miro = Proto("miro", "Mirotwin radio")
+
+local fields = {
+  robots = ProtoField.uint8("miro.robots", "Robots in the network"),
+  type = ProtoField.uint8("miro.type", "Type", base.DEC, TYPES, 256 - SEQ_MODULUS),
+  seq = ProtoField.uint8("miro.seq", "Sequence number", base.DEC, nil, SEQ_MODULUS - 1),
+  crc = ProtoField.uint16("miro.crc", "CRC", base.HEX),
+  crc_calculated = ProtoField.uint16("miro.crc.calculated", "CRC calculated", base.HEX),
+  crc_status = ProtoField.uint8("miro.crc.status", "CRC status", base.DEC, { [0] = "Bad", [1] = "Good" }),
+  damage = ProtoField.string("miro.damage", "Damage"),
+}
+
+local function keep(field)
+  fields[#fields + 1] = field
+  return field
+end
+
+-- Gives each field of a payload its ProtoField, miro.PREFIX.NAME.
+local function kept(prefix, list)
+  local found = {}
+  for place, row in ipairs(list) do
+    local field = ProtoField[row.kind]("miro." .. prefix .. "." .. row.name, row.label)
+    found[place] = { size = row.size, field = keep(field) }
+  end
+  return found
+end
+
+local VELOCITIES = {}
+for slot = 0, math.max(ROBOT_COUNTS[1], ROBOT_COUNTS[2]) - 1 do
+  VELOCITIES[slot + 1] = kept("slot" .. slot, VELOCITY)
+end
+SERVICE = kept("service", SERVICE)
+for _, opcode in pairs(OPCODES) do opcode.fields = kept("service", opcode.fields) end
+local parts = { keep(ProtoField.uint8("miro.telemetry.slot", "slot", base.DEC, nil, SLOT_MASK)) }
+for _, flag in ipairs(FLAGS) do
+  parts[#parts + 1] = keep(ProtoField.bool("miro.telemetry." .. flag.name, flag.label, 8, nil, flag.mask))
+end
+local first = table.remove(TELEMETRY, 1)
+TELEMETRY = kept("telemetry", TELEMETRY)
+table.insert(TELEMETRY, 1, { size = first.size, parts = parts })
+miro.fields = fields
+
+local damaged = ProtoExpert.new("miro.damaged", "Damaged", expert.group.CHECKSUM, expert.severity.WARN)
+local unknown_content = ProtoExpert.new("miro.content", "Unknown content", expert.group.PROTOCOL, expert.severity.WARN)
+miro.experts = { damaged, unknown_content }
+local PAYLOADS
+
+local choices = { { 1, "whatever makes the CRC good", 0 } }
+for _, robots in ipairs(ROBOT_COUNTS) do choices[#choices + 1] = { robots, tostring(robots), robots } end
+miro.prefs.robots = Pref.enum("Robots in the network", 0, "Decides how long a damaged frame was", choices, false)
+
 local event_type = Field.new("rtacser.eventtype")
 
 local function xor(a, b)

@@ -4,15 +4,17 @@ A packet is a run of characters without a pause, as `pcapng.py` writes them, so 
 ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is the number of
 robots with which the CRC is good, because the layout byte differs for 3 and 5. A packet may hold several frames.
 
-`dissector.lua` is the part that no table decides. XOR is done by a table of nibbles there, because Wireshark's Lua has
-had bit operators under three names since 5.1.
+What the table decides becomes Lua tables here; `dissector.lua` reads them. XOR is done by a table of nibbles there,
+because Wireshark's Lua has had bit operators under three names since 5.1.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 from miro_protocol import crc, table, whitening
 from miro_protocol.pcapng import EVENTS
@@ -23,143 +25,86 @@ _HEAD = """\
 -- Wireshark dissector of the Mirotwin radio frames. Written by `python -m miro_protocol.dissector`; do not edit.
 -- tshark -X lua_script:protocol/miro.lua -d rtacser.data,miro -r run.pcapng
 
-local miro = Proto("miro", "Mirotwin radio")
 """
 
 
 def render() -> str:
     """The whole script, ending in a newline."""
-    parts = (_numbers(), _formats(), _common_fields(), _payload_fields(), _experts(), _preferences())
     code = Path(__file__).with_suffix(".lua").read_text(encoding="utf-8")
-    tables = ("\n" + "".join(f"{line}\n" for line in part) for part in parts)
-    return f"{_HEAD}{''.join(tables)}\n{code}"
+    return _HEAD + "".join(f"local {name} = {_shown(value)}\n" for name, value in _tables()) + f"\n{code}"
 
 
-def _numbers() -> Iterator[str]:
-    yield f"local SYNC = {_bytes(table.SYNC)}"
-    yield f"local RESIDUE, XOR_OUT = 0x{crc.residue():04X}, 0x{crc.XOR_OUT:04X}"
-    yield f"local SEQ_MODULUS, SLOT_MASK = {table.SEQ_MODULUS}, {table.SLOT_MASK}"
-    yield from _list("WHITE", (f"0x{byte:02X}" for byte in whitening.STRING))
-    yield from _list("CRC_TABLE", (f"0x{word:04X}" for word in crc.byte_table()))
-    yield from _list("NIBBLE_XOR", (f"{a ^ b}" for a in range(16) for b in range(16)))
-
-
-def _list(name: str, values: Iterable[str]) -> Iterator[str]:
-    items = list(values)
-    yield f"local {name} = {{"
-    for place in range(0, len(items), 16):
-        yield "  " + ", ".join(items[place : place + 16]) + ","
-    yield "}"
-
-
-def _bytes(data: bytes) -> str:
-    return '"' + "".join(f"\\x{byte:02X}" for byte in data) + '"'
-
-
-def _formats() -> Iterator[str]:
-    yield f"local DIRECTIONS = {{ {', '.join(_directions())} }}"
-    types = ", ".join(f'[{kind:d}] = "{kind.name.lower()}"' for kind in FrameType)
-    yield f"local TYPES = {{ {types} }}"
-    yield "local FORMATS = {"
-    for robots, form in DOWNLINK.items():
-        yield _format(form, robots, DOWN, [kind for kind in FrameType if kind != FrameType.TELEMETRY])
-    yield _format(TELEMETRY, 0, UP, [FrameType.TELEMETRY])
-    yield "}"
-
-
-def _directions() -> Iterator[str]:
-    for direction, event in EVENTS.items():
-        yield f'[{event}] = "{direction}"'
-        yield f'[{event + 2}] = "{direction}"'  # ..._END after ..._START
-
-
-def _format(form: Format, robots: int, direction: str, types: Iterable[FrameType]) -> str:
-    known = ", ".join(f"[{kind:d}] = true" for kind in types)
-    register = crc.register(bytes([form.layout]))
-    return (
-        f'  {{ name = "{form.name}", robots = {robots}, direction = "{direction}", lead = {_bytes(form.lead)},\n'
-        f"    size = {form.size}, body = {form.body_size}, register = 0x{register:04X}, types = {{ {known} }} }},"
-    )
-
-
-def _common_fields() -> Iterator[str]:
-    types = ", ".join(f'[{kind:d}] = "{kind.name.lower()}"' for kind in FrameType)
-    mask = 0xFF // table.SEQ_MODULUS * table.SEQ_MODULUS
-    yield "local fields = {"
-    yield '  robots = ProtoField.uint8("miro.robots", "Robots in the network"),'
-    yield f'  type = ProtoField.uint8("miro.type", "Type", base.DEC, {{ {types} }}, 0x{mask:02X}),'
-    yield f'  seq = ProtoField.uint8("miro.seq", "Sequence number", base.DEC, nil, 0x{table.SEQ_MODULUS - 1:02X}),'
-    yield '  crc = ProtoField.uint16("miro.crc", "CRC", base.HEX),'
-    yield '  crc_calculated = ProtoField.uint16("miro.crc.calculated", "CRC calculated", base.HEX),'
-    yield '  crc_status = ProtoField.uint8("miro.crc.status", "CRC status", base.DEC, { [0] = "Bad", [1] = "Good" }),'
-    yield '  damage = ProtoField.string("miro.damage", "Damage"),'
-    yield "}"
-
-
-def _payload_fields() -> Iterator[str]:
-    yield "local function keep(field) fields[#fields + 1] = field; return field end"
-    yield "local VELOCITIES = {"
-    for slot in range(max(table.ROBOT_COUNTS)):
-        yield "  { " + ", ".join(_entry(f"slot{slot}", field) for field in table.VELOCITY) + " },"
-    yield "}"
-    yield from _entries("local SERVICE = {", "service", table.SERVICE, "}")
-    yield "local OPCODES = {"
-    for opcode in Opcode:
-        head = f'  [{opcode:d}] = {{ name = "{opcode.name.lower()}", fields = {{'
-        yield from _entries(head, "service", table.SERVICE_DATA[opcode], "  } },")
-    yield "}"
-    yield from _telemetry()
-    yield "miro.fields = fields"
-
-
-def _telemetry() -> Iterator[str]:
-    first, *rest = table.TELEMETRY_FIELDS
-    flags = (
-        f'keep(ProtoField.bool("miro.telemetry.{flag.name.lower()}", "{meaning}", 8, nil, 0x{flag:02X}))'
+def _tables() -> Iterable[tuple[str, Any]]:
+    down = [kind for kind in FrameType if kind != FrameType.TELEMETRY]
+    opcodes = {
+        opcode: {"name": opcode.name.lower(), "fields": _fields(table.SERVICE_DATA[opcode])}
+        for opcode in Opcode
+    }
+    flags = [
+        {"name": f"{flag.name}".lower(), "label": meaning, "mask": int(flag)}
         for flag, meaning in table.FLAG_MEANINGS.items()
-        if flag.name
-    )
-    slot = f'keep(ProtoField.uint8("miro.telemetry.slot", "slot", base.DEC, nil, 0x{table.SLOT_MASK:02X}))'
-    yield "local TELEMETRY = {"
-    yield f"  {{ size = {first.size}, parts = {{"
-    for part in (slot, *flags):
-        yield f"    {part},"
-    yield "  } },"
-    yield from _entries("", "telemetry", rest, "}")
+    ]
+    return {
+        "SYNC": table.SYNC,
+        "RESIDUE": crc.residue(),
+        "XOR_OUT": crc.XOR_OUT,
+        "SEQ_MODULUS": table.SEQ_MODULUS,
+        "SLOT_MASK": table.SLOT_MASK,
+        "ROBOT_COUNTS": table.ROBOT_COUNTS,
+        "WHITE": tuple(whitening.STRING),
+        "CRC_TABLE": crc.byte_table(),
+        "NIBBLE_XOR": tuple(a ^ b for a in range(16) for b in range(16)),
+        "DIRECTIONS": {
+            number: way for way, event in EVENTS.items() for number in (event, event + 2)
+        },  # ..._END after ..._START
+        "TYPES": {kind: kind.name.lower() for kind in FrameType},
+        "FORMATS": [
+            *(_format(form, robots, DOWN, down) for robots, form in DOWNLINK.items()),
+            _format(TELEMETRY, 0, UP, [FrameType.TELEMETRY]),
+        ],
+        "VELOCITY": _fields(table.VELOCITY),
+        "SERVICE": _fields(table.SERVICE),
+        "OPCODES": opcodes,
+        "FLAGS": flags,
+        "TELEMETRY": _fields(table.TELEMETRY_FIELDS),
+    }.items()
 
 
-def _entries(head: str, prefix: str, fields: Iterable[Field], tail: str) -> Iterator[str]:
-    if head:
-        yield head
-    for field in fields:
-        yield f"  {_entry(prefix, field)},"
-    yield tail
+def _format(form: Format, robots: int, direction: str, types: Iterable[FrameType]) -> dict[str, Any]:
+    register = crc.register(bytes([form.layout]))
+    names = {"name": form.name, "robots": robots, "direction": direction, "lead": form.lead}
+    sizes = {"size": form.size, "body": form.body_size, "register": register}
+    return {**names, **sizes, "types": dict.fromkeys(types, True)}
 
 
-def _entry(prefix: str, field: Field) -> str:
-    kind = f"{'' if field.signed else 'u'}int{8 * field.size}"
-    unit = f" [{field.unit}]" if field.unit else ""
-    name = f'"miro.{prefix}.{field.name}", "{field.name}{unit}"'
-    return f"{{ size = {field.size}, field = keep(ProtoField.{kind}({name})) }}"
+def _fields(fields: Iterable[Field]) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": field.name,
+            "label": f"{field.name} [{field.unit}]" if field.unit else field.name,
+            "size": field.size,
+            "kind": f"{'' if field.signed else 'u'}int{8 * field.size}",
+        }
+        for field in fields
+    ]
 
 
-def _experts() -> Iterator[str]:
-    yield (
-        'local damaged = ProtoExpert.new("miro.damaged", "Damaged", expert.group.CHECKSUM, expert.severity.WARN)'
-    )
-    yield (
-        'local unknown_content = ProtoExpert.new("miro.content", "Unknown content", '
-        "expert.group.PROTOCOL, expert.severity.WARN)"
-    )
-    yield "miro.experts = { damaged, unknown_content }"
-    yield "local PAYLOADS"
+def _shown(value: Any) -> str:
+    """A value in Lua; a list has a line for each item, numbers many to a line."""
+    if isinstance(value, list):
+        return "{\n" + "".join(f"  {_lua(item)},\n" for item in value) + "}"
+    return fill(_lua(value), 110, subsequent_indent="  ") if isinstance(value, tuple) else _lua(value)
 
 
-def _preferences() -> Iterator[str]:
-    choices = ['{ 1, "whatever makes the CRC good", 0 }']
-    choices += [f'{{ {robots}, "{robots}", {robots} }}' for robots in table.ROBOT_COUNTS]
-    text = '"Robots in the network", 0, "Decides how long a damaged frame was", '
-    yield f"miro.prefs.robots = Pref.enum({text}{{ {', '.join(choices)} }}, false)"
+def _lua(value: Any) -> str:
+    if isinstance(value, dict):
+        keys = (key if type(key) is str else f"[{key:d}]" for key in value)
+        return f"{{ {', '.join(f'{key} = {_lua(item)}' for key, item in zip(keys, value.values(), strict=True))} }}"
+    if isinstance(value, list | tuple):
+        return f"{{ {', '.join(map(_lua, value))} }}"
+    if isinstance(value, bytes):
+        return '"' + "".join(f"\\x{byte:02X}" for byte in value) + '"'
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()
 
 
 if __name__ == "__main__":
