@@ -63,7 +63,7 @@ class Editor:
     def __init__(self, debugger: Debugger) -> None:
         source, self.requests = os.pipe()
         self.answers = io.BytesIO()
-        wire = Wire(lambda size: os.read(source, size), self.answers)
+        wire = Wire(os.fdopen(source, "rb"), self.answers)
         self.adapter = Adapter(wire)
         self.adapter.use(debugger)
         self.seq = 0

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import base64
 import bisect
-from collections.abc import Callable, Collection, Iterator, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import partial
-from pathlib import Path
+from pathlib import PureWindowsPath as AnyPath
 from typing import Any
 
 from miro_exact.bad_input import BadInput, one_line
@@ -20,7 +21,7 @@ from miro_robot.image.c_types import CType
 from miro_robot.mcs51.opcodes import BITS, LENGTH, SFRS, disassemble
 from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
-from mirotwin.debug.expression import Value, children, content, expression
+from mirotwin.debug.expression import Term, Value, children, content, expression
 from mirotwin.debug.subject import launched, open_subject
 from mirotwin.debug.symbols import SIZES, Moment
 from mirotwin.debug.wire import Message, Wire
@@ -33,13 +34,14 @@ CAPABILITIES = (
 _WITHOUT_A_RUN = ("initialize", "launch", "disconnect", "terminate")
 _WHILE_IT_RUNS = (
     "threads", "setBreakpoints", "setFunctionBreakpoints", "setInstructionBreakpoints", "setDataBreakpoints",
-    "setExceptionBreakpoints", "dataBreakpointInfo",
+    "dataBreakpointInfo",
 )  # fmt: skip
 _MOVES = {
     "continue": "continue", "reverseContinue": "rcontinue", "next": "next", "stepBack": "rnext", "stepIn": "step",
     "stepOut": "finish",
 }  # fmt: skip
 _MOST_FRAMES = 1000
+_IN_BRACES = re.compile(r"\{(.*?)\}")
 _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
 _REASONS = {
     "breakpoint": "breakpoint", "begin": "entry", "case": "exception", "firmware": "exception", "goto": "goto",
@@ -59,7 +61,7 @@ class Adapter:
         self.console: Console
         self.began = False
         self.kinds: dict[str, list[int]] = {}  # numbers of breakpoints; those of lines by file
-        self.children: list[list[tuple[str, Shown]]] = []
+        self.children: list[dict[str, Shown]] = []
         self.paused = self.changed = self.ended = False
         self.run_after: Callable[[], object] | None = None
         self.begin: Callable[[], object] = lambda: None
@@ -129,7 +131,7 @@ class Adapter:
 
     def _at_first_line(self, why: str) -> str:
         """Goes on from reset to the first line of C: an editor shows nothing of what is before. Why it stopped."""
-        if why != "begin" or self.its.timeline.tick or not self.its.symbols.line_begins:
+        if why != "begin" or self.timeline.tick or not self.symbols.line_begins:
             return why
         found = self.its.step("into")
         return why if found == STEPPED else found
@@ -137,7 +139,9 @@ class Adapter:
     def use(self, debugger: Debugger) -> None:
         """From now on it answers for this one."""
         self.its = debugger
-        self.its.timeline.interrupted = self._interrupted
+        self.symbols = debugger.symbols
+        self.timeline = debugger.timeline
+        self.timeline.interrupted = self._interrupted
         self.console = Console(debugger)
         self.began = True
 
@@ -154,11 +158,11 @@ class Adapter:
 
     def on_setBreakpoints(self, given: Message) -> Message:
         path = given["source"].get("path") or given["source"].get("name") or ""
-        places = self.its.symbols.at_line
-        return self._set(f"breakpoint in {path}", given, lambda one: places(path, one["line"])[0])
+        at_line = self.symbols.at_line
+        return self._set(f"breakpoint in {path}", given, lambda one: at_line(path, one["line"])[0])
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
-        return self._set("function breakpoint", given, lambda one: self.its.symbols.at(one["name"])[0])
+        return self._set("function breakpoint", given, lambda one: self.symbols.at(one["name"])[0])
 
     def on_setInstructionBreakpoints(self, given: Message) -> Message:
         def address(one: Message) -> list[int]:
@@ -173,9 +177,6 @@ class Adapter:
 
         return self._set("data breakpoint", given, value)
 
-    def on_setExceptionBreakpoints(self, given: Message) -> Message:
-        return {"breakpoints": []}
-
     def _set(self, kind: str, given: Message, place: Callable[[Message], Collection[int] | Value]) -> Message:
         """All breakpoints of a kind, which replace those before. `place`: where one is, or what it watches."""
         there, before = self.its.breakpoints, self.kinds.get(kind, ())
@@ -184,8 +185,15 @@ class Adapter:
         self.changed = True
         found = []
         for one in given.get("breakpoints") or ():
+            asked = one.get("condition") or "", one.get("hitCondition") or ""
             try:
-                made = self._made(one, place(one))
+                log = _logged(one["logMessage"]) if one.get("logMessage") else None
+                where = place(one)
+                if isinstance(where, Value):
+                    made = self.its.watch(one["dataId"], *asked, where)
+                else:
+                    made = self.its.add("", where, *asked)
+                made.log = log
             except _UNUSABLE as error:
                 found.append({"verified": False, "message": str(error)})
                 continue
@@ -193,21 +201,12 @@ class Adapter:
             found.append({"verified": True, "id": made.number, **self._where(made, one.get("line"))})
         return {"breakpoints": found}
 
-    def _made(self, one: Message, place: Collection[int] | Value) -> Breakpoint:
-        asked = one.get("condition") or "", one.get("hitCondition") or ""
-        log = _logged(one["logMessage"]) if one.get("logMessage") else None
-        if isinstance(place, Value):
-            return self.its.watch(one["dataId"], *asked, place)
-        made = self.its.add("", place, *asked)
-        made.log = log
-        return made
-
     def _where(self, made: Breakpoint, asked: int | None) -> Message:
         """Where a breakpoint stands that was asked for in a line, and whether it was moved."""
         if made.written is not None:
             return {}
         address = min(made.addresses)
-        line = self.its.symbols.line(address)
+        line = self.symbols.line(address)
         at = {"instructionReference": f"{address:#06x}", "line": None if line is None else line.line}
         moved = asked is not None and asked != at["line"]
         return {**at, "message": "the line has no code: the next one that has some"} if moved else at
@@ -216,7 +215,7 @@ class Adapter:
         name = given["name"]
         try:
             if given.get("variablesReference"):
-                value = dict(self.children[given["variablesReference"] - 1])[name]()
+                value = self.children[given["variablesReference"] - 1][name]()
             else:
                 value = expression(name)(self._moment(given.get("frameId")))
             written = self.its.bytes_of(name, value)
@@ -229,10 +228,10 @@ class Adapter:
     # Running
 
     def _move(self, command: str, given: Message) -> Message | None:
-        timeline, thread = self.its.timeline, self._thread(given)
-        if thread != timeline.focus:
-            timeline.focus = thread
-            timeline.go_to(timeline.tick)
+        thread = self._thread(given)
+        if thread != self.timeline.focus:
+            self.timeline.focus = thread
+            self.timeline.go_to(self.timeline.tick)
         by_instruction = given.get("granularity") == "instruction"
         self.run_after = partial(self._go, _MOVES[command], by_instruction)
         return {"allThreadsContinued": True} if command == "continue" else None
@@ -242,7 +241,7 @@ class Adapter:
         self.run_after = self.run_after or partial(self._stopped, "interrupted")
 
     def _thread(self, given: Message) -> int:
-        threads, asked = range(1, len(self.its.timeline.cores) + 1), given["threadId"]
+        threads, asked = range(1, len(self.timeline.cores) + 1), given["threadId"]
         if asked not in threads:
             raise BadInput("", f"thread {asked}", "there is no such robot")
         return threads.index(asked)
@@ -294,7 +293,7 @@ class Adapter:
             reason=kind.partition(" in ")[0] or _REASONS.get(word, "pause"),
             description=text or why,
             text=text or None,
-            threadId=self.its.timeline.focus + 1,
+            threadId=self.timeline.focus + 1,
             allThreadsStopped=True,
             hitBreakpointIds=[number] if kind else None,
         )
@@ -302,12 +301,12 @@ class Adapter:
     # Looking
 
     def on_threads(self, given: Message) -> Message:
-        cores = enumerate(self.its.timeline.cores, 1)
+        cores = enumerate(self.timeline.cores, 1)
         return {"threads": [{"id": at, "name": core.name} for at, core in cores]}
 
     def on_stackTrace(self, given: Message) -> Message:
-        thread, symbols = self._thread(given), self.its.symbols
-        frames = symbols.unwinder.frames(self.its.timeline.cores[thread].cpu)
+        thread, symbols = self._thread(given), self.symbols
+        frames = symbols.unwinder.frames(self.timeline.cores[thread].cpu)
         found: list[Message] = []
         for at, (frame, place) in enumerate(zip(frames, symbols.unwinder.places(frames), strict=True)):
             name = symbols.function(place) + (" (interrupt)" if frame.by_interrupt else "")
@@ -319,46 +318,52 @@ class Adapter:
         if not frames[-1].known:
             label = {"id": 0, "name": "the stack cannot be told from here on", "presentationHint": "label"}
             found.append({**label, "line": 0, "column": 0})
-        return {"stackFrames": _part(found, given, "startFrame", "levels"), "totalFrames": len(found)}
+        return {"stackFrames": found, "totalFrames": len(found)}
 
     def _place(self, address: int, key: str) -> Message:
         """The source and the line of an instruction; nothing where none is known."""
-        line = self.its.symbols.line(address)
+        line = self.symbols.line(address)
         if line is None:
             return {}
-        path = self.its.symbols.sources.path(line.file)
-        source = {"name": Path(line.file).name, "path": None if path is None else f"{path.resolve()}"}
+        path = self.symbols.sources.path(line.file)
+        source = {"name": AnyPath(line.file).name, "path": None if path is None else f"{path.resolve()}"}
         return {key: source, "line": line.line}
 
     def _moment(self, frame_id: int | None) -> Moment:
-        thread, frame = divmod(frame_id - 1, _MOST_FRAMES) if frame_id else (self.its.timeline.focus, 0)
-        return Moment(self.its.symbols, self.its.timeline.cores[thread], frame)
+        thread, frame = divmod(frame_id - 1, _MOST_FRAMES) if frame_id else (self.timeline.focus, 0)
+        return Moment(self.symbols, self.timeline.cores[thread], frame)
 
     def on_scopes(self, given: Message) -> Message:
-        moment, symbols = self._moment(given["frameId"]), self.its.symbols
-        line = symbols.line(moment.pc)
-        scopes: list[tuple[str, str, Any]] = [("Locals", "locals", dict(moment.locals()).items())]
+        moment = self._moment(given["frameId"])
+        line = self.symbols.line(moment.pc)
+        scopes: list[tuple[str, str | None, Iterable[tuple[str, Shown]]]] = [
+            ("Locals", "locals", moment.locals().items())
+        ]
         if line is not None:
-            file = Path(line.file).stem
-            scopes.append((f"Statics of {file}.c", "", _placed(moment, file)))
-        scopes.append(("Globals", "globals", _placed(moment, "")))
-        scopes.append(("Registers", "registers", _named(moment, _REGISTERS)))
-        scopes.append(("Special function registers", "registers", _named(moment, SFRS)))
+            file = AnyPath(line.file).stem
+            scopes.append((f"Statics of {file}.c", None, moment.variables(file).items()))
+        scopes.append(("Globals", "globals", moment.variables("").items()))
+        for title, names in (("Registers", _REGISTERS), ("Special function registers", SFRS)):
+            scopes.append((title, "registers", [(name, partial(moment.find, name, "")) for name in names]))
         if moment.core.board is not None:
             for side, chip in children(moment.find("lm629", "")):
-                scopes.append((f"LM629 {side}", "", children(chip())))
-            scopes.append(("Radio", "", self._radio()))
-        scopes.append(("Pins", "", children(moment.find("pins", ""))))
+                scopes.append((f"LM629 {side}", None, children(chip())))
+            scopes.append(("Radio", None, self._radio()))
+        scopes.append(("Pins", None, children(moment.find("pins", ""))))
         found = []
-        for name, hint, values in scopes:
-            self.children.append(list(values))
-            kept = {"variablesReference": len(self.children), "expensive": False}
-            found.append({"name": name, "presentationHint": hint or None, **kept})
+        for title, hint, values in scopes:
+            kept = {"variablesReference": self._kept(values), "expensive": False}
+            found.append({"name": title, "presentationHint": hint, **kept})
         return {"scopes": found}
+
+    def _kept(self, values: Iterable[tuple[str, Shown]]) -> int:
+        """The reference by which these are asked for until the next stop."""
+        self.children.append(dict(values))
+        return len(self.children)
 
     def _radio(self) -> Iterator[tuple[str, Shown]]:
         """The last frames on the air of this robot's network, the latest first."""
-        for event in self.its.timeline.radio_events()[:-9:-1]:
+        for event in self.timeline.radio_events()[:-9:-1]:
             text = str(event).partition(": ")[2]
             yield self.console.time(event.tick, 0).split()[0], partial(Value, number=text)
 
@@ -366,26 +371,27 @@ class Adapter:
         reference = given["variablesReference"]
         if not 0 < reference <= len(self.children):
             raise BadInput("", f"reference {reference}", "is of a moment that is left")
-        part = _part(self.children[reference - 1], given, "start", "count")
-        return {"variables": [{"name": name, **self._shown(get)} for name, get in part]}
+        there = self.children[reference - 1]
+        return {"variables": [{"name": name, **self._shown(get)} for name, get in there.items()]}
 
     def _shown(self, get: Shown, key: str = "value") -> Message:
         """A value; one that is not live says so in its place."""
         try:
             value = get()
-            inner = _inner(value)
-            whole = content(value, self.its.moment())
+            whole = content(value)
         except BadInput as error:
             return {key: str(error), "variablesReference": 0}
+        inner = _inner(value)
         text = shown_value(whole) if not inner or isinstance(whole, int) else str(value.kind or "")
-        if inner:
-            self.children.append(inner)
-        placed = value.kind is not None and value.space in SIZES
+        place = None
+        if value.moment is not None and value.space in SIZES:
+            thread = self.timeline.cores.index(value.moment.core)
+            place = f"{thread}:{value.space}:{value.address:#x}"
         return {
             key: text + (f"   ({value.note})" if value.note else ""),
-            "variablesReference": len(self.children) if inner else 0,
+            "variablesReference": self._kept(inner) if inner else 0,
             "type": None if value.kind is None else str(value.kind),
-            "memoryReference": f"{value.space}:{value.address:#x}" if placed else None,
+            "memoryReference": place,
         }
 
     def on_evaluate(self, given: Message) -> Message:
@@ -393,9 +399,9 @@ class Adapter:
         if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, "result")
-        before, self.paused, self.changed = self.its.timeline.tick, False, False
+        before, self.paused, self.changed = self.timeline.tick, False, False
         self.console.do(text)
-        if self.its.timeline.tick != before:
+        if self.timeline.tick != before:
             self.run_after = partial(self._stopped, "goto")
         if self.console.ended:
             self.on_terminate(given)
@@ -403,19 +409,20 @@ class Adapter:
 
     def on_completions(self, given: Message) -> Message:
         begun = given["text"][: given["column"] - 1].split(" ")[-1]
-        words = sorted({*VERBS, *self.its.symbols.known_names()})
+        words = sorted({*VERBS, *self.symbols.known})
         return {"targets": [{"label": word} for word in words if word.startswith(begun)]}
 
     def on_readMemory(self, given: Message) -> Message:
-        space, _, place = given["memoryReference"].rpartition(":")
+        thread, space, place = ["0", "code", *given["memoryReference"].split(":")][-3:]
+        moment = Moment(self.symbols, self.timeline.cores[int(thread)])
         first = int(place, 16) + (given.get("offset") or 0)
-        begin, end = max(first, 0), min(first + given["count"], SIZES[space or "code"])
-        data = self.its.moment().read(space or "code", begin, end - begin) if begin < end else b""
+        begin, end = max(first, 0), min(first + given["count"], SIZES[space])
+        data = moment.read(space, begin, end - begin) if begin < end else b""
         text, missing = base64.b64encode(data).decode(), given["count"] - len(data)
         return {"address": f"{begin:#x}", "data": text, "unreadableBytes": missing or None}
 
     def on_disassemble(self, given: Message) -> Message:
-        known = sorted(self.its.symbols.instructions)
+        known = sorted(self.symbols.instructions)
         address = int(given["memoryReference"], 16) + (given.get("offset") or 0)
         at = bisect.bisect_left(known, address) + (given.get("instructionOffset") or 0)
         wanted = range(at, at + min(given["instructionCount"], SIZES["code"]))
@@ -425,48 +432,29 @@ class Adapter:
         if not 0 <= index < len(known):
             address = "0x0000" if index < 0 else "0xffff"
             return {"address": address, "instruction": "no code", "presentationHint": "invalid"}
-        symbols, at = self.its.symbols, known[index]
+        symbols, at = self.symbols, known[index]
         code = symbols.image.code
         place = self._place(at, "location") if at in symbols.line_begins else {}
         data, text = code[at : at + LENGTH[code[at]]].hex(" "), disassemble(code, at, symbols.names)
         return {"address": f"{at:#06x}", "instructionBytes": data, "instruction": text, **place}
 
 
-def _part(found: list[Any], given: Message, start: str, count: str) -> list[Any]:
-    first = given.get(start) or 0
-    return found[first : first + (given.get(count) or len(found))]
-
-
 def _inner(value: Value) -> list[tuple[str, Shown]]:
     """Members and elements; of a special function register its bits."""
     if value.space == "sfr" and value.kind is not None and value.kind.size == 1:
         bits = [(name, bit) for name, bit in BITS.items() if bit & 0xF8 == value.address]
-        return [(name, partial(Value, CType("bit", 1), "bit", bit)) for name, bit in bits]
+        return [(name, partial(Value, CType("bit", 1), "bit", bit, value.moment)) for name, bit in bits]
     return children(value)
-
-
-def _placed(moment: Moment, scope: str) -> list[tuple[str, Shown]]:
-    """Variables of a file, or "" of all."""
-    found = [(one.name, partial(moment.placed, one)) for one in moment.symbols.variables_in(scope)]
-    return sorted(found, key=lambda one: one[0])
-
-
-def _named(moment: Moment, names: Sequence[str] | dict[str, int]) -> list[tuple[str, Shown]]:
-    return [(name, partial(moment.find, name, "")) for name in names]
 
 
 def _logged(text: str) -> Callable[[Moment], str]:
     """A message with its `{expressions}` as values. Raises NoValue."""
-    pieces = text.replace("}", "{").split("{")
-    terms = [expression(piece) for piece in pieces[1::2]]
+    terms = {one: expression(one) for one in _IN_BRACES.findall(text)}
 
-    def said(moment: Moment) -> str:
-        values = []
-        for term in terms:
-            try:
-                values.append(shown_value(content(term(moment), moment)))
-            except BadInput as error:
-                values.append(f"<{error}>")
-        return "".join(plain + value for plain, value in zip(pieces[::2], [*values, ""], strict=False))
+    def value(term: Term, moment: Moment) -> str:
+        try:
+            return shown_value(content(term(moment)))
+        except BadInput as error:
+            return f"<{error}>"
 
-    return said
+    return lambda moment: _IN_BRACES.sub(lambda found: value(terms[found[1]], moment), text)

@@ -5,10 +5,10 @@ What it prints of a moment is a time that `goto` takes, why it stopped, the plac
 
 from __future__ import annotations
 
+import re
 import shlex
 import signal
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any
 
 from miro_exact.bad_input import BadInput
@@ -19,13 +19,12 @@ from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from miro_sim.world.conditions import CONDITIONS
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.expression import Value, children, content, expression
-from mirotwin.debug.symbols import Moment
-from mirotwin.rerun.inspected_run import RobotRun
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.times import TimeType
 
 PROMPT = "(mirotwin) "
 LINES_AROUND = 5
+_HEX = re.compile("0[xX][0-9a-fA-F]+")
 MOVES = {
     "continue": "to the next breakpoint",
     "finish": "to the caller",
@@ -143,18 +142,16 @@ class Console:
             raise BadInput("", rest, str(error)) from None
         if name not in CONDITIONS:
             raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
-        run = self.timeline.run
-        if not isinstance(run, RobotRun):
+        core, kind = self.timeline.core, CONDITIONS[name]
+        if core.board is None:
             what = "is a condition of a robot's world"
             raise BadInput("", name, what, "stop the bare processor by breakpoints")
-        given: dict[str, Any] = {}
-        fields = CONDITIONS[name].__struct_fields__
-        if "slot" in fields:
-            robot = self.timeline.robots[self.timeline.focus]
-            given = {"network": robot.network, "slot": robot.slot}
-        given |= {key: _plain(value) for key, _, value in (word.partition("=") for word in keys)}
+        fields = kind.__struct_fields__
+        given: dict[str, Any] = {"network": core.network, **({"slot": core.slot} if "slot" in fields else {})}
+        for key, _, value in (word.partition("=") for word in keys):
+            given[key] = int(value, 16) if _HEX.fullmatch(value) else value
         try:
-            event = self.timeline.until(struct_of(given, CONDITIONS[name], strict=False))
+            event = self.timeline.until(struct_of(given, kind, strict=False))
         except TomlError as error:
             raise BadInput(f"until {name}", error.place, error.what, error.remedy) from None
         except ValueError as error:
@@ -217,8 +214,7 @@ class Console:
             self.tell("    the stack cannot be told from here on")
 
     def _print(self, rest: str) -> None:
-        moment = self.debugger.moment(self.frame)
-        for line in _lines_of(rest, expression(rest)(moment), moment):
+        for line in _lines_of(rest, expression(rest)(self.debugger.moment(self.frame))):
             self.tell(line)
 
     def _list(self, rest: str) -> None:
@@ -246,14 +242,14 @@ class Console:
         self.ended = True
 
 
-def _lines_of(name: str, value: Value, moment: Moment) -> Iterator[str]:
+def _lines_of(name: str, value: Value) -> Iterator[str]:
     """A value as text: groups a line a member."""
     if value.members is None:
         note = f"   ({value.note})" if value.note else ""
-        yield f"{name} = {shown_value(content(value, moment))}{note}"
+        yield f"{name} = {shown_value(content(value))}{note}"
     else:
         for part, get in children(value):
-            yield from _lines_of(f"{name}.{part}", get(), moment)
+            yield from _lines_of(f"{name}.{part}", get())
 
 
 def shown_value(found: Any) -> str:
@@ -261,10 +257,3 @@ def shown_value(found: Any) -> str:
     if isinstance(found, bool) or not isinstance(found, int) or -10 < found < 10:
         return str(found)
     return f"{found} ({found:#x})"
-
-
-def _plain(text: str) -> Any:
-    """What a key of a condition is given: a number, true, false, or text."""
-    with suppress(ValueError):
-        return int(text, 0)
-    return {"true": True, "false": False}.get(text, text)

@@ -6,7 +6,6 @@ import os
 import socket
 import sys
 from contextlib import redirect_stdout, suppress
-from functools import partial
 from typing import Annotated, TextIO
 
 import click
@@ -52,7 +51,8 @@ def debug(options: DebugOptions) -> int:
     if options.dap:
         sink = sys.stdout.buffer
         with redirect_stdout(sys.stderr):  # what anything prints must not get between the messages
-            return _serve(Wire(partial(os.read, _stdin("connect to --listen").fileno()), sink))
+            source = os.fdopen(_stdin("connect to --listen").fileno(), "rb", closefd=False)
+            return _serve(Wire(source, sink))
     if not options.subject:
         raise click.UsageError("Missing argument 'SUBJECT'.")
     debugger, said, why = open_subject(options)
@@ -79,7 +79,7 @@ def _listen(port: int) -> int:
     except OSError as error:
         raise BadInput("--listen", str(port), str(error.strerror), "choose another port") from None
     with client, client.makefile("wb") as sink:
-        return _serve(Wire(client.recv, sink))
+        return _serve(Wire(client.makefile("rb"), sink))
 
 
 def _serve(wire: Wire) -> int:
@@ -121,7 +121,7 @@ def _complete(console: Console) -> None:
         import readline
     except ImportError:  # not on every system
         return
-    names = console.symbols.known_names()
+    names = console.symbols.known
 
     def offer(text: str, state: int) -> str | None:
         words = names if " " in readline.get_line_buffer().lstrip() else VERBS

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from typing import Literal, NamedTuple
 
 import msgspec
@@ -18,7 +19,7 @@ from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, SFRS, is_call
-from mirotwin.debug.expression import NoValue, Term, Value, expression, names_in, number
+from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
 from mirotwin.rerun.inspected_run import RobotRun
@@ -102,13 +103,10 @@ class Debugger:
         if not all(0 <= address < SIZES["code"] for address in addresses):
             raise BadInput("", "breakpoint", "is beyond the last code address", "use 0x0000 to 0xffff")
         self._numbers += 1
-        term = expression(condition) if condition else None
-        self.symbols.check_names(names_in(condition))
-        found = Breakpoint(
-            self._numbers, text, frozenset(addresses), term, _counting(count) if count else None
-        )
-        self.breakpoints.append(found)
-        return found
+        term = expression(condition, self.symbols.known) if condition else None
+        counts = _counting(count) if count else None
+        self.breakpoints.append(Breakpoint(self._numbers, text, frozenset(addresses), term, counts))
+        return self.breakpoints[-1]
 
     def watch(
         self, text: str, condition: str = "", count: str = "", place: Value | None = None
@@ -136,13 +134,12 @@ class Debugger:
 
     def _writers(self, written: Bytes) -> Collection[int]:
         """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""
-        run, unwinder = self.timeline.run, self.symbols.unwinder
-        if not isinstance(run, RobotRun) and run.machine.bus.code_of is not None:
+        if self.timeline.code_in_ram:
             return self.timeline.everywhere
         first, last = self.symbols.image.symbols.stack
         on_stack = written.first <= last and written.end > first
         found = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
-        return found | unwinder.vectors if written.space == "iram" and on_stack else found
+        return found | self.symbols.unwinder.vectors if written.space == "iram" and on_stack else found
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
@@ -176,7 +173,11 @@ class Debugger:
     def _is_met(self, one: Breakpoint, core: Core) -> bool:
         if one.written is not None and not self._writes(one.written, core.cpu):
             return False
-        return one.condition is None or _holds(one.condition, Moment(self.symbols, core))
+        if one.condition is None:
+            return True
+        with suppress(BadInput):  # where it has no value, it is not true
+            return bool(number(one.condition(Moment(self.symbols, core))))
+        return False
 
     def _stops(self, one: Breakpoint, core: Core, silent: bool) -> bool:
         if not self._is_met(one, core):
@@ -212,7 +213,11 @@ class Debugger:
 
     def go_on(self, back: bool = False) -> str:
         """To the next breakpoint, or the one before."""
-        return self._back() if back else self._forward()
+        if not back:
+            return self._forward()
+        self._count_hits()
+        hit = self.timeline.find_back(self._traps(silent=True))
+        return self._at_begin() if hit is None else _named(hit)
 
     def go_to(self, tick: int) -> str:
         """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
@@ -243,11 +248,6 @@ class Debugger:
             return self._at_end() or INTERRUPTED
         self.told = [one for one in self.told if one[:2] <= hit[:2]]
         return _named(hit)
-
-    def _back(self) -> str:
-        self._count_hits()
-        hit = self.timeline.find_back(self._traps(silent=True))
-        return self._at_begin() if hit is None else _named(hit)
 
     def _at_begin(self) -> str:
         return INTERRUPTED if self.timeline.tick > self.timeline.begin_tick else BEGINS
@@ -373,14 +373,6 @@ class Debugger:
 
 def _named(hit: Hit) -> str:
     return f"breakpoint {hit.found.number}" if isinstance(hit.found, Breakpoint) else STEPPED
-
-
-def _holds(condition: Term, moment: Moment) -> bool:
-    """Whether a condition is true; where it has no value it is not."""
-    try:
-        return bool(number(condition(moment), moment))
-    except BadInput:
-        return False
 
 
 def _counting(text: str) -> Callable[[int], bool]:

@@ -2,7 +2,7 @@
 
     age >= 110 && !heard     frame[2].left     *pointer     lm629.left.real_position - start     R7 == 0x3F     P1.0
 
-An expression is read once into a function of a scope, which looks names up; so a condition costs little each time it
+An expression is read once into a function of a moment, which looks names up; so a condition costs little each time it
 is asked. Numbers do not wrap. Nothing is ever written.
 """
 
@@ -10,15 +10,18 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput, shortened
-from miro_robot.image.c_types import CType, Fields, Member, value_of
+from miro_exact.bad_input import BadInput, did_you_mean, shortened
+from miro_robot.image.c_types import CType, Fields, value_of
+
+if TYPE_CHECKING:
+    from mirotwin.debug.symbols import Moment
 
 _TOKEN = re.compile(r"\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
 _MOST_TOKENS, _MOST_SHIFT = 128, 64
@@ -37,63 +40,48 @@ class NoValue(BadInput):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """Something an expression means. `kind`, `space`, `address`: of what lies in a memory; `number`: of what does not.
+    """Something an expression means. `kind`, `space`, `address`: of what lies in a memory of `moment`.
 
-    `members`: of a group, functions by name. `note`: where it is, or why it may be stale.
+    `number`: of what does not. `members`: of a group, functions by name. `note`: where it is, or why it may be stale.
     """
 
     kind: CType | None = None
     space: str = ""
     address: int = 0
+    moment: Moment | None = None
     number: Any = None
     members: Mapping[str, Callable[[], Value]] | None = None
     fields: Fields = {}
     note: str = ""
 
 
-class Scope(Protocol):
-    """What names mean at a moment."""
-
-    def find(self, name: str, module: str) -> Value:
-        """Raises NoValue."""
-
-    def read(self, space: str, address: int, count: int) -> bytes:
-        """Bytes of a memory. Raises NoValue."""
+Term = Callable[["Moment"], Value]
+_ZERO = Value(number=0)
 
 
-Term = Callable[[Scope], Value]
-
-
-def expression(text: str) -> Term:
-    """What `text` means. Raises NoValue for what is no expression."""
-    reader = _Reader(text)
+def expression(text: str, known: Collection[str] = ()) -> Term:
+    """What `text` means. Raises NoValue for what is no expression, and for names that are not `known`, if some are."""
+    reader = _Reader(text, known)
     term = reader.binary(0)
     if reader.token:
         raise reader.refused(f"cannot be read from {reader.token!r} on")
     return term
 
 
-def names_in(text: str) -> list[str]:
-    """What an expression looks up: its names but for members."""
-    tokens = _TOKEN.findall(text)
-    names = [token.rpartition(":")[2] for at, token in enumerate(tokens) if tokens[at - 1] not in (".", "->")]
-    return [name for name in names if name.isidentifier()]
-
-
-def content(value: Value, scope: Scope) -> Any:
-    """What it holds: int, float, bool, list, dict."""
+def content(value: Value) -> Any:
+    """What it holds: int, float, bool, list, dict. Raises NoValue for bytes of a memory that is not there."""
     if value.members is not None:
-        return {name: content(get(), scope) for name, get in value.members.items()}
-    if value.kind is None or value.number is not None:
+        return {name: content(get()) for name, get in value.members.items()}
+    if value.moment is None or value.kind is None:
         return value.number
-    return value_of(value.kind, scope.read(value.space, value.address, value.kind.size), value.fields)
+    return value_of(value.kind, value.moment.read(value.space, value.address, value.kind.size), value.fields)
 
 
-def number(value: Value, scope: Scope) -> Any:
+def number(value: Value) -> Any:
     """The same of a single number; an array is its address. Raises NoValue."""
-    if value.kind is not None and value.kind.kind == "array" and value.number is None:
+    if value.kind is not None and value.kind.kind == "array":
         return value.address
-    found = content(value, scope)
+    found = content(value)
     if not isinstance(found, int | float):
         raise NoValue("is no single number", "name one of its members or elements")
     return found
@@ -101,25 +89,24 @@ def number(value: Value, scope: Scope) -> Any:
 
 def children(value: Value) -> list[tuple[str, Callable[[], Value]]]:
     """Members and elements by name, empty for a single number."""
-    if value.members is not None:
-        return list(value.members.items())
-    if value.kind is not None and value.kind.kind == "array":
-        return [(f"[{at}]", partial(_element, value, at)) for at in range(value.kind.count)]
-    return [(field.name, partial(_member, value, field.name)) for field in _fields(value)]
+    kind = value.kind
+    if value.members is not None or kind is None:
+        return list((value.members or {}).items())
+    if kind.kind == "array":
+        return [(f"[{at}]", partial(_element, value, at)) for at in range(kind.count)]
+    fields = value.fields.get(kind.tag, ()) if kind.kind == "struct" else ()
+    return [(one.name, partial(_part, value, one.type, one.offset)) for one in fields]
 
 
-def _fields(value: Value) -> tuple[Member, ...]:
-    return value.fields.get(value.kind.tag, ()) if value.kind and value.kind.kind == "struct" else ()
+def _part(value: Value, kind: CType, offset: int) -> Value:
+    return msgspec.structs.replace(value, kind=kind, address=value.address + offset)
 
 
 def _member(value: Value, name: str) -> Value:
-    if value.members is not None and name in value.members:
-        return value.members[name]()
-    for field in _fields(value):
-        if field.name == name:
-            return msgspec.structs.replace(value, kind=field.type, address=value.address + field.offset)
-    there = [*(value.members or ()), *(field.name for field in _fields(value))]
-    raise NoValue(f"has no member {name}", f"it has {', '.join(there)}" if there else "")
+    there = {} if value.kind is not None and value.kind.kind == "array" else dict(children(value))
+    if name not in there:
+        raise NoValue(f"has no member {name}", f"it has {', '.join(there)}" if there else "")
+    return there[name]()
 
 
 def _element(value: Value, index: int) -> Value:
@@ -128,17 +115,15 @@ def _element(value: Value, index: int) -> Value:
         raise NoValue("is no array and no pointer")
     if not 0 <= index < kind.count:
         raise NoValue(f"[{index}] is outside of {kind}", f"give 0 to {kind.count - 1}")
-    part = None if value.number is None else value.number[index]
-    address = value.address + index * kind.element.size
-    return msgspec.structs.replace(value, kind=kind.element, address=address, number=part)
+    return _part(value, kind.element, index * kind.element.size)
 
 
-def _pointed(value: Value, scope: Scope, index: int) -> Value:
+def _pointed(value: Value, index: int) -> Value:
     """What a pointer points to, or so many elements after it; of an array its element."""
     kind = value.kind
     if kind is None or kind.kind != "pointer":
         return _element(value, index)
-    address = number(value, scope)
+    address = number(value)
     space = MEMORY_OF_POINTER.get(kind.tag) or _GENERIC.get(address >> 16, "")
     element = kind.element
     if element is not None and element.kind == "struct":
@@ -148,7 +133,7 @@ def _pointed(value: Value, scope: Scope, index: int) -> Value:
         raise NoValue(
             f"points to {address:#x}, and no debug file says to what", "name a memory: iram[..], xram[..]"
         )
-    return Value(element, space, (address & 0xFFFF) + index * element.size, fields=value.fields)
+    return Value(element, space, (address & 0xFFFF) + index * element.size, value.moment, fields=value.fields)
 
 
 def _divided(left: Any, right: Any) -> Any:
@@ -180,9 +165,9 @@ _SIGNS: dict[str, Callable[..., Any]] = {
 def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
     """An operator's value of those of its operands."""
 
-    def applied(scope: Scope) -> Value:
+    def applied(moment: Moment) -> Value:
         try:
-            found = apply(*(number(term(scope), scope) for term in terms))
+            found = apply(*(number(term(moment)) for term in terms))
             float(found)  # so that numbers do not grow without end
         except TypeError:
             raise NoValue(f"{sign} is for whole numbers") from None
@@ -196,9 +181,9 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
 def _either(stops: bool, left: Term, right: Term) -> Term:
     """`||` (stops where the left side is true) and `&&`."""
 
-    def either(scope: Scope) -> Value:
-        found = bool(number(left(scope), scope))
-        return Value(number=int(found if found == stops else bool(number(right(scope), scope))))
+    def either(moment: Moment) -> Value:
+        found = bool(number(left(moment)))
+        return Value(number=int(found if found == stops else bool(number(right(moment)))))
 
     return either
 
@@ -212,8 +197,9 @@ def _address(value: Value) -> Value:
 class _Reader:
     """Reads one expression, token by token."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, known: Collection[str]) -> None:
         self.text = text
+        self.known = known
         self.tokens = _TOKEN.findall(text)
         if len(self.tokens) > _MOST_TOKENS:
             raise self.refused("is too long")
@@ -253,9 +239,9 @@ class _Reader:
         self.take()
         term = self.unary()
         if sign == "*":
-            return _indexed(term, lambda scope: Value(number=0))
+            return _indexed(term, lambda moment: _ZERO)
         if sign == "&":
-            return lambda scope: _address(term(scope))
+            return lambda moment: _address(term(moment))
         return _applied(_SIGNS[sign], sign, term)
 
     def postfix(self, term: Term) -> Term:
@@ -265,7 +251,7 @@ class _Reader:
                 term = _indexed(term, self.binary(0))
                 self.expect("]")
             else:
-                target = _indexed(term, lambda scope: Value(number=0)) if how == "->" else term
+                target = _indexed(term, lambda moment: _ZERO) if how == "->" else term
                 term = _member_of(target, self.take())
         return term
 
@@ -277,11 +263,13 @@ class _Reader:
             return term
         module, _, name = token.rpartition(":")
         if name.isidentifier():
-            return lambda scope: scope.find(name, module)
+            if self.known and name not in self.known:
+                raise NoValue(f"there is no {name}", did_you_mean(name, self.known))
+            return lambda moment: moment.find(name, module)
         constant = Value(number=_constant(token))
         if constant.number is None:
             raise self.refused(f"lacks a name or a number{f' before {token}' if token else ''}")
-        return lambda scope: constant
+        return lambda moment: constant
 
 
 def _constant(token: str) -> int | float | None:
@@ -294,13 +282,13 @@ def _constant(token: str) -> int | float | None:
 
 
 def _indexed(term: Term, index: Term) -> Term:
-    return lambda scope: _pointed(term(scope), scope, number(index(scope), scope))
+    return lambda moment: _pointed(term(moment), number(index(moment)))
 
 
 def _member_of(term: Term, name: str) -> Term:
     """A member, or by a number a bit."""
     if not name.isdecimal():
-        return lambda scope: _member(term(scope), name)
+        return lambda moment: _member(term(moment), name)
     if int(name) > 31:
         raise NoValue(f"has no bit {name}")
     return _applied(lambda bits: bits >> int(name) & 1, f".{name}", term)

@@ -148,7 +148,7 @@ def _judge(job: Job, timeline: Timeline) -> CaseVerdict:
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
     place = (failure.network, failure.slot if slot is None else slot)
-    places = [(robot.network, robot.slot) for robot in timeline.robots]
+    places = [(core.network, core.slot) for core in timeline.cores]
     timeline.focus = places.index(place) if place in places else timeline.focus
     timeline.go_to(failure.tick)
 

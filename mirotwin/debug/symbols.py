@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from functools import partial
 from operator import attrgetter
+from pathlib import PureWindowsPath as AnyPath
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import CYCLE_TICKS
@@ -37,7 +38,7 @@ _CHIP = {
 
 
 class Symbols:
-    """Of one image. Raises ImageError where a debug file beside it is another image's."""
+    """Of one image. `known`: names, for completion and remedies. Raises ImageError for debug files of another image."""
 
     def __init__(self, image: Image, sources: Sources) -> None:
         self.image = image
@@ -53,6 +54,9 @@ class Symbols:
         functions = [first for first, _ in self.names.functions]
         known = [*self.unwinder.heights, *self.line_begins, *functions]
         self.instructions = instructions_of(image.code, image.used, known)
+        names = [*image.symbols.names, *(name.removeprefix("_") for name in image.symbols.names)]
+        names += [*self.variables.by_name, *(one.name for one in self.blocks.variables)]
+        self.known = sorted({*names, *SPECIAL, *SFRS, *BITS, *SIZES})
 
     # Places
 
@@ -65,22 +69,22 @@ class Symbols:
         line = self.line(address)
         if line is None:
             return f"{address:#06x} in {self.names.place(address)}"
-        return f"{_name(line.file)}:{line.line} in {self.function(address)}"
+        return f"{AnyPath(line.file).name}:{line.line} in {self.function(address)}"
 
     def entry(self, address: int) -> int:
         """Where the function of the instruction begins."""
-        found = self.debug.function_at(address)
-        return self.names.function(address)[0] if found is None else found.first
+        return self.names.function(address)[0]
 
     def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
         """Where the code of a line begins, in each function that has some, or that of the next line that has any.
 
         Raises BadInput.
         """
-        own = [(place, address) for address, place in self.debug.lines if _name(place.file) == _name(file)]
-        what = f"{_name(file)}:{line}"
+        name = AnyPath(file).name
+        own = [(place, address) for address, place in self.debug.lines if AnyPath(place.file).name == name]
+        what = f"{name}:{line}"
         if not own:
-            files = ", ".join(sorted({_name(place.file) for place in self.line_begins.values()}))
+            files = ", ".join(sorted({AnyPath(place.file).name for place in self.line_begins.values()}))
             remedy = f"the files are {files}" if files else "give an address: the image has no debug files"
             raise BadInput("", what, "no code is of this file", remedy)
         place = min((place for place, _ in own if place.line >= line), default=None, key=lambda one: one.line)
@@ -106,22 +110,11 @@ class Symbols:
     # Names
 
     def variables_in(self, scope: str) -> list[Variable]:
-        """What has a place in memory and belongs to a function or a file; "": to all."""
-        every = [one for each in self.variables.by_name.values() for one in each if one.scope == scope]
+        """What has a place in memory and belongs to a function or a file; "": to all. By name."""
+        every = [
+            one for _, each in sorted(self.variables.by_name.items()) for one in each if one.scope == scope
+        ]
         return [one for one in every if scope or one.space in ("iram", "xram", "code")]
-
-    def known_names(self) -> list[str]:
-        """For completion and remedies."""
-        symbols = (name.removeprefix("_") for name in self.image.symbols.names)
-        in_registers = (one.name for one in self.blocks.variables)
-        return [*symbols, *self.variables.by_name, *in_registers, *SPECIAL, *SFRS, *BITS, *SIZES]
-
-    def check_names(self, names: Sequence[str]) -> None:
-        """Raises NoValue for one that means nothing anywhere: what it stands in would never be true."""
-        known = {*self.known_names(), *self.image.symbols.names}
-        for name in names:
-            if name not in known:
-                raise NoValue(f"there is no {name}", did_you_mean(name, known))
 
 
 class Moment:
@@ -137,8 +130,8 @@ class Moment:
         return self.symbols.unwinder.frames(self.core.cpu)
 
     def find(self, name: str, module: str) -> Value:
-        """See `Scope`."""
-        local = None if module else dict(self.locals()).get(name)
+        """What a name means; `module`: the file that is named before it, if any. Raises NoValue."""
+        local = None if module else self.locals().get(name)
         if local is not None:
             return local()
         variable = self._variable(name, module)
@@ -150,7 +143,7 @@ class Moment:
         symbol = self.symbols.image.symbols.find(name)
         if symbol is None:
             owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
-            remedy = did_you_mean(name, self.symbols.known_names())
+            remedy = did_you_mean(name, self.symbols.known)
             if owners:
                 remedy = f"it is a local variable of {', '.join(sorted(owners))}"
             raise NoValue(f"there is no {name} here", remedy)
@@ -159,12 +152,12 @@ class Moment:
         if symbol.space == "iram":
             self._refuse_shared(name, symbol.address, name.removeprefix("_").rpartition("_PARM_")[0])
         kind = _BIT if symbol.space == "bit" else _BYTE
-        return Value(kind, symbol.space, symbol.address, note="of unknown type")
+        return Value(kind, symbol.space, symbol.address, self, note="of unknown type")
 
     def _variable(self, name: str, module: str) -> Variable | None:
         """The one of this file before that of all files. Raises NoValue where several others have it."""
         line = self.symbols.line(self.pc)
-        own = _name(line.file).partition(".")[0] if line else ""
+        own = AnyPath(line.file).stem if line else ""
         there = self.symbols.variables.by_name.get(name, ())
         fitting = [one for one in there if not module or module in (one.scope, one.module)]
         near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
@@ -178,7 +171,7 @@ class Moment:
         if variable.space == "iram" and variable.scope:
             self._refuse_shared(variable.name, variable.address, variable.scope)
         fields = self.symbols.variables.fields(variable)
-        return Value(variable.type, variable.space, variable.address, fields=fields)
+        return Value(variable.type, variable.space, variable.address, self, fields=fields)
 
     def _refuse_shared(self, name: str, address: int, function: str) -> None:
         """Raises NoValue for memory that several functions use, while this one is not under way."""
@@ -188,15 +181,18 @@ class Moment:
                 why = f"its memory is shared, and {function or 'its function'} is not under way"
                 raise NoValue(f"{name} is not live: {why}")
 
-    def locals(self) -> Iterator[tuple[str, Callable[[], Value]]]:
-        """Of the function that it stands in; what is not live raises NoValue when it is asked for. Inner ones last."""
+    def locals(self) -> dict[str, Callable[[], Value]]:
+        """Of the function that it stands in; what is not live raises NoValue when it is asked for."""
         function = self.symbols.debug.function_at(self.pc)
-        if function is not None:
-            name = function.name.removeprefix("_")
-            for variable in self.symbols.variables_in(name):
-                yield variable.name, partial(self.placed, variable)
-            for one in reversed(self.symbols.blocks.visible(name, function.first, self.pc)):
-                yield one.name, partial(self._in_registers, one)
+        if function is None:
+            return {}
+        name = function.name.removeprefix("_")
+        inner_last = reversed(self.symbols.blocks.visible(name, function.first, self.pc))
+        return self.variables(name) | {one.name: partial(self._in_registers, one) for one in inner_last}
+
+    def variables(self, scope: str) -> dict[str, Callable[[], Value]]:
+        """Those of a function or a file that have a place in memory, or "" of all."""
+        return {one.name: partial(self.placed, one) for one in self.symbols.variables_in(scope)}
 
     def _in_registers(self, one: RegisterVariable) -> Value:
         why = ""
@@ -223,13 +219,13 @@ class Moment:
         """A register, a bit, a memory, the chips."""
         cpu, board = self.core.cpu, self.core.board
         if name in SFRS or name == "A":
-            return Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name])
+            return Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name], self)
         if len(name) == 2 and name[0] == "R" and name[1] in "01234567":
-            return Value(_BYTE, "iram", cpu.bank + int(name[1]))
+            return Value(_BYTE, "iram", cpu.bank + int(name[1]), self)
         if name in BITS:
-            return Value(_BIT, "bit", BITS[name])
+            return Value(_BIT, "bit", BITS[name], self)
         if name in SIZES:
-            return Value(CType("array", SIZES[name], element=_BYTE, count=SIZES[name]), name)
+            return Value(CType("array", SIZES[name], element=_BYTE, count=SIZES[name]), name, 0, self)
         if name == "pins":
             return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
         if name == "lm629" and board is not None:
@@ -245,7 +241,7 @@ class Moment:
         return Value(number=port_pins(tap.start, port))
 
     def read(self, space: str, address: int, count: int) -> bytes:
-        """See `Scope`."""
+        """Bytes of a memory. Raises NoValue."""
         cpu = self.core.cpu
         if space == "xram":
             if self.core.board is not None:
@@ -262,7 +258,3 @@ def _chip(chip: Lm629, path: str = "") -> Value:
         return Value(number=int(attrgetter(path)(chip)))
     paths = {name: f"{path}.{name}".lstrip(".") for name in _CHIP[path].split()}
     return Value(members={name: partial(_chip, chip, inner) for name, inner in paths.items()})
-
-
-def _name(path: str) -> str:
-    return path.replace("\\", "/").rpartition("/")[2]

@@ -24,7 +24,6 @@ from miro_robot.inspect.marks import MarkInspector
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event, HostLog
-from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.shell.progress import ProgressBar
@@ -38,11 +37,13 @@ _WAKES = frozenset((0, *range(0x03, 0x34, 8)))  # where a processor that slept g
 
 
 class Core(NamedTuple):
-    """A processor of the run: of a robot, or the bare one."""
+    """A processor of the run: of a robot, or the bare one, which has no board."""
 
     name: str
     cpu: Cpu
-    board: Board | None
+    board: Board | None = None
+    network: int = 0
+    slot: int = 0
 
 
 class Hit(NamedTuple):
@@ -67,30 +68,32 @@ class _Checkpoint(NamedTuple):
 
 
 class Timeline:
-    """`run` from its start on. `interrupted` is asked between pieces: true ends a search where it is."""
+    """`run` from its start on. `interrupted` is asked between pieces: true ends a search where it is.
 
-    def __init__(
-        self, run: RobotRun | BareRun | CaseRun, interrupted: Callable[[], bool] = lambda: False
-    ) -> None:
+    `code_in_ram`: what is executed may change, and lie anywhere.
+    """
+
+    def __init__(self, run: RobotRun | BareRun | CaseRun) -> None:
         self.run = run
-        self.interrupted = interrupted
-        self.robots: list[Robot] = []
-        self.cores = [Core("processor", run.cpu, None)]
-        self.focus = 0
+        self.interrupted: Callable[[], bool] = lambda: False
+        self.cores = [Core("processor", run.cpu)]
         self._logs: list[EventLog | HostLog] = []
         self._restore: Callable[[bytes], None]
         if isinstance(run, RobotRun):
             networks = run.world.networks
-            self.robots = [robot for network in networks for robot in network.robots]
+            robots = [(one.network, one.slot, one.board) for network in networks for one in network.robots]
             self.cores = [
-                Core(f"net{one.network}/robot{one.slot}", one.board.cpu, one.board) for one in self.robots
+                Core(f"net{network}/robot{slot}", board.cpu, board, network, slot)
+                for network, slot, board in robots
             ]
-            self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
-            self._logs = [*(one.board.log for one in self.robots), *(network.log for network in networks)]
+            self._logs = [*(board.log for _, _, board in robots), *(network.log for network in networks)]
+            self.code_in_ram = False
             self.state, self._restore = run.world.state.save, run.world.go_on_from
         else:
             flat = Flat(run.machine)
+            self.code_in_ram = run.machine.bus.code_of is not None
             self.state, self._restore = flat.save, flat.load
+        self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
         self._kept: list[_Checkpoint] = []
         self.kept_bytes = 0
         self._save()
@@ -117,7 +120,7 @@ class Timeline:
     @property
     def everywhere(self) -> Collection[int]:
         """Where instructions may be."""
-        if not isinstance(self.run, RobotRun) and self.run.machine.bus.code_of is not None:
+        if self.code_in_ram:
             return range(0x10000)
         return [address for first, end in self.run.image.used for address in range(first, end)]
 
@@ -151,8 +154,8 @@ class Timeline:
         self._restore(b"".join(one.pages))
         for log, end in zip(self._logs, one.log_ends, strict=True):
             log.cut(end)
-        for robot in self.robots:
-            del robot.board.faults[robot.board.fault_count :]
+        for board in filter(None, (core.board for core in self.cores)):
+            del board.faults[board.fault_count :]
         if not isinstance(self.run, RobotRun):
             self.run.resume()
 
@@ -326,7 +329,7 @@ class Timeline:
         """Frames on the air of the network of the robot in focus, up to now."""
         if not isinstance(self.run, RobotRun):
             return []
-        log = self.run.world.networks[self.robots[self.focus].network].log
+        log = self.run.world.networks[self.core.network].log
         return [event for _, event in log.since(0, ("sent", "answer")) if event.tick <= self.tick]
 
     @contextmanager

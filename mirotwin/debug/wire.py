@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import re
 import threading
-from collections.abc import Callable
 from typing import Any, BinaryIO
 
 import msgspec
@@ -13,7 +12,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, shortened
 
 MOST_BYTES = 16 << 20
-_MOST_HEAD, _CHUNK_BYTES = 4096, 65536
+_MOST_HEAD = 4096
 _LENGTH = re.compile(rb"^Content-Length:[ \t]*([0-9]{1,9})[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
 _NULL = ("dataId",)  # what the protocol wants as null where there is none
 Message = dict[str, Any]
@@ -31,11 +30,10 @@ class Request(msgspec.Struct):
 class Wire:
     """Messages of a client, read by a thread of their own so that one that comes during a run is seen."""
 
-    def __init__(self, receive: Callable[[int], bytes], sink: BinaryIO) -> None:
-        self.receive = receive
+    def __init__(self, source: BinaryIO, sink: BinaryIO) -> None:
+        self.source = source
         self.sink = sink
         self.sequence = 0
-        self.data = b""
         self.came: queue.SimpleQueue[Message | BadInput | None] = queue.SimpleQueue()
         self.back: list[Message | BadInput | None] = []
         threading.Thread(target=self._read_all, daemon=True).start()
@@ -73,20 +71,16 @@ class Wire:
             self.came.put(found)
 
     def _read(self) -> Message | None:
-        while (end := self.data.find(b"\r\n\r\n")) < 0:
-            more = len(self.data) <= _MOST_HEAD and self.receive(_CHUNK_BYTES)
-            if not more and self.data:
-                raise _garbage(self.data, "a head that does not end")
-            if not more:
-                return None
-            self.data += more
-        found = _LENGTH.search(self.data, 0, end)
+        head = line = self.source.readline(_MOST_HEAD)
+        while line.strip() and len(head) < _MOST_HEAD:
+            line = self.source.readline(_MOST_HEAD)
+            head += line
+        if not head:
+            return None
+        found = _LENGTH.search(head)
         if found is None or int(found[1]) > MOST_BYTES:
-            raise _garbage(self.data[:end], f"a head without a Content-Length up to {MOST_BYTES >> 20} MiB")
-        begin, end = end + 4, end + 4 + int(found[1])
-        while len(self.data) < end and (more := self.receive(_CHUNK_BYTES)):
-            self.data += more
-        data, self.data = self.data[begin:end], self.data[end:]
+            raise _garbage(head, f"a head without a Content-Length up to {MOST_BYTES >> 20} MiB")
+        data = self.source.read(int(found[1]))
         try:
             request = msgspec.json.decode(data, type=Request)
         except msgspec.MsgspecError as error:

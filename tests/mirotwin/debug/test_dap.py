@@ -1,5 +1,6 @@
 """What the adapter answers to clients that ask wrongly, at the wrong time, or not at all."""
 
+import base64
 import json
 import socket
 
@@ -305,3 +306,19 @@ def test_robots_are_threads_that_stop_together(adapter, short):
         assert trace[0]["name"] == "failsafe_fresh"
         stopped.add(body["threadId"])
     assert stopped == {1, 2}
+
+
+def test_each_thread_shows_the_memory_of_its_own_robot(adapter, short):
+    _, client = adapter
+    client.begin(subject=str(short), at="100ms")
+    slots = []
+    for thread in (1, 2):
+        frame = client.ask("stackTrace", threadId=thread)["body"]["stackFrames"][0]["id"]
+        evaluated = client.ask("evaluate", expression="slot", frameId=frame)["body"]
+        scopes = client.ask("scopes", frameId=frame)["body"]["scopes"]
+        reference = next(one["variablesReference"] for one in scopes if one["name"] == "Globals")
+        named = client.ask("variables", variablesReference=reference)["body"]["variables"]
+        listed = next(one for one in named if one["name"] == "slot")
+        memory = client.ask("readMemory", memoryReference=listed["memoryReference"], count=1)["body"]["data"]
+        slots.append((evaluated["result"], listed["value"], base64.b64decode(memory)))
+    assert slots == [("0", "0", b"\0"), ("2", "2", b"\2")]

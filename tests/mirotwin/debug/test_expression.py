@@ -27,7 +27,7 @@ class Numbers:
 
 def value(text, scope=None):
     scope = scope or Numbers(a=7, b=-2, c=0)
-    return content(expression(text)(scope), scope)
+    return content(expression(text)(scope))
 
 
 @pytest.mark.parametrize(
@@ -86,8 +86,7 @@ def debugger():
 
 
 def shown(debugger, text, frame=0):
-    moment = debugger.moment(frame)
-    return content(expression(text)(moment), moment)
+    return content(expression(text)(debugger.moment(frame)))
 
 
 @pytest.mark.parametrize(

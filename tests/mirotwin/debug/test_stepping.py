@@ -238,7 +238,8 @@ def test_a_step_back_from_a_sleep_is_its_begin_and_a_step_leads_to_what_wakes():
 
 
 def test_a_search_is_interrupted_between_two_pieces():
-    timeline = Timeline(robot_run(), lambda: True)
+    timeline = Timeline(robot_run())
+    timeline.interrupted = lambda: True
     assert timeline.find({0: Trap((0x1FFF,), lambda core: True)}) is None
     assert 0 < timeline.tick < SECOND // 10
 
