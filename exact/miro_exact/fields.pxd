@@ -1,4 +1,9 @@
 # C layout of miro_exact.fields.
 
-cdef class Items:
+cdef class Kind:
+    pass
+
+
+cdef class Items(Kind):
     cdef readonly object form, code, room, bounds, ordered, made
+    cdef public object packed

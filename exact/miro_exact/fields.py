@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 from miro_exact.clock import NEVER_TICK
 
@@ -27,15 +27,30 @@ _NONE = b"\0\0\0\0"
 _ROOM = 1 << 16
 
 
-class Kind(Protocol):
-    """What every kind of field can do. `form` says in a few letters how its bytes are to be read."""
+NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY = range(6)
+"""How `memory.Attributes` packs a field; the last one is that of a `Memory`."""
 
-    form: str
 
-    def read(self, part: Any, name: str) -> Any: ...
-    def write(self, part: Any, name: str, value: Any) -> None: ...
-    def encode(self, value: Any) -> bytes: ...
-    def decode(self, data: bytes, at: int) -> tuple[Any, int]: ...
+class Kind:
+    """What every kind of field can do. `form` says in a few letters how its bytes are to be read.
+
+    `packed`: shape, codes, number of items and `split` for `memory.Attributes`, None where that cannot pack it.
+    """
+
+    form = ""
+    packed: tuple[int, str, int, Callable[[Any], tuple[Any, ...]] | None] | None = None
+
+    def read(self, part: Any, name: str) -> Any:
+        return getattr(part, name)
+
+    def write(self, part: Any, name: str, value: Any) -> None:
+        setattr(part, name, value)
+
+    def encode(self, value: Any) -> bytes:
+        raise NotImplementedError
+
+    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
+        raise NotImplementedError
 
 
 def _take(layout: struct.Struct, data: bytes, at: int) -> tuple[Any, ...]:
@@ -63,7 +78,7 @@ def _bounds(code: str, low: Any, high: Any) -> Bounds | None:
     return (low, high)
 
 
-class Number:
+class Number(Kind):
     """A number, or a fixed array of them: a `struct` code such as "q", "d" or "256B"; limits include both ends."""
 
     def __init__(self, form: str, low: Any = None, high: Any = None) -> None:
@@ -73,9 +88,7 @@ class Number:
         self.bounds = _bounds(self.code, low, high)
         self.layout = struct.Struct(f"<{form}")
         self.is_real = self.code == "d"
-
-    def read(self, part: Any, name: str) -> Any:
-        return getattr(part, name)
+        self.packed = NUMBER, self.code, self.count, None
 
     def write(self, part: Any, name: str, value: Any) -> None:
         if self.count:
@@ -98,7 +111,7 @@ class Number:
         return values if self.count else values[0], at + self.layout.size
 
 
-class Items:
+class Items(Kind):
     """A list or a tuple of at most `room` numbers: their number (4 bytes), then they.
 
     With `ordered` each is greater than the one before. The part takes the values by assignment: it may
@@ -109,15 +122,12 @@ class Items:
         self, code: str, room: int, low: Any = None, high: Any = None, ordered: bool = False
     ) -> None:
         self.form = f"{code}[]"
+        self.packed = ITEMS, code, room, None
         self.code = code
         self.room = room
         self.bounds = _bounds(code, low, high)
         self.ordered = ordered
         self.made: type[Any] | None = None  # list or tuple, as the part has it
-
-    def read(self, part: Any, name: str) -> Sequence[Any]:
-        values: Sequence[Any] = getattr(part, name)
-        return values
 
     def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
         if self.made is None:  # asked once: a property may have to make a list for the answer
@@ -156,6 +166,7 @@ class Queue(Items):
 
     def __init__(self, code: str, room: int, end: str, low: Any = None, high: Any = None) -> None:
         super().__init__(code, room, low, high)
+        self.packed = None
         self.end = end
 
     def read(self, part: Any, name: str) -> list[Any]:
@@ -169,10 +180,11 @@ class Queue(Items):
         setattr(part, self.end, len(value))
 
 
-class Octets:
+class Octets(Kind):
     """Bytes of any length up to `room`: the length (4 bytes), then they. A bytearray stays the same object."""
 
     form = "s"
+    packed = OCTETS, "s", 0, None
 
     def __init__(self, room: int) -> None:
         self.room = room
@@ -198,7 +210,7 @@ class Octets:
         return data[at + 4 : at + 4 + length], at + 4 + length
 
 
-class Row:
+class Row(Kind):
     """A tuple of a value a column; with `split` and `make` anything that can be taken apart into one and made of it."""
 
     def __init__(
@@ -212,6 +224,7 @@ class Row:
         self.columns: list[Kind] = [
             Octets(*(kind[1:] or (_ROOM,))) if kind[0] == "s" else Number(*kind) for kind in kinds
         ]
+        self.packed = ROW, self.form, 0, split
         self.split = split
         self.make = make
         self.layout: struct.Struct | None = None
@@ -223,12 +236,6 @@ class Row:
             for index, column in enumerate(self.columns)
             if isinstance(column, Number) and column.bounds is not None
         ]
-
-    def read(self, part: Any, name: str) -> Any:
-        return getattr(part, name)
-
-    def write(self, part: Any, name: str, value: Any) -> None:
-        setattr(part, name, value)
 
     def encode(self, value: Any) -> bytes:
         cells = value if self.split is None else self.split(value)
@@ -257,7 +264,7 @@ class Row:
         return (value if self.split is None else self.split(value))[0]
 
 
-class Rows:
+class Rows(Kind):
     """At most `room` rows: their number (4 bytes), then they. A list or deque stays the same object; or it is a tuple.
 
     With `ordered` the first column never falls from one row to the next.
@@ -267,6 +274,7 @@ class Rows:
         self.room = room
         self.row = Row(*columns, **parts)
         self.form = f"({self.row.form})[]"
+        self.packed = ROWS, self.row.form, room, self.row.split
         self.ordered = ordered
 
     def read(self, part: Any, name: str) -> list[Any]:

@@ -15,6 +15,7 @@ from libc.string cimport memcpy
 import sys
 
 from miro_exact.domain import DomainError
+from miro_exact.fields import ITEMS, MEMORY, NUMBER, OCTETS, ROW
 
 cdef bint LITTLE = sys.byteorder == "little"
 
@@ -273,7 +274,6 @@ cdef class Memory:
             source += span.size * count
 
 
-NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY = range(6)
 cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW, _MEMORY = MEMORY
 
 

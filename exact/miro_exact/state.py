@@ -39,27 +39,13 @@ from functools import cache, cached_property, partial
 from itertools import groupby
 from operator import itemgetter
 from struct import calcsize
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from miro_exact import engine
 from miro_exact.domain import DomainError
-from miro_exact.fields import FLAG, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
+from miro_exact.fields import FLAG, MEMORY, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
 
-__all__ = [
-    "FLAG",
-    "TICK",
-    "Flat",
-    "Items",
-    "Number",
-    "Octets",
-    "Queue",
-    "Row",
-    "Rows",
-    "restore",
-    "snapshot",
-    "table",
-    "values",
-]
+__all__ = ["FLAG", "TICK", "Flat", "Items", "Octets", "Queue", "Row", "Rows", "restore", "snapshot", "values"]
 
 CODES = {
     "int": "i",
@@ -86,19 +72,6 @@ class StateField(NamedTuple):
     name: str
     kind: Kind
     path: str
-
-
-class Packed(Protocol):
-    """Neighbouring fields that are packed together."""
-
-    def pack(self) -> bytes: ...
-
-
-class Block(Packed, Protocol):
-    """The same, which can be put back too."""
-
-    def check(self, data: bytes, at: int) -> int: ...
-    def put(self) -> None: ...
 
 
 def table(cls: type) -> dict[str, Any]:
@@ -154,7 +127,7 @@ class Piece(NamedTuple):
 class One:
     """A field that is not compiled."""
 
-    def __init__(self, field: StateField, before: Block | None) -> None:
+    def __init__(self, field: StateField, before: Any) -> None:
         self.field = field
         self.part, self.name, self.kind, _ = field
         self.value: Any = None
@@ -225,24 +198,20 @@ class Flat:
             self._put()
 
     def _first_load(self, data: bytes) -> None:
-        before = self._before_load()
+        try:
+            before = self.save()
+        except DomainError:  # it holds NaN, and can only be left
+            before = b""
         self._accepted = None
         self._check(data)
         try:
             self._put()
         except Exception:
-            if before is not None:
+            if before:
                 self._check(before)
                 self._put()
             raise
         self._accepted = data
-
-    def _before_load(self) -> bytes | None:
-        """What to go back to; None for a state that holds NaN, which can only be left."""
-        try:
-            return self.save()
-        except DomainError:
-            return None
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """Path -> value of every field in the bytes of a state. Raises ValueError as `load` does."""
@@ -286,7 +255,8 @@ class Flat:
             if isinstance(entry, Group):
                 self._pieces.append(Piece(part, prefix, entry, counts and entry.counts))
             elif entry.many:
-                for key, child in _numbered(getattr(part, entry.name)):
+                parts = getattr(part, entry.name)
+                for key, child in parts.items() if isinstance(parts, dict) else enumerate(parts):
                     self._walk(child, f"{prefix}{entry.name}[{key}].", counts and entry.counts)
             elif (child := getattr(part, entry.name)) is not None:
                 self._walk(child, f"{prefix}{entry.name}.", counts and entry.counts)
@@ -362,9 +332,12 @@ def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[i
 
 
 class Known(NamedTuple):
-    """A block, whether it enters a digest, and its fields for `memory.Attributes`, None where that packs none."""
+    """A block, whether it enters a digest, and its fields for `memory.Attributes`, None where that packs none.
 
-    block: Block
+    Blocks are a `One` or a `memory.Memory`: neighbouring fields with `pack`, `check` and `put`.
+    """
+
+    block: Any
     counts: bool
     attributes: list[tuple[Any, ...]] | None
 
@@ -376,7 +349,7 @@ def _blocks(pieces: list[Piece]) -> list[Known]:
         pieces, lambda one: (one.group.layout is not None, one.counts)
     ):
         if is_compiled:
-            from miro_exact.memory import MEMORY, Memory
+            from miro_exact.memory import Memory
 
             memory = Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group])
             found.append(Known(memory, counts, [(memory, "", MEMORY, b"", 0, None)]))
@@ -387,9 +360,9 @@ def _blocks(pieces: list[Piece]) -> list[Known]:
     return found
 
 
-def _together(known: list[Known]) -> list[Packed]:
+def _together(known: list[Known]) -> list[Any]:
     """The same blocks for packing alone: neighbours become one, but for those that only `fields` can pack."""
-    found: list[Packed] = []
+    found: list[Any] = []
     for is_slow, group in groupby(known, lambda one: one.attributes is None):
         together = list(group)
         blocks = [one.block for one in together]
@@ -405,35 +378,15 @@ def _together(known: list[Known]) -> list[Packed]:
 
 def _attributes(field: StateField) -> list[tuple[Any, ...]] | None:
     """What `memory.Attributes` has to know of a field that is a Python object; None where it cannot pack it."""
-    return [_attribute(field)] if engine.active() == "compiled" and _is_simple(field.kind) else None
+    packed = field.kind.packed
+    if engine.active() != "compiled" or packed is None or not set(field.kind.form) <= _PACKED_CODES:
+        return None
+    shape, codes, count, split = packed
+    return [(field.part, field.name, shape, codes.encode(), count, split)]
 
 
-def _is_simple(kind: Kind) -> bool:
-    return not isinstance(kind, Queue) and set(kind.form) <= _PACKED_CODES
-
-
-def _attribute(field: StateField) -> tuple[Any, ...]:
-    from miro_exact import memory
-
-    part, name, kind, _ = field
-    if isinstance(kind, Number):
-        return (part, name, memory.NUMBER, kind.code.encode(), kind.count, None)
-    if isinstance(kind, Items):
-        return (part, name, memory.ITEMS, kind.code.encode(), kind.room, None)
-    if isinstance(kind, Octets):
-        return (part, name, memory.OCTETS, b"s", 0, None)
-    row: Row = kind.row if isinstance(kind, Rows) else kind  # type: ignore[assignment]
-    if isinstance(kind, Rows):
-        return (part, name, memory.ROWS, row.form.encode(), kind.room, row.split)
-    return (part, name, memory.ROW, row.form.encode(), 0, row.split)
-
-
-def _pack_each(blocks: Sequence[Block]) -> bytes:
+def _pack_each(blocks: Sequence[Any]) -> bytes:
     return b"".join([block.pack() for block in blocks])
-
-
-def _numbered(parts: Any) -> Iterator[tuple[Any, Any]]:
-    yield from parts.items() if isinstance(parts, dict) else enumerate(parts)
 
 
 def snapshot(part: Any) -> bytes:
