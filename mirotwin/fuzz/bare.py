@@ -107,7 +107,7 @@ class BareTarget(Target):
         harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks)
         program = Program(
             INPUTS.index(input),
-            repair=lambda body: self._repaired(body, self.program.frames - 1),
+            repair=lambda body: self._repaired(body, self.program.frames),
             character_ticks=_BITS * bit_ticks,
         )
         super().__init__(image, harness, program)
@@ -143,8 +143,8 @@ class BareTarget(Target):
         cpu, bus = self.cpu, self.processor.bus
         end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
         sent = -1
-        while sent != bus.sent_count and 12 * cpu.cycles < end:
-            sent = bus.sent_count
+        while sent != len(bus.said) and 12 * cpu.cycles < end:
+            sent = len(bus.said)
             idle = cpu.idle_cycles
             cpu.run(cpu.cycles + SETTLE_TICKS // 12)
             if bus.fault_kind:

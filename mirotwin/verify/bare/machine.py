@@ -90,8 +90,8 @@ class BareProcessor:
     def exchange(self) -> Exchange:
         """What went in and out since `RecordingBus.begin`, and the memories as they are now."""
         return Exchange(
-            received=tuple(Character(value, tick, bool(stop)) for value, stop, tick in self.bus.heard()),
-            sent=tuple(Character(value, tick) for value, tick in self.bus.said()),
+            received=tuple(Character(value, tick, bool(stop)) for value, stop, tick in self.bus.heard),
+            sent=tuple(Character(value, tick) for value, tick in self.bus.said),
             fault=self.fault(),
             begin_tick=self.begin_tick,
             reset_tick=None if self.bus.reset_tick < 0 else self.bus.reset_tick,

@@ -1,10 +1,12 @@
+cimport cython
+
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line
 
-cdef long long _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD, _RESET_TICKS, _LOOK, _WAIT
+cdef long long _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD, RESET_TICKS, _LOOK, _WAIT
 cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET
 
 
@@ -49,7 +51,6 @@ cdef class Harness:
 
     cpdef back(self)
     cdef int _put(self, Moment moment) except -1
-    cdef int _forget_records(self, Board board) except -1
     cdef int _begin(self, Program program) except -1
     cdef bint _opens(self, Board board, Program program) except -1
     cdef int _open(self, EventLog log) except -1
@@ -60,6 +61,6 @@ cdef class Harness:
     cdef int _move(self, long long until) except -1
     cdef int _go_on(self, long long until) except -1
     cdef int _run(self, long long until) except -1
+    @cython.locals(faulted=bint)
     cdef int _settle(self, long long tick) except -1
     cdef bint _falls_asleep(self, long long until) except -1
-    cdef bint _faulted(self) noexcept

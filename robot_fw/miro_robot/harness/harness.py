@@ -37,7 +37,6 @@ DONE, STOPPED, AWAKE = range(3)
 
 _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD = LEAD_TICKS, SETTLE_TICKS, AWAKE_TICKS, AHEAD_TICKS
 _DONE, _STOPPED, _AWAKE = DONE, STOPPED, AWAKE
-_RESET_TICKS = RESET_TICKS
 _LOOK = TICKS_PER_SECOND // 10_000  # how often it is looked at whether firmware sleeps
 _WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the oracle waits for came
 _BURST = 64  # characters on RXD that are not heard yet
@@ -175,17 +174,13 @@ class Harness:
 
     def _put(self, moment: Moment) -> None:
         moment.put()
-        if self.board is not None:
-            self._forget_records(self.board)
+        if self.board is not None:  # what observers could have read would fill the memory
+            self.board.faults.clear()
+            self.board.left.commands.clear()
+            self.board.right.commands.clear()
         self.now_tick = moment.tick
         self.oracle.begin(self.begin_tick)
         moment.tell()
-
-    def _forget_records(self, board: Board) -> None:
-        """What observers could have read: it would fill the memory."""
-        board.faults.clear()
-        board.left.commands.clear()
-        board.right.commands.clear()
 
     def play(self, program: Program) -> int:
         """Puts the machine back and sends what the program has read. Returns DONE, STOPPED or AWAKE."""
@@ -212,9 +207,9 @@ class Harness:
         self.end_tick = tick
         if program.ends_with_reset() and self._reset(tick):
             return _STOPPED
-        if self._run(tick + program.trailing_ticks()):
+        if self._run(tick + program.trailing_ticks):
             return _STOPPED
-        return self._settle(tick + program.trailing_ticks())
+        return self._settle(tick + program.trailing_ticks)
 
     def _begin(self, program: Program) -> int:
         """Puts the machine back. Returns which character of the program comes first."""
@@ -267,9 +262,9 @@ class Harness:
         if self._run(tick):
             return 1
         self._set_reset(1)
-        self._move(tick + _RESET_TICKS)
+        self._move(tick + RESET_TICKS)
         self._set_reset(0)
-        self.oracle.restarted(tick + _RESET_TICKS)
+        self.oracle.restarted(tick + RESET_TICKS)
         return 0
 
     def _set_reset(self, level: int) -> None:
@@ -306,7 +301,8 @@ class Harness:
         if not self.sleeps:
             return _STOPPED if self._run(tick + _AWAKE_TICKS) else _DONE
         if not self._falls_asleep(tick + _SETTLE):
-            return _STOPPED if self.oracle.code or self._faulted() else _AWAKE
+            faulted = self.board is not None and self.board.fault_count > 0
+            return _STOPPED if self.oracle.code or faulted else _AWAKE
         latest = self.now_tick + 2 * _SETTLE
         while self.now_tick < latest and self.oracle.waits():
             if self._run(self.now_tick + _WAIT):
@@ -327,6 +323,3 @@ class Harness:
             asleep = cpu.idle or cpu.powered_down
         cpu.end_run()
         return asleep != 0 and not stopped
-
-    def _faulted(self) -> bool:
-        return self.board is not None and self.board.fault_count > 0

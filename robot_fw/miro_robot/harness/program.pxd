@@ -1,10 +1,11 @@
 cimport cython
 
-cdef int _MOST, _MOST_RESETS, _PAIR, _SEQS, _XOR_OUT
+cdef int _MOST, _MOST_RESETS, _PAIR, SEQ_MODULUS, _XOR_OUT
 cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS
 cdef int _BYTES, _FRAMES, _SESSION
 cdef int _TEAM, _SERVICE, _ASK
 cdef int _BAD_STOP, _RESET, _LONG
+cdef bytes _WHITE
 
 
 cdef class Program:
@@ -16,18 +17,16 @@ cdef class Program:
     cdef long long pauses[2048]
     cdef readonly int count, frames
     cdef readonly long long length
-    cdef bytes _sync, _lead, _white
-    cdef int _payload
+    cdef unsigned char _frame[64]
+    cdef int _head, _payload
     cdef unsigned int _layout
     cdef unsigned short _table[256]
-    cdef unsigned char _body[64]
     cdef const unsigned char[::1] _data
     cdef Py_ssize_t _place, _end
     cdef int _seq, _first, _size, _damage_at, _damage, _cut, _stop_at, _flags, _resets
-    cdef long long _wait
+    cdef readonly long long trailing_ticks
 
     cpdef int read(self, data) except -1
-    cpdef long long trailing_ticks(self) noexcept
     cpdef bint ends_with_reset(self) noexcept
     cpdef bint opens_with(self, bytes characters) noexcept
     cdef bint _has_room(self) noexcept
@@ -40,11 +39,8 @@ cdef class Program:
     cdef int _frame_operation(self, int kind) except -1
     cdef void _payload_from_input(self) noexcept
     cdef void _own_velocities(self) noexcept
-    @cython.locals(body='unsigned char *')
-    cdef void _seal(self, int hdr) noexcept
+    @cython.locals(frame='unsigned char *', register='unsigned int')
+    cdef int _seal(self, int hdr) except -1
     @cython.locals(value=int)
     cdef int _foreign(self) except -1
-    cdef void _again(self) noexcept
-    cdef void _begin_frame(self) noexcept
-    cdef void _put_of_frame(self, int value) noexcept
-    cdef void _end_frame(self) noexcept
+    cdef int _send(self, bytes frame) except -1

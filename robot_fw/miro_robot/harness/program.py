@@ -58,24 +58,24 @@ _SILENCE = 3 * TICKS_PER_SECOND // 1000
 _RESET_TICKS, _UP_TICKS = RESET_TICKS, UP_TICKS
 _BYTES, _FRAMES, _SESSION = BYTES, FRAMES, SESSION
 _TEAM, _SERVICE, _ASK = FrameType.TEAM, FrameType.SERVICE, FrameType.TEAM_ASK
-_SEQS = SEQ_MODULUS
 _PAIR = downlink(3).payload_size // 3  # two int16
 _XOR_OUT = crc.XOR_OUT
+_WHITE = STRING
 _BAD_STOP, _RESET = 1, 2
 _LONG = 0xE0  # counts of eight bytes each, in a foreign body
 
 
 class Program:
-    """Reads inputs for robot `slot` of `robots`. After `read`: `count` characters, each with the pause before it.
+    """Reads inputs for robot `slot` of `robots`. After `read`: `count` characters, each with the pause before it, and
+    the pause after the last one, `trailing_ticks`.
 
     `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line.
     """
 
     NOT_STATE = (
         "how", "slot", "robots", "repair", "character_ticks", "characters", "flaws", "pauses", "count",
-        "length", "frames", "_sync", "_lead", "_payload", "_layout", "_white", "_table", "_place",
-        "_end", "_data", "_seq", "_first", "_size", "_damage_at", "_damage", "_cut", "_stop_at", "_wait",
-        "_flags", "_resets", "_body",
+        "length", "frames", "trailing_ticks", "_frame", "_head", "_payload", "_layout", "_table", "_place",
+        "_end", "_data", "_seq", "_first", "_size", "_damage_at", "_damage", "_cut", "_stop_at", "_flags", "_resets",
     )  # fmt: skip
 
     def __init__(
@@ -100,13 +100,13 @@ class Program:
         self.count = 0
         self.frames = 0  # how many frames were sealed
         self.length = 0  # ticks from the begin to the end of the last character, without waiting at the end
-        self._sync = form.sync
-        self._lead = form.lead
+        self._frame = bytearray(64)  # the next one of our own
+        self._head = len(form.lead + form.sync)  # where HDR stands in it
+        for place, value in enumerate(form.lead + form.sync):
+            self._frame[place] = value
         self._payload = form.payload_size
         self._layout = crc.register(bytes([form.layout]))
-        self._white = STRING
         self._table = crc.byte_table()
-        self._body = bytearray(64)
         self._data: bytes | bytearray | memoryview = b""
         self._place = 0
         self._end = 0
@@ -117,7 +117,7 @@ class Program:
         self._damage = 0
         self._cut = -1
         self._stop_at = -1
-        self._wait = 0  # ticks of pause before the next character
+        self.trailing_ticks = 0
         self._flags = 0
         self._resets = 0
 
@@ -132,23 +132,17 @@ class Program:
         self._seq = 0
         self._size = 0
         self._forget_flaws()
-        self._wait = 0
+        self.trailing_ticks = 0
         self._flags = 0
         self._resets = 0
-        if self.how == _BYTES:
-            while self._place < self._end:
+        while self._place < self._end and self._has_room():
+            if self.how == _BYTES:
                 self._put(self._next())
-        elif self.how == _FRAMES:
-            while self._place < self._end and self._has_room():
+            elif self.how == _FRAMES:
                 self._one_frame()
-        else:
-            while self._place < self._end and self._has_room():
+            else:
                 self._operation(self._next() & 0x0F)
         return self.count
-
-    def trailing_ticks(self) -> int:
-        """The pause after the last character."""
-        return self._wait
 
     def ends_with_reset(self) -> bool:
         """Whether the reset pin goes up after the last character."""
@@ -182,20 +176,18 @@ class Program:
 
     def _put(self, value: int) -> None:
         """One more character."""
-        place = self.count
-        if place >= _MOST or self.length >= _MOST_TICKS:
-            return
-        self.characters[place] = value
-        self.flaws[place] = self._flags
-        self.pauses[place] = self._wait
-        self.length += self._wait + self.character_ticks
-        self._wait = 0
-        self._flags = 0
-        self.count = place + 1
+        if self._has_room():
+            self.characters[self.count] = value
+            self.flaws[self.count] = self._flags
+            self.pauses[self.count] = self.trailing_ticks
+            self.length += self.trailing_ticks + self.character_ticks
+            self.trailing_ticks = 0
+            self._flags = 0
+            self.count += 1
 
     def _pause(self, ticks: int) -> None:
-        if self.length + self._wait + ticks <= _MOST_TICKS:
-            self._wait += ticks
+        if self.length + self.trailing_ticks + ticks <= _MOST_TICKS:
+            self.trailing_ticks += ticks
 
     def _forget_flaws(self) -> None:
         self._damage_at = -1
@@ -210,7 +202,7 @@ class Program:
             self._foreign()
         else:
             hdr = self._next()
-            self._seq = (self._seq + (hdr & 7) + 1) % _SEQS
+            self._seq = (self._seq + (hdr & 7) + 1) % SEQ_MODULUS
             self._payload_from_input()
             self._seal((hdr & 0xC0) | self._seq)
 
@@ -218,7 +210,8 @@ class Program:
         if kind < 9 and kind != 8:
             self._frame_operation(kind)
         elif kind == 8:
-            self._again()
+            if self._size:
+                self._send(bytes(self.characters[self._first : self._first + self._size]))
         elif kind == 9:
             for _ in range((self._next() & 0x1F) + 1):
                 self._put(self._next())
@@ -246,7 +239,7 @@ class Program:
             self._payload_from_input()
             self._seal(hdr)
         else:
-            self._seq = (self._seq + 1) % _SEQS
+            self._seq = (self._seq + 1) % SEQ_MODULUS
             if kind >= 5:
                 self._payload_from_input()
             else:
@@ -255,41 +248,37 @@ class Program:
 
     def _payload_from_input(self) -> None:
         for place in range(self._payload):
-            self._body[1 + place] = self._next()
+            self._frame[self._head + 1 + place] = self._next()
 
     def _own_velocities(self) -> None:
         for place in range(self._payload):
-            self._body[1 + place] = 0
+            self._frame[self._head + 1 + place] = 0
         for place in range(_PAIR):
             value = self._next()
             if self.slot < self.robots:
-                self._body[1 + _PAIR * self.slot + place] = value
+                self._frame[self._head + 1 + _PAIR * self.slot + place] = value
 
     # ---- frames --------------------------------------------------------------------------------------------
 
     def _seal(self, hdr: int) -> None:
-        """Number, CRC and whitening; then what is to be wrong with it."""
-        body = self._body
-        kind = hdr >> 6
-        body[0] = hdr
-        if kind in (_TEAM, _ASK):
-            for place in range(1, self._payload, 2):
-                if body[place] == 0 and body[place + 1] == 0x80:
-                    body[place] = 1  # -32768
+        """HDR, CRC and whitening, and out it goes."""
+        frame = self._frame
+        first = self._head
+        end = first + 1 + self._payload  # of what the CRC is of
+        frame[first] = hdr
+        if hdr >> 6 in (_TEAM, _ASK):
+            for place in range(first + 1, end, 2):
+                if frame[place] == 0 and frame[place + 1] == 0x80:
+                    frame[place] = 1  # -32768
         register = self._layout
-        for place in range(self._payload + 1):
-            register = (register >> 8) ^ self._table[(register ^ body[place]) & 0xFF]
+        for place in range(first, end):
+            register = (register >> 8) ^ self._table[(register ^ frame[place]) & 0xFF]
         register ^= _XOR_OUT
-        body[self._payload + 1] = register & 0xFF
-        body[self._payload + 2] = register >> 8
-        self._begin_frame()
-        for place in range(len(self._lead)):
-            self._put_of_frame(self._lead[place])
-        for place in range(len(self._sync)):
-            self._put_of_frame(self._sync[place])
-        for place in range(self._payload + 3):
-            self._put_of_frame(body[place] ^ self._white[place])
-        self._end_frame()
+        frame[end] = register & 0xFF
+        frame[end + 1] = register >> 8
+        for place in range(first, end + 2):
+            frame[place] ^= _WHITE[place - first]
+        self._send(bytes(frame[: end + 2]))
 
     def _foreign(self) -> None:
         """A frame of a wire format that Python repairs."""
@@ -304,39 +293,21 @@ class Program:
         for place in range(size):
             value = self._next()  # on its own: Cython 3.2 would call it three times in the next line
             body[place] = value
-        self._begin_frame()
         assert self.repair is not None
-        for value in self.repair(bytes(body)):
-            self._put_of_frame(value)
-        self._end_frame()
+        self._send(self.repair(bytes(body)))
 
-    def _again(self) -> None:
-        first = self._first
-        size = self._size
-        if size == 0:
-            return
-        self._begin_frame()
-        for place in range(size):
-            self._put_of_frame(self.characters[first + place])
-        self._end_frame()
-
-    def _begin_frame(self) -> None:
+    def _send(self, frame: bytes) -> None:
+        """The characters of a frame, with what is to be wrong with it."""
         self._first = self.count
         self._size = 0
         self.frames += 1
-
-    def _put_of_frame(self, value: int) -> None:
-        if self._cut >= 0 and self._size >= self._cut:
-            return
-        if self.count >= _MOST:
-            return
-        if self._size == self._damage_at:
-            value ^= self._damage
-        if self._size == self._stop_at:
-            self._flags |= _BAD_STOP
-        before = self.count
-        self._put(value)
-        self._size += self.count - before
-
-    def _end_frame(self) -> None:
+        for value in frame:
+            if self._size == self._cut or not self._has_room():
+                break
+            if self._size == self._damage_at:
+                value ^= self._damage
+            if self._size == self._stop_at:
+                self._flags |= _BAD_STOP
+            self._put(value)
+            self._size += 1
         self._forget_flaws()

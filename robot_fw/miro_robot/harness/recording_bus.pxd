@@ -3,17 +3,12 @@ from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.xram cimport XramBus
 
 cdef int _KEPT, _NO_FAULT
-cdef long long _NEVER, _STOPPED, _LONGEST
+cdef long long NEVER_TICK, STOPPED_TICK, _LONGEST
 
 cdef class RecordingBus(XramBus):
     cdef public Cpu cpu
-    cdef unsigned char received_values[4096]
-    cdef unsigned char received_stops[4096]
-    cdef long long received_ticks[4096]
-    cdef readonly int received
-    cdef unsigned char sent_values[4096]
-    cdef long long sent_ticks[4096]
-    cdef readonly int sent_count, fault_kind, fault_pc
+    cdef readonly list heard, said
+    cdef readonly int fault_kind, fault_pc
     cdef readonly long long fault_tick
     cdef public long long reset_tick
 

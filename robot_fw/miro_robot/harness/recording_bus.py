@@ -2,68 +2,52 @@
 
 from __future__ import annotations
 
-from array import array
-
 from miro_exact.clock import NEVER_TICK
 from miro_robot.harness.harness import LiveOracle
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.mcs51.xram import XramBus
 
-KEPT = 4096
-"""Characters of each direction that are kept."""
-NO_FAULT = 1
-"""What a `BareOracle` finds."""
 LONGEST_ANSWER_TICKS = 24_000_000
 """How long a run goes on, behind the moment at which the firmware sleeps, while it still sends."""
-_KEPT, _NO_FAULT, _LONGEST = KEPT, NO_FAULT, LONGEST_ANSWER_TICKS
-_NEVER, _STOPPED = NEVER_TICK, STOPPED_TICK
+_LONGEST = LONGEST_ANSWER_TICKS
+_KEPT = 4096  # characters of each direction
+_NO_FAULT = 1  # what a `BareOracle` finds
 
 
 class RecordingBus(XramBus):
-    """Keeps the first 4096 characters of each direction since `begin`, and the first fault, which stops the CPU."""
+    """Keeps the first 4096 characters of each direction since `begin`, and the first fault, which stops the CPU.
+
+    `heard`: what the serial port received: value, bit RB8 (the stop bit in mode 1), tick of RI. `said`: what it sent:
+    value, tick of TI.
+    """
 
     NOT_STATE = (
-        *("code_of", "faulted", "sent", "cpu"),
-        *("received_values", "received_stops", "received_ticks", "received"),  # what was seen
-        *("sent_values", "sent_ticks", "sent_count"),
+        *("code_of", "faulted", "sent", "cpu", "heard", "said"),
         *("fault_kind", "fault_pc", "fault_tick", "reset_tick"),
     )
 
     def __init__(self) -> None:
         XramBus.__init__(self, _nothing, _nothing)
         self.cpu: Cpu | None = None
-        self.received_values = bytearray(KEPT)
-        self.received_stops = bytearray(KEPT)
-        self.received_ticks = array("q", bytes(8 * KEPT))
-        self.received = 0
-        self.sent_values = bytearray(KEPT)
-        self.sent_ticks = array("q", bytes(8 * KEPT))
-        self.sent_count = 0
-        self.fault_kind = 0
         self.fault_pc = 0
         self.fault_tick = 0
-        self.reset_tick = -1  # of the last reset, -1 without one
+        self.begin()
 
     def begin(self) -> None:
         """Forgets what it kept."""
-        self.received = 0
-        self.sent_count = 0
+        self.heard: list[tuple[int, int, int]] = []
+        self.said: list[tuple[int, int]] = []
         self.fault_kind = 0
-        self.reset_tick = -1
+        self.reset_tick = -1  # of the last reset, -1 without one
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
-        if self.received < _KEPT:
-            self.received_values[self.received] = value
-            self.received_stops[self.received] = stop
-            self.received_ticks[self.received] = tick
-            self.received += 1
+        if len(self.heard) < _KEPT:
+            self.heard.append((value, stop, tick))
 
     def byte_sent(self, value: int, tick: int) -> None:
-        if self.sent_count < _KEPT:
-            self.sent_values[self.sent_count] = value
-            self.sent_ticks[self.sent_count] = tick
-            self.sent_count += 1
+        if len(self.said) < _KEPT:
+            self.said.append((value, tick))
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         if self.fault_kind == 0:
@@ -72,17 +56,6 @@ class RecordingBus(XramBus):
             self.fault_tick = tick
         if self.cpu is not None:
             self.cpu.request_stop()
-
-    def heard(self) -> list[tuple[int, int, int]]:
-        """What the serial port received: value, bit RB8 (the stop bit in mode 1), tick of RI."""
-        return [
-            (self.received_values[at], self.received_stops[at], self.received_ticks[at])
-            for at in range(self.received)
-        ]
-
-    def said(self) -> list[tuple[int, int]]:
-        """What the serial port sent: value, tick of TI."""
-        return [(self.sent_values[at], self.sent_ticks[at]) for at in range(self.sent_count)]
 
 
 class BareOracle(LiveOracle):
@@ -94,12 +67,12 @@ class BareOracle(LiveOracle):
         LiveOracle.__init__(self)
         self.bus = bus
         self.cpu = cpu
-        self.slept_tick = _NEVER
+        self.slept_tick = NEVER_TICK
 
     def begin(self, tick: int) -> None:
         self.code = 0
         self.tick = 0
-        self.slept_tick = _NEVER
+        self.slept_tick = NEVER_TICK
         self.bus.begin()
 
     def restarted(self, tick: int) -> None:
@@ -112,11 +85,11 @@ class BareOracle(LiveOracle):
 
     def waits(self) -> bool:
         now = 12 * self.cpu.cycles
-        if self.slept_tick == _NEVER:
+        if self.slept_tick == NEVER_TICK:
             self.slept_tick = now
         if self.cpu.powered_down or now - self.slept_tick > _LONGEST:
             return False
-        return self.cpu.peripherals.uart.ti_tick() < _STOPPED
+        return self.cpu.peripherals.uart.ti_tick() < STOPPED_TICK
 
 
 def _nothing(*_: int) -> None:

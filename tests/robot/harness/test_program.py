@@ -93,9 +93,9 @@ def test_pauses_add_up_and_raw_characters_follow():
         (0xAA, False, False, MS // 10 + 6 * MS),
         (0xBB, False, False, 0),
     ]
-    assert program.trailing_ticks() == 0
+    assert program.trailing_ticks == 0
     program.read(b"\x09\x00\xaa\x0b\xff")
-    assert program.trailing_ticks() == 768 * MS
+    assert program.trailing_ticks == 768 * MS
 
 
 def test_a_reset_comes_before_the_next_character_and_leaves_time_to_come_up():
@@ -103,7 +103,7 @@ def test_a_reset_comes_before_the_next_character_and_leaves_time_to_come_up():
     assert played(program, b"\x0f\x09\x00\xaa") == [(0xAA, False, True, 5 * MS + 48)]
     program.read(b"\x09\x00\xaa\x0f")
     assert program.ends_with_reset()
-    assert program.trailing_ticks() == 5 * MS + 48
+    assert program.trailing_ticks == 5 * MS + 48
 
 
 def test_another_wire_format_repairs_bodies():
