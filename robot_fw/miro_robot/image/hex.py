@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import msgspec
@@ -77,11 +78,7 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
 
 def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
     """The same from the file's content; `path` is for messages and symbols."""
-    known = _KNOWN.get((content, limit))
-    if known is None:
-        known = _KNOWN[content, limit] = _parsed(content, path, limit)
-        if len(_KNOWN) > _KEPT:
-            del _KNOWN[next(iter(_KNOWN))]
+    known = _parsed(content, path, limit)
     return Image(
         path=path,
         code=known.code,
@@ -101,11 +98,7 @@ class _Content(msgspec.Struct, frozen=True):
     sha256: str
 
 
-_KEPT = 32
-_KNOWN: dict[tuple[bytes, int], _Content] = {}
-"""Files that were read before, by content and limit: a test loads the robot's image hundreds of times."""
-
-
+@lru_cache(32)  # a test loads the robot's image hundreds of times
 def _parsed(content: bytes, path: Path, limit: int) -> _Content:
     if not content.strip():
         raise ImageError(path, 0, "is empty", _REBUILD)

@@ -38,6 +38,13 @@ class Signal(NamedTuple):
         """A wire's name with its scopes."""
         return ".".join([TOP, *([self.scope] if self.scope else []), wire])
 
+    def places(self) -> list[int]:
+        """Where the levels that it follows from are noted."""
+        if self.place in PLACES:
+            return [PLACES.index(self.place)]
+        port = int(self.place[4:])
+        return [_LATCH + port, _OUTSIDE + port, *((_RXD, _TXD, _SHIFT) if port == 3 else ())]
+
     @property
     def on_board(self) -> bool:
         """Whether a CPU alone does not have it."""
@@ -77,17 +84,12 @@ SIGNALS = (
     *(Signal(f"p{port}_", "ports", 8, f"port{port}", f"pins of P{port}") for port in range(4)),
 )
 
-PLACE_OF = {name: place for place, name in enumerate(PLACES)}
-
-
 TICK_HZ = 24_000_000  # of every board, and of the bare CPU by default
 NS_PER_SECOND = 1_000_000_000
 SETTLING_TICKS = 4096
 """After it begins to look on in mid-run, so long a level may still be on its way: encoder edges are reported up to a
 step of the plant (2048 ticks) late, and the CPU may be four cycles ahead."""
-
-_RXD, _TXD, _SHIFT = (PLACE_OF[name] for name in ("rxd", "txd", "shift"))
-_LATCH, _OUTSIDE = PLACE_OF["latch0"], PLACE_OF["outside0"]
+_RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE = map(PLACES.index, ("rxd", "txd", "shift", "latch0", "outside0"))
 
 
 class Waveform:
@@ -120,7 +122,11 @@ class Waveform:
         self._levels: list[int] = []
         self._shown: list[int] = []
         self._variables: list[list[Any]] = []
-        self._affected = [self._signals_of(place) for place in range(len(PLACE_OF))]
+        self._places = [signal.places() for signal in self.signals]
+        self._affected = [
+            [index for index, places in enumerate(self._places) if place in places]
+            for place in range(len(PLACES))
+        ]
 
     def attach(self, cpu: Cpu) -> Waveform:
         """Looks on from the next run of `cpu` on, whose board was given."""
@@ -197,7 +203,7 @@ class Waveform:
             check_values=False,
             init_timestamp=nanoseconds(self.first_tick, self.tick_hz),
         )
-        self._shown = [self._level_of(signal) for signal in self.signals]
+        self._shown = [self._level_of(index) for index in range(len(self.signals))]
         for signal, level in zip(self.signals, self._shown, strict=True):
             scope = (TOP, signal.scope) if signal.scope else (TOP,)
             self._variables.append(
@@ -212,30 +218,17 @@ class Waveform:
         stamp = nanoseconds(tick, self.tick_hz)
         for index in sorted(changed):
             signal = self.signals[index]
-            level = self._level_of(signal)
+            level = self._level_of(index)
             if level == self._shown[index]:
                 continue
             for bit, variable in enumerate(self._variables[index]):
                 self._writer.change(variable, stamp, _bit(signal, level, bit))
             self._shown[index] = level
 
-    def _level_of(self, signal: Signal) -> int:
+    def _level_of(self, index: int) -> int:
         """What a signal's wires carry now; a pin of a port is the AND of all that drive it."""
-        levels = self._levels
-        if not signal.place.startswith("port"):
-            return levels[PLACE_OF[signal.place]]
-        return port_pins(levels, int(signal.place[4:]))
-
-    def _signals_of(self, place: int) -> list[int]:
-        """Which signals may change with a place."""
-        names = {name for name, at in PLACE_OF.items() if at == place}
-        if _LATCH <= place < _LATCH + 4:
-            names.add(f"port{place - _LATCH}")
-        if _OUTSIDE <= place < _OUTSIDE + 4:
-            names.add(f"port{place - _OUTSIDE}")
-        if place in (_RXD, _TXD, _SHIFT):
-            names.add("port3")
-        return [index for index, signal in enumerate(self.signals) if signal.place in names]
+        place, *more = self._places[index]
+        return port_pins(self._levels, place - _LATCH) if more else self._levels[place]
 
 
 def nanoseconds(tick: int, tick_hz: int = TICK_HZ) -> int:
