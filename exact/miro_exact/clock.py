@@ -43,7 +43,7 @@ CONTROL_PERIOD_TICKS = CAMERA_FRAME_TICKS
 """The host controls once per camera frame."""
 
 NEVER_TICK = 1 << 62
-"""Tick, or cycle, of an event that will not happen; no tick lies beyond it. Hot modules call their C copy `_NEVER`."""
+"""Tick, or cycle, of an event that will not happen; no tick lies beyond it."""
 
 
 def ticks(seconds: float | Fraction) -> int:

@@ -12,10 +12,10 @@ cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, 
 cdef int _CS, _BOTH_STROBES, _RST
 cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
 cdef int _WR, _RD, _BEHIND_TICKS
-cdef int _RESET_PULSE, PORTS
+cdef int RESET_PULSE, PORTS
 cdef long long CYCLE_TICKS
-cdef int _FAULT, _REACHED, _RECEIVED, _SENT, _REPLAN
-cdef long long RESET_PULSE_TICKS, _NEVER
+cdef int FAULT, REACHED, RECEIVED, SENT, REPLAN
+cdef long long RESET_PULSE_TICKS, NEVER_TICK
 
 
 cdef class Board(Bus):

@@ -17,7 +17,7 @@ but the CPU is advanced at its own events only, never "up to now", so reading a 
 
 from __future__ import annotations
 
-from miro_exact.clock import NEVER_TICK
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
@@ -31,7 +31,6 @@ from miro_robot.plant import Plant
 from miro_robot.probe import Probe
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
-CYCLE_TICKS = 12
 MAIN_LOOP_LIMIT_CYCLES = 20_000
 """10 ms without main loop are a fault: a third of a camera frame is lost."""
 FAULTS_KEPT = 1000
@@ -44,10 +43,8 @@ the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to it
 _WR, _RD = 0x40, 0x80  # pins of P3
 # Inputs of an LM629 as bits, in the order of CHIP_INPUTS; those of both chips: the left one's, then the right one's.
 _CS, _BOTH_STROBES, _RST = 0x01, 0x06, 0x10
-_CHIP_PINS, _ALL_PINS, _BOTH_RST, _NEVER = 5, 0x1F, 0x210, NEVER_TICK
+_CHIP_PINS, _ALL_PINS, _BOTH_RST = 5, 0x1F, 0x210
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
-_RESET_PULSE, _FAULT, _REACHED, _RECEIVED, _SENT = RESET_PULSE, FAULT, REACHED, RECEIVED, SENT
-_REPLAN = REPLAN
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
@@ -197,7 +194,7 @@ class Board(Bus):
             self.horizon = horizon
             stopped = cpu.go_on((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
             self.sync(min(horizon, cpu.cycles * CYCLE_TICKS) if stopped else horizon)
-            if stopped == _REPLAN:
+            if stopped == REPLAN:
                 stopped = 0
         self.horizon = -1
         return stopped
@@ -213,16 +210,16 @@ class Board(Bus):
                 cpu.unmark(addresses)
             if stopped != BREAKPOINT:
                 return stopped
-            self.log.note(_REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
+            self.log.note(REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
             stopped = self.run(cpu.cycles * CYCLE_TICKS + 1)
             if stopped or cpu.cycles * CYCLE_TICKS >= until_tick:
                 return stopped
 
     def _next_interrupt(self, chip: Lm629) -> int:
         """The next tick at which the chip may raise HI by itself: an unmasked sample, or the end of reset."""
-        if chip.sample_tick == _NEVER:
+        if chip.sample_tick == NEVER_TICK:
             return chip.next_tick
-        return chip.sample_tick if chip.signals.mask else _NEVER
+        return chip.sample_tick if chip.signals.mask else NEVER_TICK
 
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
@@ -316,11 +313,11 @@ class Board(Bus):
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         """Tells the log of a character that the serial port delivered."""
-        self.log.note(_RECEIVED, tick, stop, value)
+        self.log.note(RECEIVED, tick, stop, value)
 
     def byte_sent(self, value: int, tick: int) -> None:
         """Tells the log of a character that the serial port sent."""
-        self.log.note(_SENT, tick, 0, value)
+        self.log.note(SENT, tick, 0, value)
 
     # ---- from CPU to chip ---------------------------------------------------------------------------------
 
@@ -491,9 +488,9 @@ class Board(Bus):
     def _reset_chips(self, left: int, right: int, tick: int) -> None:
         """/RST of a chip has another level."""
         if self._reset_is_short(self.left, left & _RST, tick):
-            self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
+            self._timing_fault(RESET_PULSE, tick - self.left.reset_tick, tick)
         elif self._reset_is_short(self.right, right & _RST, tick):
-            self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
+            self._timing_fault(RESET_PULSE, tick - self.right.reset_tick, tick)
         self.left.set_reset(tick, left >> 4)
         self.right.set_reset(tick, right >> 4)
 
@@ -511,7 +508,7 @@ class Board(Bus):
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
         if not self.forced:
             self.fault_count += 1
-            self.log.note(_FAULT, tick, kind, pc)
+            self.log.note(FAULT, tick, kind, pc)
             if len(self.faults) < FAULTS_KEPT:
                 symbol = self.symbols.name_at(pc) if self.symbols is not None else ""
                 self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
@@ -527,7 +524,7 @@ class Board(Bus):
         self.right.check_times(earliest_tick)
         latest_tick = earliest_tick + 2 * _BEHIND_TICKS + SAMPLE_TICKS
         next_tick = self.plant.next_tick
-        if next_tick < earliest_tick or latest_tick < next_tick < _NEVER:
+        if next_tick < earliest_tick or latest_tick < next_tick < NEVER_TICK:
             raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")
         self.hi_seen[0] = self.left.hi
         self.hi_seen[1] = self.right.hi

@@ -1,7 +1,7 @@
 # C layout of miro_robot.plant.
 from miro_robot.lm629.chip cimport Lm629
 
-cdef long long _SAMPLE_TICKS
+cdef long long SAMPLE_TICKS
 
 cdef class Plant:
     cdef public Lm629 left, right

@@ -11,7 +11,6 @@ from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 
 LEFT = 0
 RIGHT = 1
-_SAMPLE_TICKS = SAMPLE_TICKS
 _MORE: tuple[str, ...] = ()  # what a subclass adds
 
 
@@ -46,7 +45,7 @@ class Plant:
         Where a chip has more to do it ends, with an advance to that tick or before. Returns 1 if it has done something.
         """
         left, right = self.left, self.right
-        if left is not None and right is not None and tick - left.next_tick > _SAMPLE_TICKS:
+        if left is not None and right is not None and tick - left.next_tick > SAMPLE_TICKS:
             left.rest(tick)
             right.rest(tick)
         return 0

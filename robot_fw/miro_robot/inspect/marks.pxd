@@ -1,7 +1,7 @@
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.execute cimport Executor
 
-cdef int _BREAKPOINT
+cdef int BREAKPOINT
 
 cdef class MarkInspector:
     cdef readonly Cpu cpu

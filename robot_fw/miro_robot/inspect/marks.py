@@ -7,8 +7,6 @@ from collections.abc import Callable, Collection
 from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.execute import Executor
 
-_BREAKPOINT = BREAKPOINT
-
 
 class MarkInspector:
     """Runs `cpu` as its `run` does, and calls `ask` before each instruction at one of `addresses`; true ends that.
@@ -35,13 +33,13 @@ class MarkInspector:
         if self.others is not None:
             self.cpu.mark(_shared(self.others(), self.marked))  # the owner took them away
         reason = Executor.run(self.cpu, until_cycle)
-        return self._pass_marks(until_cycle) if reason == _BREAKPOINT else reason
+        return self._pass_marks(until_cycle) if reason == BREAKPOINT else reason
 
     def _pass_marks(self, until_cycle: int) -> int:
         cpu = self.cpu
         others = () if self.others is None else self.others()
-        reason = _BREAKPOINT
-        while reason == _BREAKPOINT:
+        reason = BREAKPOINT
+        while reason == BREAKPOINT:
             place = cpu.pc
             if place in self.marked and self.ask():
                 cpu.unmark(tuple(self.marked))

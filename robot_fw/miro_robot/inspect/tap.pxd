@@ -7,7 +7,7 @@ from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line
 from miro_robot.probe cimport Probe
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef int _TICKS
 cdef int _RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP, _IN_SERVICE, _ROUTINE, _DATA, _SIDE
 cdef int _CS, _BUSY, _HI, _PWM, _SIGN, _MAGNITUDE, _A, _B, _PER_SIDE

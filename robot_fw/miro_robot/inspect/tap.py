@@ -15,7 +15,6 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import Line
 from miro_robot.probe import Probe
 
-_NEVER = NEVER_TICK
 _TICKS = 12  # per machine cycle
 
 _RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP = 0, 1, 2, 3, 7, 11
@@ -86,7 +85,7 @@ class BoardTap(Probe):
         """The tick below which the board's changes are all noted, whatever the CPU does from there on."""
         board = self.board
         tick = min(board.left.next_tick, board.right.next_tick)
-        if board.plant.next_tick == _NEVER:  # the plant has no next step, so no encoder edge comes
+        if board.plant.next_tick == NEVER_TICK:  # the plant has no next step, so no encoder edge comes
             return tick
         return min(tick, self.passed_tick)
 
@@ -268,7 +267,7 @@ class CpuTap(Watcher):
     def _take_line(self, place: int, line: Line, until_tick: int) -> None:
         """The edges below `until_tick` that are new."""
         tick = line.next_edge(self.line_ticks[place])
-        while tick < until_tick and tick < _NEVER:
+        while tick < until_tick and tick < NEVER_TICK:
             self._see(tick, place, line.level_at(tick))
             self.line_ticks[place] = tick
             tick = line.next_edge(tick)

@@ -4,7 +4,7 @@ from miro_robot.mcs51.execute cimport Executor
 from miro_robot.mcs51.line cimport Line
 from miro_robot.mcs51.peripherals cimport Peripherals
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef int _OUTSIDE
 cdef int _MARK
 cdef int _STOP_REQUESTED, _REPLAN

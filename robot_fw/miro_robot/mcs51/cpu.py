@@ -45,7 +45,6 @@ ASLEEP = 4  # why a run ended, beside those of `execute.py`: with `stop_asleep`,
 
 REPLAN = 5  # `replan` was called
 
-_NEVER = NEVER_TICK
 _REPLAN = REPLAN
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
@@ -99,7 +98,7 @@ class Cpu(Executor):
         self.next_event = 0
         self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
-        self.next_mark = _NEVER
+        self.next_mark = NEVER_TICK
         self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
@@ -239,7 +238,7 @@ class Cpu(Executor):
     def set_external(self, port: int, levels: int, tick: int) -> None:
         """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
         if (
-            self.peripherals.ports.next_cycle == _NEVER
+            self.peripherals.ports.next_cycle == NEVER_TICK
             and (port == 0 or port == 2)
             and tick <= 12 * self.cycles + 9
         ):
@@ -255,7 +254,7 @@ class Cpu(Executor):
         """Whether only a reset or a new input can make it execute another instruction."""
         if self.powered_down:
             return True
-        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _NEVER
+        return bool(self.idle) and self.peripherals.next_event(self.cycles) == NEVER_TICK
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -272,7 +271,9 @@ class Cpu(Executor):
     # The run loop's view of time
 
     def begin_run(self) -> None:
-        self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _NEVER
+        self.next_mark = (
+            (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else NEVER_TICK
+        )
         self.peripherals.look_again()  # more may have been put on RXD since the last run
         self.next_event = 0
 
@@ -353,7 +354,7 @@ class Cpu(Executor):
         """Looks up again when less may be known of what ends idle mode: then nothing may be left."""
         self.peripherals.settle()
         turn = self.peripherals.serial_turn()
-        if self.next_event >= _NEVER:
+        if self.next_event >= NEVER_TICK:
             self.next_event = now + 1
         elif turn < self.next_event:
             self.next_event = turn

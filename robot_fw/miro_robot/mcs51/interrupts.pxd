@@ -1,6 +1,6 @@
 cimport cython
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 
 @cython.final
 cdef class Interrupts:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
 
-_NEVER = NEVER_TICK
 SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
 INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
 
@@ -58,16 +57,16 @@ class Interrupts:
 
         The serial port tells of what it sent before it tells of what it received.
         """
-        if self.until[source] != _NEVER:
+        if self.until[source] != NEVER_TICK:
             self.since[source] = cycle
-            self.until[source] = _NEVER
+            self.until[source] = NEVER_TICK
             self.asked |= 1 << source
         elif cycle < self.since[source]:
             self.since[source] = cycle
 
     def withdraw(self, source: int, cycle: int) -> None:
         """The source's flag is no longer seen at S5P2 of `cycle`."""
-        if self.until[source] == _NEVER:
+        if self.until[source] == NEVER_TICK:
             self.until[source] = cycle
 
     def enabled(self) -> int:
@@ -96,7 +95,7 @@ class Interrupts:
     def next_boundary(self, now: int) -> int:
         """The first cycle >= `now` in which `choose` may find something among the flags known, or NEVER_TICK."""
         waiting = self.open() & self.asked
-        earliest = _NEVER
+        earliest = NEVER_TICK
         for source in range(6 if waiting else 0):
             if not (waiting >> source) & 1:
                 continue

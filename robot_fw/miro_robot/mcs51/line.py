@@ -20,7 +20,6 @@ from array import array
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK, Items
 
-_NEVER = NEVER_TICK
 _SIZE = 4096  # places of a new ring; always a power of two
 WAITING = 2048
 """Edges that may wait for the listener before the line is full."""
@@ -113,7 +112,7 @@ class Line:
         """Tick of the first edge strictly after `tick`, NEVER_TICK if none is known."""
         self._seek(tick)
         if self._cursor == self._end:
-            return _NEVER
+            return NEVER_TICK
         return self._ticks[self._cursor & self._mask]
 
     def edge_at(self, tick: int) -> int:
@@ -129,7 +128,7 @@ class Line:
         self._seek(tick)
         cursor = self._cursor
         level = self._before ^ ((cursor - self._first) & 1)
-        edge = self._ticks[cursor & self._mask] if cursor < self._end else _NEVER
+        edge = self._ticks[cursor & self._mask] if cursor < self._end else NEVER_TICK
         levels = 0
         taken = 0
         while taken < most and tick + width < edge and tick + width < end:
@@ -139,7 +138,7 @@ class Line:
             while edge <= tick:
                 level ^= 1
                 cursor += 1
-                edge = self._ticks[cursor & self._mask] if cursor < self._end else _NEVER
+                edge = self._ticks[cursor & self._mask] if cursor < self._end else NEVER_TICK
         self._cursor = cursor
         return taken << 16 | levels
 
@@ -160,7 +159,7 @@ class Line:
     def full_tick(self) -> int:
         """Tick of the 2048th edge that waits to be heard, NEVER_TICK if there are not so many."""
         if self._end - self._heard < _WAITING:
-            return _NEVER
+            return NEVER_TICK
         return self._ticks[(self._heard + _WAITING - 1) & self._mask]
 
     def edges(self) -> list[tuple[int, int]]:

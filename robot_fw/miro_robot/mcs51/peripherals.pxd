@@ -8,7 +8,7 @@ from miro_robot.mcs51.timer2 cimport Timer2
 from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef int _UNIMPLEMENTED
 cdef int _P0
 cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1
@@ -19,7 +19,7 @@ cdef int _S5P2
 cdef int _SERIAL, _TIMER2, _BOTH_TIMERS
 cdef int _REN, _SETTINGS, _RI_TI
 cdef long long _NO_PERIOD
-cdef long long _STOPPED
+cdef long long STOPPED_TICK
 
 @cython.final
 cdef class Peripherals:

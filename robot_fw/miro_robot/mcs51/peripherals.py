@@ -27,7 +27,6 @@ from miro_robot.mcs51.timer2 import Timer2
 from miro_robot.mcs51.timers import Timers
 from miro_robot.mcs51.uart import STOPPED_TICK, Uart
 
-_NEVER = NEVER_TICK
 _UNIMPLEMENTED = 0xFF  # what an address without a register reads as (C5)
 _P0 = 0x80
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
@@ -38,7 +37,6 @@ _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2, _BOTH_TIMERS = 0x10, 0x20, 0x0A  # in IE
 _REN, _SETTINGS, _RI_TI = 0x10, 0xF0, 0x03  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
-_STOPPED = STOPPED_TICK
 
 
 class Peripherals:
@@ -174,7 +172,7 @@ class Peripherals:
 
     def _sync_pulsed(self, cycle: int) -> None:
         """The serial port gets its 16x ticks one by one from the overflows of a timer that counts a pin."""
-        pulse1 = self.timers.next_overflow(1) if self.timers.counts_pin(1) else _NEVER
+        pulse1 = self.timers.next_overflow(1) if self.timers.counts_pin(1) else NEVER_TICK
         pulse2 = self.timer2.next_pin_overflow()
         self.timers.sync(cycle)
         self.timer2.sync(cycle)
@@ -217,7 +215,7 @@ class Peripherals:
         if self.interrupts.enabled() & _SERIAL:
             if self.serial_wait < 0:
                 self.settle()
-            if self.serial_wait < _STOPPED:
+            if self.serial_wait < STOPPED_TICK:
                 flag = (self.serial_wait + 2) // 12 + 2
                 if flag < event:
                     event = flag
@@ -228,7 +226,7 @@ class Peripherals:
         tick = self.uart.turn_tick()
         if self.serial_wait < tick:
             tick = self.serial_wait
-        return tick // 12 + 1 if tick < _STOPPED else _NEVER
+        return tick // 12 + 1 if tick < STOPPED_TICK else NEVER_TICK
 
     def serial_tick(self) -> int:
         """A tick before which neither TI nor RI will go up."""
@@ -250,7 +248,7 @@ class Peripherals:
         mode = self.uart.mode()
         self._note_clocks(mode)
         if mode == 0:
-            self.uart.set_clock(_NEVER, 0, _NEVER, 0)
+            self.uart.set_clock(NEVER_TICK, 0, NEVER_TICK, 0)
             return
         next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle (U8)
         period1 = 2 if self.smod else 4
@@ -279,11 +277,11 @@ class Peripherals:
     def _timer1_tick(self) -> int:
         """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one since reset (U1)."""
         if self.timers.counts_pin(1):
-            return _NEVER
+            return NEVER_TICK
         cycle = self.timers.next_overflow(1)
-        if cycle < _NEVER and not self.smod and not self.timers.overflows1 & 1:
+        if cycle < NEVER_TICK and not self.smod and not self.timers.overflows1 & 1:
             cycle += self.timers.span(1)
-        return 12 * cycle + _S5P2 if cycle < _NEVER else _NEVER
+        return 12 * cycle + _S5P2 if cycle < NEVER_TICK else NEVER_TICK
 
     # Pins
 

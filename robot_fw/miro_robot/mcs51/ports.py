@@ -16,7 +16,6 @@ from msgspec import Meta
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 
-_NEVER = NEVER_TICK
 _Push = tuple[
     Annotated[int, Meta(ge=0, le=1 << 55)],
     Annotated[int, Meta(ge=0, le=3)],
@@ -38,7 +37,7 @@ class Ports:
         self.latches = [0xFF] * 4
         self.outside = [0xFF] * 4
         self.pending: list[tuple[int, int, int]] = []  # (cycle, port, levels), by cycle
-        self.next_cycle = _NEVER  # of the first of them
+        self.next_cycle = NEVER_TICK  # of the first of them
 
     def level(self, port: int) -> int:
         return self.latches[port] & self.outside[port]
@@ -56,7 +55,7 @@ class Ports:
         while self.next_cycle <= cycle:
             _, port, levels = self.pending.pop(0)
             self.outside[port] = levels
-            self.next_cycle = self.pending[0][0] if self.pending else _NEVER
+            self.next_cycle = self.pending[0][0] if self.pending else NEVER_TICK
 
     def after_load(self) -> None:
-        self.next_cycle = self.pending[0][0] if self.pending else _NEVER
+        self.next_cycle = self.pending[0][0] if self.pending else NEVER_TICK

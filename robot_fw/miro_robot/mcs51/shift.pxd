@@ -4,7 +4,7 @@ from miro_robot.mcs51.line cimport Line
 from miro_robot.mcs51.uart cimport Uart
 
 cdef int _REN, _TI, _RI
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef int _SAMPLE
 cdef int _CLOCK_FALLS, _CLOCK_RISES
 

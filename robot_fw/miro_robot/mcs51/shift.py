@@ -16,7 +16,6 @@ from miro_robot.mcs51.line import Line
 from miro_robot.mcs51.uart import Uart
 
 _REN, _TI, _RI = 0x10, 0x02, 0x01
-_NEVER = NEVER_TICK
 _SAMPLE = 9  # S5P2
 _CLOCK_FALLS, _CLOCK_RISES = 4, 10  # S3P1, S6P1
 
@@ -94,7 +93,7 @@ class Shift:
 
     def flag_tick(self) -> int:
         """Tick at which TI or RI goes up, NEVER_TICK when idle."""
-        return 12 * (self.cycle + 8 - self.number) if self.flag else _NEVER
+        return 12 * (self.cycle + 8 - self.number) if self.flag else NEVER_TICK
 
     def check_times(self, cycle: int) -> None:
         """Raises ValueError unless the register goes on at `cycle`."""

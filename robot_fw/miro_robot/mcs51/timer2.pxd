@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.interrupts cimport Interrupts
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef long long _NONE
 cdef int _TIMER2
 cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2

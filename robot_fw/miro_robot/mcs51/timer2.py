@@ -20,7 +20,6 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
-_NEVER = NEVER_TICK
 _NONE = -1
 _TIMER2 = 5  # its place in the polling order
 _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2 = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
@@ -145,16 +144,16 @@ class Timer2:
             # EXF2 asks a cycle later, but TF2 may go up in the same cycle: by a reload, too.
             return self.synced - 1
         if self.control & _TF2 or self.silent():
-            return _NEVER
+            return NEVER_TICK
         if self.rate():
             return self.synced + self.left() - 2
         overflow = self.next_pin_overflow()
-        return overflow - 1 if overflow < _NEVER else _NEVER
+        return overflow - 1 if overflow < NEVER_TICK else NEVER_TICK
 
     def next_overflow_tick(self) -> int:
         """Tick at which the state ends that overflows next as a baud rate generator, or NEVER_TICK."""
         if self.rate() != _STATES:
-            return _NEVER
+            return NEVER_TICK
         return 12 * self.synced + 2 * self.left() - 1
 
     def counts_pin(self) -> int:
@@ -163,7 +162,7 @@ class Timer2:
     def next_pin_overflow(self) -> int:
         """Cycle in which a fall of T2 that was seen already overflows, or NEVER_TICK."""
         waiting = self.counts_pin() and self.left() == 1 and self.edge_cycle >= self.synced
-        return self.edge_cycle if waiting else _NEVER
+        return self.edge_cycle if waiting else NEVER_TICK
 
     def fall(self, cycle: int) -> None:
         """T2 was high in one sample and low in the next, that of `cycle`."""

@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.interrupts cimport Interrupts
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef long long _NONE
 cdef int _TIMER0, _TIMER1, _TF0, _TF1, _TR0, _TR1
 

@@ -17,7 +17,6 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
-_NEVER = NEVER_TICK
 _NONE = -1  # no counter edge waiting
 _TIMER0, _TIMER1 = 0x02, 0x08  # in IE
 _TF0, _TF1 = 0x20, 0x80  # in TCON
@@ -66,7 +65,7 @@ class Timers:
         self.steady = 0  # a bit per part that counts cycles
         self.start = [0] * 3  # cycle in which a part that counts cycles would have stood at 0
         self.top = [0] * 3  # the count that overflows
-        self.due = _NEVER  # no overflow and no fall that counts comes before this cycle
+        self.due = NEVER_TICK  # no overflow and no fall that counts comes before this cycle
         self._set_mode(0)
 
     def clear(self, cycle: int) -> None:
@@ -92,7 +91,7 @@ class Timers:
         """TMOD, with all counts in TL and TH."""
         self.tmod = tmod
         self.steady = 0
-        self.due = _NEVER
+        self.due = NEVER_TICK
         self.on_pins = self.counts_pin(0) | self.counts_pin(1) << 1
         for part in range(3):
             mode = 2 if part == 2 else self.mode(part)
@@ -181,12 +180,12 @@ class Timers:
         if self.steady >> part & 1:
             return self.start[part] + self.top[part] - 1
         if self.counting >> part & 1 and self.top[part] - self.value(part) == 1:
-            return self.edge_cycle[part] if self.edge_cycle[part] >= self.synced else _NEVER
-        return _NEVER
+            return self.edge_cycle[part] if self.edge_cycle[part] >= self.synced else NEVER_TICK
+        return NEVER_TICK
 
     def next_flag(self, timers: int) -> int:
         """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK. `timers`: which, as in IE."""
-        first = _NEVER
+        first = NEVER_TICK
         if timers & _TIMER0 and not self.control & _TF0:
             first = self.next_overflow(0)
         if timers & _TIMER1 and not self.control & _TF1:
@@ -262,7 +261,7 @@ class Timers:
 
     def _pass(self, cycle: int) -> None:
         """The overflows and the falls that count in the cycles `synced` .. `cycle` - 1."""
-        self.due = _NEVER
+        self.due = NEVER_TICK
         for part in range(3):
             if not self.counting >> part & 1:
                 continue

@@ -4,7 +4,7 @@ from miro_robot.mcs51.bus cimport Bus
 from miro_robot.mcs51.interrupts cimport Interrupts
 from miro_robot.mcs51.line cimport Line
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 cdef long long _STOPPED
 cdef long long _STOPPED_PERIOD
 cdef int _SERIAL

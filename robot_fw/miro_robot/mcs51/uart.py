@@ -25,7 +25,6 @@ from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import Interrupts
 from miro_robot.mcs51.line import Line
 
-_NEVER = NEVER_TICK
 STOPPED_TICK = 1 << 61
 """Next tick of a clock that does not run. A tick computed from it lies beyond it, and never comes."""
 _STOPPED = STOPPED_TICK
@@ -78,7 +77,7 @@ class Uart:
         self.bus = bus
         self.interrupts = interrupts
         self.rxd = Line()
-        self.rxd.settled_tick = _NEVER  # nothing connected: mark, until a producer sets it
+        self.rxd.settled_tick = NEVER_TICK  # nothing connected: mark, until a producer sets it
         self.txd = Line()
         self.txd.unread = True  # until a listener says otherwise
         self.latch = 3
@@ -93,7 +92,7 @@ class Uart:
         self.tx_value = 0
         self.tx_delay = 0  # from rollover to pin (U3); 0 before the start bit
         self.tx_level = 1  # what the transmitter puts on TXD
-        self.tx_edge = _NEVER  # tick at which tx_coming replaces it
+        self.tx_edge = NEVER_TICK  # tick at which tx_coming replaces it
         self.tx_coming = 1
         # receiver
         self.rx_next = _STOPPED
@@ -102,7 +101,7 @@ class Uart:
         self.rx_last = 1  # RXD at the last 16x tick
         self.rx_votes = 0
         self.rx_bits = 0
-        self.rx_done = _NEVER  # tick at which rx_frame is delivered
+        self.rx_done = NEVER_TICK  # tick at which rx_frame is delivered
         self.rx_frame = 0  # data, and the bit after them in bit 8
 
     def clear(self, cycle: int) -> None:
@@ -116,10 +115,10 @@ class Uart:
         """Both state machines to idle: reset, and a change of mode; with everything below `tick` done."""
         self.txd.append(tick, self.latch >> 1)
         self.tx_left = 0
-        self.tx_edge = _NEVER
+        self.tx_edge = NEVER_TICK
         self.tx_level = 1
         self.rx_count = 0
-        self.rx_done = _NEVER
+        self.rx_done = NEVER_TICK
 
     def mode(self) -> int:
         return self.scon >> 6
@@ -225,7 +224,7 @@ class Uart:
         if self.tx_left == 0:
             self.raise_flag(_TI, self.tx_edge)
             self.bus.byte_sent(self.tx_value, self.tx_edge)
-        self.tx_edge = _NEVER
+        self.tx_edge = NEVER_TICK
 
     def ti_tick(self) -> int:
         """Tick at which TI goes up if nothing changes, NEVER_TICK if nothing is being sent."""
@@ -267,7 +266,7 @@ class Uart:
                 self.rx_next = now + self.rx_period
                 return
             self.rx_last = level
-            change = self.rxd.next_edge(now) if self.latch & 1 else _NEVER
+            change = self.rxd.next_edge(now) if self.latch & 1 else NEVER_TICK
             if change > tick:
                 change = tick
             now += ((change - now + self.rx_period - 1) // self.rx_period) * self.rx_period
@@ -341,7 +340,7 @@ class Uart:
     def _deliver(self) -> None:
         """Into SBUF and RB8, if RI is 0 and SM2 lets it pass; otherwise the frame is lost."""
         tick = self.rx_done
-        self.rx_done = _NEVER
+        self.rx_done = NEVER_TICK
         last = self.rx_frame >> 8
         if self.scon & _RI or (self.scon & _SM2 and not last):
             return
@@ -352,14 +351,14 @@ class Uart:
 
     def ri_tick(self) -> int:
         """A tick before which RI will not go up: where the next character shows, NEVER_TICK if none can come."""
-        if self.rx_done != _NEVER:
+        if self.rx_done != NEVER_TICK:
             return self.rx_done
         if self.rx_count > _LAST_ACTION:  # a nine-bit frame without its stop bit: no other begins before that
             return self.rx_next + (_LAST_ACTION + _ROLLOVERS - self.rx_count) * self.rx_period
         if self.rx_count:
             return _flag_tick(self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period)
         start = self._start_tick()
-        return _flag_tick(start + _LAST_ACTION * self.rx_period) if start < _STOPPED else _NEVER
+        return _flag_tick(start + _LAST_ACTION * self.rx_period) if start < _STOPPED else NEVER_TICK
 
     def _start_tick(self) -> int:
         """The 16x tick that finds the next start bit, as far as is known; NEVER_TICK if none can come.
@@ -368,22 +367,22 @@ class Uart:
         """
         tick = self.rx_next
         if not self.scon & _REN or tick >= _STOPPED:
-            return _NEVER
+            return NEVER_TICK
         if not self.latch & 1:  # P3.0 holds RXD low
-            return tick if self.rx_last else _NEVER
+            return tick if self.rx_last else NEVER_TICK
         settled = self.rxd.settled_tick
         if tick >= settled or (self.rx_last and not self.rxd.level_at(tick)):
             return tick
         change = self.rxd.next_edge(tick)
         if change > settled:
             change = settled
-        return change + (tick - change) % self.rx_period if change < _STOPPED else _NEVER
+        return change + (tick - change) % self.rx_period if change < _STOPPED else NEVER_TICK
 
     def turn_tick(self) -> int:
         """A tick before which nothing changes what `ri_tick` knows: a fall, the vote of a start bit, RI."""
-        if self.rx_done == _NEVER and self.rx_count == 0:
+        if self.rx_done == NEVER_TICK and self.rx_count == 0:
             return self._start_tick()
-        if self.rx_done == _NEVER and self.rx_count <= _ACTION:
+        if self.rx_done == NEVER_TICK and self.rx_count <= _ACTION:
             return self.rx_next + (_ACTION - self.rx_count) * self.rx_period
         return self.ri_tick()
 
