@@ -55,7 +55,7 @@ SSE = ["-msse2", "-mfpmath=sse"] if sys.maxsize < 1 << 32 and platform.machine()
 SCALAR = ["-fno-tree-slp-vectorize", *SSE]
 HOTTEST = re.compile(
     r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.regions"
-    r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(axis|bus_timing|encoder|pid))"
+    r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(bus_timing|chip|encoder|pid))"
     r"|miro_robot\.mcs51\.(core|cpu|execute|interrupts|line|peripherals|timers|uart)"
     r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|drive)"
 )

@@ -2,10 +2,10 @@
 
 The log is no state: it changes no bit of a run, and a board that is restored begins a new one.
 
-    kind        code                       value and size
+    kind        code                       value
     RECEIVED    stop bit good (1) or not   the character that the serial port delivered
     SENT        -                          the character whose stop bit begins
-    COMMAND     side << 8 | opcode         the data bytes of an LM629 command, `size` of them, first one highest
+    COMMAND     side << 8 | opcode         - (`data`: the data bytes of an LM629 command)
     FAULT       kind of fault              address of the instruction
     REACHED     instructions so far        address of the instruction that is next
     TRUE        -                          - (a predicate of the caller's)
@@ -18,13 +18,13 @@ from __future__ import annotations
 RECEIVED, SENT, COMMAND, FAULT, REACHED, TRUE = 0, 1, 2, 3, 4, 5
 CAPACITY = 2048
 _MASK = 2047
-_LOW_BITS = 56  # of a value: two halves of seven bytes each
+_COMMAND = COMMAND
 
 
 class EventLog:
     """The last 2048 events of one board. `end`: serial number of the next one; `first`: of the oldest kept."""
 
-    NOT_STATE = ("end", "first", "_ticks", "_kinds", "_codes", "_sizes", "_high", "_low")
+    NOT_STATE = ("end", "first", "_ticks", "_kinds", "_codes", "_values", "_data")
 
     def __init__(self) -> None:
         self.end = 0
@@ -32,23 +32,18 @@ class EventLog:
         self._ticks = [0] * 2048
         self._kinds = [0] * 2048
         self._codes = [0] * 2048
-        self._sizes = [0] * 2048
-        self._high = [0] * 2048
-        self._low = [0] * 2048
+        self._values = [0] * 2048
+        self._data = [b""] * 2048
 
-    def note(self, kind: int, tick: int, code: int, value: int) -> None:
-        """Adds an event whose value has at most 62 bits."""
-        self.note_long(kind, tick, code, 1, 0, value)
-
-    def note_long(self, kind: int, tick: int, code: int, size: int, high: int, low: int) -> None:
-        """The same for a value of two halves, the low one of seven bytes."""
+    def note(self, kind: int, tick: int, code: int, value: int, data: bytes = b"") -> None:
+        """Adds an event."""
         place = self.end & _MASK
         self._ticks[place] = tick
         self._kinds[place] = kind
         self._codes[place] = code
-        self._sizes[place] = size
-        self._high[place] = high
-        self._low[place] = low
+        self._values[place] = value
+        if kind == _COMMAND:
+            self._data[place] = data
         self.end += 1
         if self.end - self.first > CAPACITY:
             self.first = self.end - CAPACITY
@@ -57,15 +52,15 @@ class EventLog:
         """Adds an event of another log once more."""
         place = serial & _MASK
         kind, tick, code = other._kinds[place], other._ticks[place], other._codes[place]
-        self.note_long(kind, tick, code, other._sizes[place], other._high[place], other._low[place])
+        self.note(kind, tick, code, other._values[place], other._data[place])
 
-    def event(self, serial: int) -> tuple[int, int, int, int, int]:
-        """(tick, kind, code, size, value). Raises IndexError for an event that is not kept."""
+    def event(self, serial: int) -> tuple[int, int, int, int, bytes]:
+        """(tick, kind, code, value, data). Raises IndexError for an event that is not kept."""
         if not self.first <= serial < self.end:
             raise IndexError(f"event {serial} is not among {self.first} to {self.end - 1}")
         place = serial & _MASK
-        value = self._high[place] << _LOW_BITS | self._low[place]
-        return self._ticks[place], self._kinds[place], self._codes[place], self._sizes[place], value
+        tick, kind, code = self._ticks[place], self._kinds[place], self._codes[place]
+        return tick, kind, code, self._values[place], self._data[place] if kind == COMMAND else b""
 
     def cut(self, serial: int) -> None:
         """Forgets the events from `serial` on: the board goes back to before them."""

@@ -10,8 +10,6 @@ from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.orders import WheelOrder
 from miro_sim.world.events import SIDES, Event
 
-_LOW_BITS = 56
-
 
 def saturated(word: int) -> int:
     """A velocity as firmware cuts it off."""
@@ -52,8 +50,7 @@ class Orders:
     def take(self, event: Event) -> Order | None:
         """The order that this command gives, if it gives one."""
         wheel = self.wheels[event.side]
-        value = int.from_bytes(event.data, "big")
-        if not wheel.take(event.opcode, len(event.data), value >> _LOW_BITS, value & (1 << _LOW_BITS) - 1):
+        if not wheel.take(event.opcode, event.data):
             return None
         order = Order(event.tick, event.side, wheel.what, wheel.velocity, wheel.acceleration, wheel.abrupt)
         self.last[event.side] = order

@@ -8,9 +8,9 @@ from miro_robot.harness.harness cimport LiveOracle
 from miro_robot.lm629.orders cimport WheelOrder
 
 cdef int _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
-cdef long long _ACTING, _EDGE, _FRESH_AGAIN, _NEVER, _TO_RI, _TO_TI
-cdef int _FRESH_STEPS, _SATURATION, _TEAM, _ASK, _SEQS, _SLOT_MASK
-cdef int _RECEIVED, _SENT, _COMMAND, _FAULT, _COMMAND_ERROR
+cdef long long ACTING_TICKS, EDGE_TICKS, FRESH_AGAIN_TICKS, NEVER_TICK, TO_RI_TICKS, TO_TI_TICKS
+cdef int FRESH_STEPS, VELOCITY_SATURATION, _TEAM, _ASK, SEQ_MODULUS, SLOT_MASK
+cdef int RECEIVED, SENT, COMMAND, FAULT, COMMAND_ERROR
 
 
 cdef class FastOracle(LiveOracle):
@@ -45,7 +45,7 @@ cdef class FastOracle(LiveOracle):
     cdef bint _stops_already(self) except -1
     cdef bint _read_pair(self) noexcept
     cdef int _word(self, int place) noexcept
-    cdef int _command(self, long long tick, int code, int size, long long high, long long low) except -1
+    cdef int _command(self, long long tick, int code, bytes data) except -1
     cdef int _order(self, long long tick, WheelOrder order, bint moved, bint driven) except -1
     cdef int _sent(self, long long tick, int value) except -1
     cdef int _answer(self, long long tick) except -1

@@ -37,8 +37,8 @@ from miro_protocol.table import (
     FrameType,
     downlink,
 )
-from miro_robot import event_log
 from miro_robot.board import Board
+from miro_robot.event_log import COMMAND, FAULT, RECEIVED, SENT
 from miro_robot.harness.harness import LiveOracle
 from miro_robot.lm629.orders import WheelOrder
 from miro_robot.lm629.signals import COMMAND_ERROR
@@ -60,15 +60,7 @@ EDGE_TICKS = TICKS_PER_MS // 5
 """Firmware tells 150 ms to within 0.1 ms: what it makes of a frame so near to that, nobody can say."""
 
 _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(1, 10)
-_ACTING, _EDGE, _FRESH_AGAIN, _FRESH_STEPS = ACTING_TICKS, EDGE_TICKS, FRESH_AGAIN_TICKS, FRESH_STEPS
-_NEVER = NEVER_TICK
-_TO_RI, _TO_TI = TO_RI_TICKS, TO_TI_TICKS
-_SATURATION = VELOCITY_SATURATION
 _TEAM, _ASK = FrameType.TEAM, FrameType.TEAM_ASK
-_SEQS = SEQ_MODULUS
-_SLOT_MASK = SLOT_MASK
-_RECEIVED, _SENT, _COMMAND, _FAULT = event_log.RECEIVED, event_log.SENT, event_log.COMMAND, event_log.FAULT
-_COMMAND_ERROR = COMMAND_ERROR
 
 
 class FastOracle(LiveOracle):
@@ -138,13 +130,15 @@ class FastOracle(LiveOracle):
 
     def restarted(self, tick: int) -> None:
         """Pins that all went high at once may have told an LM629 nonsense, until firmware has reset it."""
-        self.up_tick = tick + _ACTING
+        self.up_tick = tick + ACTING_TICKS
         self.look(tick)
         self._forget()
         self.decided = 1
 
     def waits(self) -> bool:
-        return self.decided != 0 and (self.answers.asked_tick != _NEVER or self.driving.deadline != _NEVER)
+        return self.decided != 0 and (
+            self.answers.asked_tick != NEVER_TICK or self.driving.deadline != NEVER_TICK
+        )
 
     def look(self, tick: int) -> None:
         """Judges what has happened before `tick`."""
@@ -155,21 +149,21 @@ class FastOracle(LiveOracle):
             place = self.read & 2047
             at = log._ticks[place]
             kind = log._kinds[place]
-            if kind == _FAULT:
-                self._fault(at, log._codes[place], log._low[place])
+            if kind == FAULT:
+                self._fault(at, log._codes[place], log._values[place])
             else:
                 self._pass(at)
-                if kind == _RECEIVED:
-                    self._received(at, log._codes[place], log._low[place])
-                elif kind == _COMMAND:
-                    self._command(at, log._codes[place], log._sizes[place], log._high[place], log._low[place])
-                elif kind == _SENT:
-                    self._sent(at, log._low[place])
+                if kind == RECEIVED:
+                    self._received(at, log._codes[place], log._values[place])
+                elif kind == COMMAND:
+                    self._command(at, log._codes[place], log._data[place])
+                elif kind == SENT:
+                    self._sent(at, log._values[place])
             self.read += 1
         if self.code == 0:
             self._pass(tick)
             word = self.board.left.signals.word | self.board.right.signals.word
-            if word & _COMMAND_ERROR and tick > self.up_tick:
+            if word & COMMAND_ERROR and tick > self.up_tick:
                 self._found(_LM629, tick)
 
     def _found(self, code: int, tick: int) -> None:
@@ -210,14 +204,14 @@ class FastOracle(LiveOracle):
     def _received(self, tick: int, good_stop: int, value: int) -> None:
         self.stop.received(tick)
         self.off.received(tick)
-        if self.window.take(value, good_stop == 0, tick - _TO_RI):
-            self._frame(tick - _TO_RI)
+        if self.window.take(value, good_stop == 0, tick - TO_RI_TICKS):
+            self._frame(tick - TO_RI_TICKS)
 
     def _frame(self, tick: int) -> None:
         """A valid frame, whose last character began at `tick`."""
         hdr = self.window.body_at(0)
         kind = hdr >> 6
-        seq = hdr % _SEQS
+        seq = hdr % SEQ_MODULUS
         self._ask_whether_decided(seq, tick)
         fresh = self.freshness.judge(seq, tick)
         team = kind in (_TEAM, _ASK) and self._read_pair()
@@ -236,10 +230,10 @@ class FastOracle(LiveOracle):
                 self.answers.question(tick, seq)
 
     def _ask_whether_decided(self, seq: int, tick: int) -> None:
-        since = tick - self.fresh_tick - _FRESH_AGAIN
-        if self.fresh_tick >= 0 and -_EDGE <= since <= _EDGE:
-            step = (seq - self.fresh_seq) % _SEQS
-            if step == 0 or step > _FRESH_STEPS:
+        since = tick - self.fresh_tick - FRESH_AGAIN_TICKS
+        if self.fresh_tick >= 0 and -EDGE_TICKS <= since <= EDGE_TICKS:
+            step = (seq - self.fresh_seq) % SEQ_MODULUS
+            if step == 0 or step > FRESH_STEPS:
                 self.decided = 0
 
     def _stops_already(self) -> bool:
@@ -264,14 +258,14 @@ class FastOracle(LiveOracle):
         word = self.window.body_at(place) | self.window.body_at(place + 1) << 8
         if word >= 0x8000:
             word -= 0x10000
-        return max(-_SATURATION, min(_SATURATION, word))
+        return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
 
     # ---- what the wheels are told, and what is sent --------------------------------------------------------
 
-    def _command(self, tick: int, code: int, size: int, high: int, low: int) -> None:
+    def _command(self, tick: int, code: int, data: bytes) -> None:
         order = self.right_order if code >> 8 & 1 else self.left_order
         moved, driven = order.moves(), order.what != "off"
-        if order.take(code & 0xFF, size, high, low):
+        if order.take(code & 0xFF, data):
             self._order(tick, order, moved, driven)
 
     def _order(self, tick: int, order: WheelOrder, moved: bool, driven: bool) -> None:
@@ -289,12 +283,12 @@ class FastOracle(LiveOracle):
     def _sent(self, tick: int, value: int) -> None:
         if not self.answers.character():
             self._found(_IN_TURN, tick)
-        elif self.telemetry.take(value, False, tick - _TO_TI):
-            self._answer(tick - _TO_TI)
+        elif self.telemetry.take(value, False, tick - TO_TI_TICKS):
+            self._answer(tick - TO_TI_TICKS)
 
     def _answer(self, tick: int) -> None:
-        seq = self.telemetry.body_at(0) % _SEQS
-        slot = self.telemetry.body_at(1) & _SLOT_MASK
+        seq = self.telemetry.body_at(0) % SEQ_MODULUS
+        slot = self.telemetry.body_at(1) & SLOT_MASK
         if not self.answers.in_turn(seq) or slot != self.slot:
             self._found(_IN_TURN, tick)
         if self.answers.late(tick, seq):

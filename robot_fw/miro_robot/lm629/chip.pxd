@@ -1,17 +1,22 @@
 cimport cython
 
-from miro_robot.lm629.axis cimport MotorAxis
-from miro_robot.lm629.buffers cimport TrajectoryBuffer, fit_15
+from miro_robot.event_log cimport EventLog
+from miro_robot.lm629.buffers cimport FilterBuffer, TrajectoryBuffer, fit_15, signed_31
+from miro_robot.lm629.encoder cimport Encoder
+from miro_robot.lm629.host_port cimport HostPort
+from miro_robot.lm629.pid cimport Pid
+from miro_robot.lm629.signals cimport Signals
 from miro_robot.lm629.trajectory cimport ProfileGenerator
 
 
-cdef long long _NEVER, _SAMPLE_TICKS, _PWM_TICKS
+cdef long long NEVER_TICK, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
+cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE
 cdef int _COMMAND_ERROR, _ACCELERATION_LOADED, _OUTPUT_8_BIT
-cdef int _COMMAND_CAME, _WORD_CAME, _ANSWERED, _SOFTWARE_RESET
-cdef int _STOPS, _COMPLETED, _OUT_OF_RANGE, _COMMAND
-cdef long long _SEVEN_BYTES
+cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY
+cdef int _STOPS, _COMPLETED, _OUT_OF_RANGE, COMMAND
+cdef int _COMMAND_CAME, _WORD_CAME, _ANSWERED, _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET
 cdef int _RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12
 cdef int _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS
 cdef int _LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR
@@ -19,13 +24,51 @@ cdef unsigned char _WORDS_IN[256]
 cdef unsigned char _WORDS_OUT[256]
 
 
+cdef int _side(long long value) noexcept
+
+
 @cython.final
-cdef class Lm629(MotorAxis):
+cdef class Lm629:
+    cdef readonly object options
+    cdef readonly long long reset_ticks
+    cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats, clamps
+    cdef readonly HostPort port
+    cdef readonly Encoder encoder
+    cdef readonly ProfileGenerator trajectory
+    cdef readonly Pid pid
+    cdef readonly Signals signals
+    cdef readonly TrajectoryBuffer trajectory_buffer
+    cdef readonly FilterBuffer filter_buffer
+    cdef readonly EventLog log
+    cdef readonly int side
+    cdef public list commands, encoder_edges
+    cdef public long long writes_while_busy
+    cdef public long long next_tick, sample_tick, period_tick, reset_tick
+    cdef public int mode, reset_level, start_taken
+    cdef public long long threshold, real_position, real_velocity, index_position, breakpoint
+    cdef public int breakpoint_armed, breakpoint_side, excessive
+    cdef public int pwm, pwm_magnitude, sign, hi, pulses
+
+    cpdef set_reset(self, long long tick, int level)
+    cdef _enter_reset(self, int mode, int lock, long long until_tick)
+    cdef _end_reset(self, long long now)
+    cpdef int advance(self, long long tick) except -1
+    cpdef rest(self, long long tick)
+    cdef inline int _period(self, long long now) except -1
+    cdef bint _late_pulse_begins(self, long long now) noexcept
+    cdef inline int _sample(self, long long now) except -1
+    cdef inline int _latch_position(self, long long now) noexcept
+    cdef int _start(self) except -1
+    cdef _relative_base(self)
+    cdef inline int _step_profile(self) noexcept
+    cdef inline int _check_error(self, long long error) noexcept
+    cdef inline void _put_out(self, int drive) noexcept
+    cdef inline int _check_breakpoint(self) noexcept
+    cpdef int set_breakpoint(self, long long place) except -1
     cpdef void set_encoder(self, long long tick, int a, int b) noexcept
     cpdef void set_index(self, long long tick, int level) noexcept
     cpdef int set_bus(self, long long tick, int cs, int rd, int wr, int ps, int data) except -1
     cdef int _host(self, long long tick, int outcome) except -1
-    @cython.locals(high=cython.longlong, low=cython.longlong)
     cdef int _finished(self, long long tick) except -1
     cdef int _command(self, long long tick) except -1
     cdef int _execute(self, long long tick, int opcode) except -1

@@ -1,7 +1,7 @@
 cimport cython
 
 
-cdef long long _NEVER
+cdef long long NEVER_TICK
 
 
 @cython.final

@@ -2,7 +2,7 @@
 
 Nothing is done per clock: a level is known to count from the moment it has been there long enough, so every
 input keeps the tick at which that will be (`due`). What is made of the counts (positions, flags) is in
-`axis.py`.
+`chip.py`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 
-_NEVER = NEVER_TICK
 _COUNTS = ("q", -(1 << 40), 1 << 40)  # between two samples: far more than ticks
 
 
@@ -44,13 +43,13 @@ class InputFilter:
         self.run_tick = tick
         self.pin = level
         self.pin_tick = tick
-        self.due = _NEVER
+        self.due = NEVER_TICK
 
     def set(self, tick: int, level: int) -> None:
         """The pin changes at `tick`. What was due before that must have been taken already (`accept`)."""
         if self.direct:
             self.pin = level
-            self.due = tick if level != self.level else _NEVER
+            self.due = tick if level != self.level else NEVER_TICK
             return
         clock = (tick & -4) + 4
         if clock > self.pin_tick:
@@ -60,7 +59,7 @@ class InputFilter:
             self.pin_tick = clock
         self.pin = level
         if level == self.level:
-            self.due = _NEVER
+            self.due = NEVER_TICK
         elif level == self.run_level:
             self.due = self.run_tick + self.wait
         else:
@@ -69,7 +68,7 @@ class InputFilter:
     def accept(self) -> None:
         """The level at the pin counts from now on."""
         self.level = self.pin
-        self.due = _NEVER
+        self.due = NEVER_TICK
 
 
 class Encoder:
@@ -138,7 +137,7 @@ class Encoder:
         """
         quadrature = self.quadrature
         clock = first_tick & -4
-        waits = clock < quadrature.due != _NEVER or clock < quadrature.pin_tick
+        waits = clock < quadrature.due != NEVER_TICK or clock < quadrature.pin_tick
         if not self.seen or quadrature.direct or self.armed or self.index.due <= last_tick or waits:
             return 0
         if quadrature.due <= clock:

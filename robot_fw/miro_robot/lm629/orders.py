@@ -46,14 +46,14 @@ class WheelOrder:
         self._velocity = 0
         self._acceleration = 0
 
-    def take(self, opcode: int, size: int, high: int, low: int) -> bool:
-        """A command with `size` bytes of data, the last seven of which are in `low`. Returns whether it is an order."""
+    def take(self, opcode: int, data: bytes) -> bool:
+        """A command with its data bytes. Returns whether it is an order."""
         if opcode == _STT:
             self._start()
         elif opcode == _RESET:
             self.begin()
-        elif opcode == _LTRJ:
-            self._load(size, high, low)
+        elif opcode == _LTRJ and len(data) > 1:
+            self._load(data)
         return opcode in (_STT, _RESET)
 
     def moves(self) -> bool:
@@ -79,31 +79,22 @@ class WheelOrder:
             backward = control & VELOCITY_MODE and not control & FORWARD
             self.velocity = -self._velocity if backward else self._velocity
 
-    def _load(self, size: int, high: int, low: int) -> None:
-        control = _byte(size, high, low, 0) << 8 | _byte(size, high, low, 1)
+    def _load(self, data: bytes) -> None:
+        control = data[0] << 8 | data[1]
         self._control = control
         at = 2
-        if control & ACCELERATION and at + 4 <= size:
+        if control & ACCELERATION and at + 4 <= len(data):
             relative = control & ACCELERATION >> 1
-            self._acceleration = _number(size, high, low, at) + (self._acceleration if relative else 0)
+            self._acceleration = _number(data, at) + (self._acceleration if relative else 0)
             at += 4
-        if control & VELOCITY and at + 4 <= size:
+        if control & VELOCITY and at + 4 <= len(data):
             relative = control & VELOCITY >> 1
-            self._velocity = _number(size, high, low, at) + (self._velocity if relative else 0)
+            self._velocity = _number(data, at) + (self._velocity if relative else 0)
 
 
-def _number(size: int, high: int, low: int, at: int) -> int:
+def _number(data: bytes, at: int) -> int:
     """Four bytes with sign, the first of which is byte `at`."""
-    value = _byte(size, high, low, at)
-    value -= (value & 0x80) << 1
+    value = (data[at] ^ 0x80) - 0x80
     for place in range(at + 1, at + 4):
-        value = value * 256 + _byte(size, high, low, place)
+        value = value * 256 + data[place]
     return value
-
-
-def _byte(size: int, high: int, low: int, at: int) -> int:
-    """Byte `at` of `size` ones; 0 after the last."""
-    behind = 8 * (size - 1 - at)
-    if behind < 0:
-        return 0
-    return (low >> behind if behind < 56 else high >> (behind - 56)) & 0xFF

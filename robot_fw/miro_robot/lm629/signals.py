@@ -1,7 +1,7 @@
 """The signals register, the interrupt mask and what drives the HI pin.
 
 Bits 7..1 are those of the status byte; bit 0 is not the busy bit but "a SIP is pending". When a bit is set is
-decided in `chip.py` (commands) and `axis.py` (samples).
+decided in `chip.py`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 cimport cython
 
 
-cdef long long _NEVER, _HALF_SPACE, _SPACE_MASK
+cdef long long NEVER_TICK, _HALF_SPACE, _SPACE_MASK
 
 
 cdef long long _wrapped(long long position) noexcept

@@ -11,7 +11,6 @@ from __future__ import annotations
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG
 
-_NEVER = NEVER_TICK
 _HALF_SPACE = 1 << 46
 _SPACE_MASK = (1 << 47) - 1
 
@@ -26,7 +25,7 @@ def _stopping_distance(speed: int, acceleration: int) -> int:
     if speed == 0:
         return 0
     if acceleration == 0:
-        return _NEVER
+        return NEVER_TICK
     n = speed // acceleration
     return (n + 1) * speed - acceleration * n * (n + 1) // 2
 

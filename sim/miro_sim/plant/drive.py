@@ -118,7 +118,7 @@ class Winding:
                 self.drive = wanted
 
     def pass_edge(self, chip: Lm629) -> int:
-        """What `MotorAxis.advance` does at an edge, and the bridge's input after it. Returns the tick of the next."""
+        """What `Lm629.advance` does at an edge, and the bridge's input after it. Returns the tick of the next."""
         if chip.pwm:
             chip.pwm = 0
             chip.next_tick = chip.period_tick + LONGEST_STEP

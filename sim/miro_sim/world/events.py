@@ -245,9 +245,8 @@ class Cursor:
         return found
 
 
-def _event(tick: int, kind: int, code: int, size: int, value: int, network: int, slot: int) -> Event:
+def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: int, slot: int) -> Event:
     if kind == event_log.COMMAND:
-        data = value.to_bytes(size, "big")
         side, opcode = SIDES[code >> 8], code & 0xFF
         return Event(
             tick=tick, what="command", network=network, slot=slot, side=side, opcode=opcode, data=data
