@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -11,7 +10,6 @@ import click
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import check_regular
 from miro_exact.rng import Stream
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
@@ -129,16 +127,15 @@ def calibrate(options: CalibrateOptions) -> None:
     _check_outputs(options)
     first = None
     if options.initial is not None:
-        check_regular(options.initial)
         first = calibrations.read(options.initial).camera
     if scenario is not None:
         found = _of_scenario(scenario, first, options)
     else:
         assert points is not None
-        check_regular(points)
         measured = read_points(points)
         calibration = fit(measured, first or CameraParameters(), f"{points}")
-        found = _Found(measured, calibration, colours_text="" if samples is None else _classes(samples))
+        colours = "" if samples is None else classes_of(read_samples(samples), f"{samples}").text()
+        found = _Found(measured, calibration, colours_text=colours)
     texts = (found.calibration.text(), found.points_text, found.colours_text)
     for (option, path), text in zip(options.outputs.items(), texts, strict=True):
         if path is not None:
@@ -159,11 +156,6 @@ def _check_outputs(options: CalibrateOptions) -> None:
         other = seen.setdefault(path.resolve(), option)
         if other != option:
             raise OutputError(path, f"is the file of {other} and of {option}", "give two files")
-
-
-def _classes(samples: Path) -> str:
-    check_regular(samples)
-    return classes_of(read_samples(samples), f"{samples}").text()
 
 
 def _of_scenario(name: str, initial: CameraParameters | None, options: CalibrateOptions) -> _Found:
@@ -229,21 +221,11 @@ def marks_text(camera: CameraParameters, noise_px: float, seed: int) -> str:
     stream = Stream(seed, "calibrate/marks")
     lens = Lens(camera)
     rows = [",".join(COLUMNS)]
-    for number, (x_cm, y_cm, height_cm) in enumerate(_marks()):
+    marks = [(x, y, height) for columns, lines, height in (FLOOR_CM, TOPS_CM) for y in lines for x in columns]
+    for number, (x_cm, y_cm, height_cm) in enumerate(marks):
         u, v = lens.pixel(x_cm / 100.0, y_cm / 100.0, height_cm / 100.0)
         if 0.0 <= u <= WIDTH and 0.0 <= v <= HEIGHT:
-            u = _rounded(u + noise_px * stream.gauss(2 * number))
-            v = _rounded(v + noise_px * stream.gauss(2 * number + 1))
+            u += noise_px * stream.gauss(2 * number)
+            v += noise_px * stream.gauss(2 * number + 1)
             rows.append(f"{x_cm},{y_cm},{height_cm:g},{u:.4f},{v:.4f}")
     return "\n".join(rows) + "\n"
-
-
-def _marks() -> Iterator[tuple[int, int, float]]:
-    for columns, rows, height_cm in (FLOOR_CM, TOPS_CM):
-        for y_cm in rows:
-            for x_cm in columns:
-                yield x_cm, y_cm, height_cm
-
-
-def _rounded(px: float) -> float:
-    return math.floor(10_000.0 * px + 0.5) / 10_000.0

@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageOps
+from PIL.ImageFont import load_default
 
 from miro_exact.dmath import sincos
 from miro_host.eye.patterns import COLOURS
@@ -49,7 +50,6 @@ ASIDE_PX = 56
 """From the middle of a robot to its label: outside of the usual window."""
 
 Point = tuple[float, float]
-Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
 
 class Box(NamedTuple):
@@ -96,19 +96,12 @@ def draw(picture: Picture, tracker: Tracker, notes: Notes | None, caption: str) 
 
 def _outlined(image: Image.Image, picture: Picture, table: bytes, windows: Sequence[Window]) -> Image.Image:
     """Lines around the pixels of each colour class, on the pixels outside of them."""
-    kinds = _classes(picture, table, windows)
+    kinds = np.pad(_classes(picture, table, windows).repeat(SCALE, axis=0).repeat(SCALE, axis=1), 1)
     pixels = np.array(image)
     for kind, name in enumerate(COLOURS, start=1):
-        rows, columns = np.nonzero(kinds == kind)
-        if not rows.size:
-            continue
-        top, left = max(int(rows.min()) - 1, 0), max(int(columns.min()) - 1, 0)
-        part = kinds[top : int(rows.max()) + 2, left : int(columns.max()) + 2] == kind
-        own = part.repeat(SCALE, axis=0).repeat(SCALE, axis=1)
-        inside = np.pad(own, 1)
-        around = inside[:-2, 1:-1] | inside[2:, 1:-1] | inside[1:-1, :-2] | inside[1:-1, 2:]
-        place = pixels[SCALE * top :, SCALE * left :][: own.shape[0], : own.shape[1]]
-        place[around & ~own] = INK[name]
+        own = kinds == kind
+        around = own[:-2, 1:-1] | own[2:, 1:-1] | own[1:-1, :-2] | own[1:-1, 2:]
+        pixels[around & ~own[1:-1, 1:-1]] = INK[name]
     return Image.fromarray(pixels)
 
 
@@ -203,7 +196,7 @@ def _labels(tracker: Tracker, notes: Notes) -> list[_Label]:
 
 def _draw_labels(brush: ImageDraw.ImageDraw, labels: Sequence[_Label], team: str, sheet: Box) -> None:
     """Each beside its robot, where it covers least of robots, arrows and other labels."""
-    bold, font = _font(17), _font(14)
+    bold, font = load_default(17), load_default(14)
     others = [_around(label.at, ROBOT_PX) for label in labels]
     others += [_around(label.tip, 9.0) for label in labels if label.tip is not None]
     for label in labels:
@@ -213,15 +206,10 @@ def _draw_labels(brush: ImageDraw.ImageDraw, labels: Sequence[_Label], team: str
         costs = [_cost(place, others, sheet) for place in places]
         box = places[costs.index(min(costs))]
         others.append(box)
-        _write(brush, (box.left, box.bottom), label.number, INK[team], bold)
-        _write(brush, (box.left + first, box.bottom), label.text, label.colour, font)
-
-
-def _write(
-    brush: ImageDraw.ImageDraw, at: Point, text: str, colour: tuple[int, int, int], font: Font
-) -> None:
-    """Text whose line begins at a point, with a black edge."""
-    brush.text(at, text, colour, font, anchor="ls", stroke_width=2, stroke_fill=BLACK)
+        words = ((0.0, label.number, INK[team], bold), (first, label.text, label.colour, font))
+        for x, text, colour, its_font in words:
+            at = (box.left + x, box.bottom)
+            brush.text(at, text, colour, its_font, anchor="ls", stroke_width=2, stroke_fill=BLACK)
 
 
 def _around(at: Point, reach: float) -> Box:
@@ -250,15 +238,10 @@ def _cost(place: Box, others: Sequence[Box], sheet: Box) -> float:
 
 def _with_strip(image: Image.Image, caption: str, lost: Sequence[int]) -> Image.Image:
     """The picture with a line of text below it."""
-    whole = Image.new("RGB", (image.width, image.height + STRIP_PX), (24, 24, 24))
-    whole.paste(image)
-    brush, font, y = ImageDraw.Draw(whole), _font(14), image.height + 3
+    whole = ImageOps.expand(image, (0, 0, 0, STRIP_PX), (24, 24, 24))
+    brush, font, y = ImageDraw.Draw(whole), load_default(14), image.height + 3
     brush.text((8, y), caption, (225, 225, 225), font)
     if lost:
         text = f"lost: {', '.join(map(str, lost))}"
         brush.text((image.width - 8 - brush.textlength(text, font), y), text, LOST, font)
     return whole
-
-
-def _font(size: int) -> Font:
-    return ImageFont.load_default(size)

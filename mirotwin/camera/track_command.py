@@ -9,7 +9,6 @@ import click
 import msgspec
 
 from miro_exact.bad_input import amount
-from miro_exact.inputs import check_regular
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import eye_file
 from miro_host.eye.colours import ColourClasses
@@ -38,20 +37,6 @@ def robot_numbers(text: str) -> tuple[int, ...]:
 
 
 NUMBERS = Word("numbers", robot_numbers, lambda numbers: ",".join(map(str, numbers)))
-
-
-class TrackLine(msgspec.Struct):
-    """One robot in one frame, as `--json` prints it; what is measured is null for a lost robot."""
-
-    frame: int
-    picture: str
-    tick: int
-    robot: int
-    lost: bool
-    x_m: float | None = None
-    y_m: float | None = None
-    theta_rad: float | None = None
-    confidence: float | None = None
 
 
 class TrackOptions(Options, frozen=True, kw_only=True):
@@ -104,8 +89,8 @@ def track(options: TrackOptions) -> None:
             click.echo(HEADING)
         for robot, seen in zip(robots, tracker.track(still.picture, still.tick), strict=True):
             found[robot] += seen is not None
-            line = _line(frame, _utf8(still.name), still.tick, robot, seen)
-            show_line(msgspec.json.encode(line).decode() if as_json else _row(line))
+            line = _json_line if as_json else _row
+            show_line(line(frame, _utf8(still.name), still.tick, robot, seen))
         frames = frame + 1
     if not as_json:
         counts = ", ".join(f"robot {robot} in {count}" for robot, count in found.items())
@@ -114,8 +99,6 @@ def track(options: TrackOptions) -> None:
 
 def _tracker(options: TrackOptions, robots: tuple[int, ...]) -> Tracker:
     """Raises BadInput for files that make none."""
-    for path in (options.calibration, options.colours):
-        check_regular(path)
     believed = calibrations.read(options.calibration)
     classes = eye_file.read(options.colours, ColourClasses)
     try:
@@ -129,16 +112,16 @@ def _utf8(name: str) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> TrackLine:
-    if seen is None:
-        return TrackLine(frame, name, tick, robot, True)
-    return TrackLine(frame, name, tick, robot, False, seen.x_m, seen.y_m, seen.theta_rad, seen.confidence)
+def _json_line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> str:
+    """What is measured is null for a lost robot."""
+    line = {"frame": frame, "picture": name, "tick": tick, "robot": robot, "lost": seen is None}
+    measured = {field: getattr(seen, field, None) for field in ("x_m", "y_m", "theta_rad", "confidence")}
+    return msgspec.json.encode(line | measured).decode()
 
 
-def _row(line: TrackLine) -> str:
-    head = f"{line.frame:6d} {line.robot:6d}"
-    x_m, y_m, theta_rad, confidence = line.x_m, line.y_m, line.theta_rad, line.confidence
-    if x_m is None or y_m is None or theta_rad is None or confidence is None:
-        return f"{head} {'lost':>9} {'':>9} {'':>12} {'':>11}  {line.picture}"
-    place = f"{100.0 * x_m:9.2f} {100.0 * y_m:9.2f} {_DEGREES * theta_rad:12.2f} {confidence:11.2f}"
-    return f"{head} {place}  {line.picture}"
+def _row(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> str:
+    place = f"{'lost':>9} {'':>9} {'':>12} {'':>11}"
+    if seen is not None:
+        degrees = _DEGREES * seen.theta_rad
+        place = f"{100.0 * seen.x_m:9.2f} {100.0 * seen.y_m:9.2f} {degrees:12.2f} {seen.confidence:11.2f}"
+    return f"{frame:6d} {robot:6d} {place}  {name}"
