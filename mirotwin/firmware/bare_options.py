@@ -206,10 +206,10 @@ def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     if machine.faults_lost:
         complain(f"firmware faults: {machine.faults_lost} more are not listed")
     if ended is Ended.CYCLES:
-        complain(f"stopped at the limit, at {_stopped_at(machine)}")
+        complain(f"stopped at the limit, at {stopped_at(machine)}")
         code = LIMIT_REACHED
     elif ended is Ended.HALTED:
-        complain(f"the program ended at {_stopped_at(machine)}; no interrupt can wake it")
+        complain(f"the program ended at {stopped_at(machine)}; no interrupt can wake it")
         code = DONE if options.until is None else EXPECTATION_FAILED
     if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
         complain(f"addresses have no names: {machine.image.symbols.problem}")
@@ -233,7 +233,8 @@ def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     return FIRMWARE_FAULT if machine.faults else code
 
 
-def _stopped_at(machine: BareMachine) -> str:
+def stopped_at(machine: BareMachine) -> str:
+    """Where and when, for people."""
     return f"{place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
 
 

@@ -37,11 +37,10 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
         if found is not None and found.space == "code":
             return found.address
     names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
-    remedy = did_you_mean(text, names) or did_you_mean(f"_{text}", names)
-    if not remedy and names:
-        remedy = "see the map beside the image"
-    elif not names:
-        remedy = "put its .map or .cdb beside it, or give an address as 0x.."
+    remedy = "put its .map or .cdb beside it, or give an address as 0x.."
+    if names:
+        near = did_you_mean(text, names) or did_you_mean(f"_{text}", names)
+        remedy = near or "see the map beside the image"
     raise BadInput(path, option, f"no symbol {text} in the code", remedy)
 
 

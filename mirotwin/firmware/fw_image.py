@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Annotated
 
@@ -101,20 +101,13 @@ def vectors(options: VectorsOptions) -> None:
 
     with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):
-            draw = drawing(Stream(options.seed, f"vectors/mcs51/{opcode:02x}"))
             with hold.released():
-                drawn = encode(draw_vectors(opcode, options.per_opcode, draw))
+                drawn = _vectors(opcode, options)
             folder.part(name).write_bytes(drawn)
             bar.to(opcode + 1)
 
 
-def drawing(stream: Stream) -> Callable[[int], int]:
-    """Successive draws from a stream: `draw(n)` is an integer from 0 to n - 1."""
-    drawn = 0
-
-    def draw(n: int) -> int:
-        nonlocal drawn
-        drawn += 1
-        return stream.u32(drawn - 1) * n >> 32
-
-    return draw
+def _vectors(opcode: int, options: VectorsOptions) -> bytes:
+    """The file of one opcode."""
+    word = map(Stream(options.seed, f"vectors/mcs51/{opcode:02x}").u32, count())
+    return encode(draw_vectors(opcode, options.per_opcode, lambda n: next(word) * n >> 32))

@@ -19,7 +19,7 @@ from typing import Annotated
 
 import msgspec
 
-from miro_exact.bad_input import BadInput, amount
+from miro_exact.bad_input import BadInput
 from miro_robot.bare.machine import BareMachine, Ended
 from mirotwin.firmware.bare_options import (
     STDIN,
@@ -27,9 +27,9 @@ from mirotwin.firmware.bare_options import (
     load_bare_image,
     make_machine,
     report,
+    stopped_at,
     target_of,
 )
-from mirotwin.firmware.code_place import place_of
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
@@ -63,7 +63,6 @@ def run_terminal(machine: BareMachine, target: int | None, options: BareOptions)
     hertz = options.crystal_hz / 12
     slice_cycles = max(1, int(hertz * SLICE_S))
     keyboard = sys.stdin.fileno()
-    left = False
     with _raw(keyboard):
         due_s = time.monotonic()
         while True:
@@ -74,14 +73,11 @@ def run_terminal(machine: BareMachine, target: int | None, options: BareOptions)
             due_s = max(due_s + SLICE_S, time.monotonic() - LATEST_S)
             keys = _keys(keyboard, due_s)
             if keys is None or LEAVE in keys:
-                left = True
                 break
             if keys:
                 machine.input.add(keys)
-    if left:
-        complain(
-            f"left at {place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
-        )
+    if ended is Ended.PAUSED:
+        complain(f"left at {stopped_at(machine)}")
     return ended
 
 

@@ -129,7 +129,10 @@ def look(
         raise BadInput(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
-    return _verdict(run, options)
+    if isinstance(run, RobotRun):
+        return report_faults(run.world)
+    assert isinstance(run, BareRun)
+    return report(run.machine, run.ended, options.bare)
 
 
 def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
@@ -183,11 +186,3 @@ def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
             options.subject, f"--slot {options.slot}", "no robot in that slot", f"there is {there}"
         )
     return network, slots.index(options.slot)
-
-
-def _verdict(run: Run, options: SubjectOptions) -> int:
-    """Says on stderr why a run ended that did not end as planned."""
-    if isinstance(run, RobotRun):
-        return report_faults(run.world)
-    assert isinstance(run, BareRun)
-    return report(run.machine, run.ended, options.bare)
