@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from selectors import EVENT_READ, EVENT_WRITE, BaseSelector
-from typing import Any
-
-import msgspec
+from typing import Any, NamedTuple
 
 from miro_exact.bad_input import amount
 from mirotwin.ports.radio_port import RadioPort
@@ -53,7 +51,7 @@ Tell = Callable[[str], object]
 """Takes a line for the user."""
 
 
-class PortContext(msgspec.Struct, frozen=True):
+class PortContext(NamedTuple):
     """What all endpoints are made with: their radio, the selector that wakes the session, who is told."""
 
     port: RadioPort
@@ -67,9 +65,7 @@ class Endpoint:
     kind = ""
 
     def __init__(self, context: PortContext, where: str) -> None:
-        self.port = context.port
-        self.selector = context.selector
-        self.tell = context.tell
+        self.port, self.selector, self.tell = context
         self.where = where
         self.name = f"{self.kind} {where}"
         self.client = ""

@@ -13,7 +13,6 @@ from typing import Any
 from serial import rfc2217
 from serial.serialutil import EIGHTBITS, PARITY_NONE, STOPBITS_ONE
 
-from mirotwin.ports.endpoint import PortContext
 from mirotwin.ports.sockets import TcpEndpoint
 
 BAUD = 9600
@@ -26,11 +25,8 @@ class Rfc2217Endpoint(TcpEndpoint):
     """`ignored`: commands of all clients that made no sense."""
 
     kind, scheme = "rfc2217", "rfc2217"
-
-    def __init__(self, context: PortContext, host: str, number: int) -> None:
-        super().__init__(context, host, number)
-        self.ignored = 0
-        self._manager: Any = None
+    ignored = 0
+    _manager: Any = None
 
     def greet(self) -> None:
         self._told = False

@@ -8,7 +8,7 @@ SCENARIO is a built-in name or the path of a .toml file (`miro:///tmp/my.toml` i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 from urllib.parse import unquote
 
@@ -51,51 +51,40 @@ def parse_url(url: str) -> UrlOptions:
         if key == "set":
             settings.append(value)
             continue
-        if key not in _READERS:
-            known = ", ".join(["set", *_READERS])
+        if key not in _MOST:
+            known = ", ".join(["set", *_MOST])
             raise BadInput(url, key, "is no option of the URL", f"there are {known}")
         if key in found:
             raise BadInput(url, key, "stands twice", "give it once")
         try:
-            found[key] = _READERS[key](value)
+            found[key] = _read(value, _MOST[key])
         except ValueError as error:
             raise BadInput(url, key, f"{value!r} {error}") from None
     return UrlOptions(scenario, settings=tuple(settings), **found)
 
 
-def _whole(most: int) -> Callable[[str], int]:
-    def read(value: str) -> int:
-        if not (value.isascii() and value.isdecimal()) or not 0 <= int(value) <= most:
+_MOST: dict[str, int | float | None] = {
+    "seed": MAX_SEED,
+    "firmware": None,
+    "network": MAX_NETWORKS - 1,
+    "realtime": FASTEST,
+    "limit_s": LONGEST_S,
+    "out": None,
+}
+"""The options but for `set`, and the most that one may be; None: it is text."""
+
+
+def _read(value: str, most: float | None) -> str | float:
+    """The value of an option. Raises ValueError."""
+    if most is None:
+        if not value:
+            raise ValueError("is empty")
+        return value
+    if isinstance(most, int):
+        if not (value.isascii() and value.isdecimal()) or int(value) > most:
             raise ValueError(f"is no whole number from 0 to {most}")
         return int(value)
-
-    return read
-
-
-def _number(most: float) -> Callable[[str], float]:
-    def read(value: str) -> float:
-        try:
-            number = float(value)
-        except ValueError:
-            number = -1.0
-        if not 0.0 < number <= most:
-            raise ValueError(f"is no number above 0 and up to {most:g}")
-        return number
-
-    return read
-
-
-def _text(value: str) -> str:
-    if not value:
-        raise ValueError("is empty")
-    return value
-
-
-_READERS: dict[str, Callable[[str], Any]] = {
-    "seed": _whole(MAX_SEED),
-    "firmware": _text,
-    "network": _whole(MAX_NETWORKS - 1),
-    "realtime": _number(FASTEST),
-    "limit_s": _number(LONGEST_S),
-    "out": _text,
-}
+    with suppress(ValueError):
+        if 0.0 < float(value) <= most:
+            return float(value)
+    raise ValueError(f"is no number above 0 and up to {most:g}")

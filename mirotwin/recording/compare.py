@@ -196,10 +196,8 @@ def _of_host(robot: RobotPeriod) -> NamedValues:
         yield "measurement exposed_tick", seen.tick
         yield "measurement confidence", seen.confidence
     control = robot.control
-    yield "control v_m_s", None if control is None else control.v_m_s
-    yield "control w_rad_s", None if control is None else control.w_rad_s
-    yield "control left", None if control is None else control.left
-    yield "control right", None if control is None else control.right
+    for name in ("v_m_s", "w_rad_s", "left", "right"):
+        yield f"control {name}", getattr(control, name, None)
     if control is not None:
         yield from ((f"control inner.{name}", value) for name, value in control.inner.items())
         yield from ((f"control estimate.{name}", value) for name, value in control.estimate.items())

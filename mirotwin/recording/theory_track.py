@@ -36,11 +36,13 @@ class Broken:
         self.count = 0
         self.first_tick = self.last_tick = -1
 
-    def note(self, tick: int) -> None:
-        if not self.count:
-            self.first_tick = tick
-        self.count += 1
-        self.last_tick = tick
+    def note(self, tick: int, broken: bool) -> bool:
+        """Whether all is as it should be."""
+        if broken:
+            self.first_tick = self.first_tick if self.count else tick
+            self.last_tick = tick
+        self.count += broken
+        return not broken
 
 
 class Turns:
@@ -89,9 +91,9 @@ class TheoryTrack:
         f = self._disturbance(robot, tick)
         rho_c, across_rad = radius(robot.truth), across(robot.truth)
         holds = (
-            self._note(self.ranges, tick, self._left_the_ranges(robot)),
-            self._note(self.origin, tick, self._near_the_origin(rho_c, robot.reference, tick)),
-            self._note(self.perpendicular, tick, self._perpendicular(across_rad)),
+            self.ranges.note(tick, self._left_the_ranges(robot)),
+            self.origin.note(tick, self._near_the_origin(rho_c, robot.reference, tick)),
+            self.perpendicular.note(tick, self._perpendicular(across_rad)),
         )
         self._move(robot.v_m_s)
         self._steer(robot)
@@ -112,11 +114,6 @@ class TheoryTrack:
             self.s1_m_s.append(self._surfaces[0])
             self.s2_rad_s.append(self._surfaces[1])
         return f1, f2
-
-    def _note(self, broken: Broken, tick: int, now: bool) -> bool:
-        if now:
-            broken.note(tick)
-        return not now
 
     def _left_the_ranges(self, robot: RobotPeriod) -> bool:
         """Assumption 1. In the origin phi is no angle."""

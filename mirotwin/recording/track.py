@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TypeAlias, overload
+from functools import partial
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -60,11 +62,8 @@ class TrackingErrors(Sequence[ErrorSample]):
     """Tracking errors of one robot in the order of time."""
 
     def __init__(self) -> None:
-        self.ticks = array("q")
-        self.x_cm = array("d")
-        self.y_cm = array("d")
-        self.theta_rad = array("d")
-        self.off_pitch = array("b")
+        self.ticks, self.off_pitch = array("q"), array("b")
+        self.x_cm, self.y_cm, self.theta_rad = column(), column(), column()
 
     def append(self, sample: ErrorSample) -> None:
         self.ticks.append(sample.tick)
@@ -76,11 +75,7 @@ class TrackingErrors(Sequence[ErrorSample]):
     def __len__(self) -> int:
         return len(self.ticks)
 
-    @overload
-    def __getitem__(self, index: int) -> ErrorSample: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[ErrorSample]: ...
-    def __getitem__(self, index: int | slice) -> ErrorSample | list[ErrorSample]:
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self[at] for at in range(*index.indices(len(self)))]
         error = self.x_cm[index], self.y_cm[index], self.theta_rad[index]
@@ -120,16 +115,18 @@ class MeasuredErrors(TrackingErrors):
 
     A measurement arrives some frames after its exposure. It is compared with the reference at the exposure, so a delay
     by itself is no error: this is the best that a laboratory without another camera can plot. `delay_frames`: of a
-    camera whose measurements bear no tick.
+    camera whose measurements bear no tick; without it they stay empty.
     """
 
-    def __init__(self, delay_frames: int) -> None:
+    def __init__(self, delay_frames: int | None) -> None:
         super().__init__()
         self.delay_frames = delay_frames
         self._references: dict[int, Posture] = {}
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
         """Takes over the measurement of the next control period."""
+        if self.delay_frames is None:
+            return
         self._references[tick] = robot.reference
         self._references.pop(tick - LONGEST_FRAMES * CONTROL_PERIOD_TICKS, None)
         seen = robot.measurement
@@ -144,23 +141,21 @@ class MeasuredErrors(TrackingErrors):
 class RobotTrack:
     """One robot: where it was, should have been and was measured; the errors in truth, and of the measurements.
 
-    `delay_frames` as in `MeasuredErrors`, which stay empty without it. `theory`: filled by `Tracks`.
+    `delay_frames` as in `MeasuredErrors`. `theory`: filled by `Tracks`.
     """
 
     def __init__(self, delay_frames: int | None = None) -> None:
         self.truth, self.reference, self.measured = Postures(), Postures(), Postures()
         self.errors = TrackingErrors()
-        self.measured_errors = MeasuredErrors(delay_frames or 0)
+        self.measured_errors = MeasuredErrors(delay_frames)
         self.theory = TheoryTrack()
-        self._measures = delay_frames is not None
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
         self.truth.append(robot.truth)
         self.reference.append(robot.reference)
         self.measured.append(robot.measurement)
         self.errors.append(error_of(robot.truth, robot.reference, tick))
-        if self._measures:
-            self.measured_errors.add(robot, tick)
+        self.measured_errors.add(robot, tick)
 
 
 class Tracks:
@@ -175,7 +170,7 @@ class Tracks:
         self.count = 0
         self.digest = ""
         self.robots: dict[RobotId, RobotTrack] = {}
-        self.inner: dict[str, dict[RobotId, Series]] = {}
+        self.inner: dict[str, dict[RobotId, Series]] = defaultdict(partial(defaultdict, Series))
         for period in periods:
             self.add(period)
 
@@ -188,8 +183,8 @@ class Tracks:
                 track = self.robots[robot_id] = RobotTrack(self.delay_frames)
             track.add(robot, period.tick)
             track.theory.add(robot, period.tick)
-            if robot.control is not None:
-                self._add_inner(robot_id, period.tick, robot.control.inner)
+            for name, value in robot.control.inner.items() if robot.control is not None else ():
+                self.inner[name][robot_id].append(period.tick, value)
         self.count += 1
         self.digest = period.digest
 
@@ -198,13 +193,6 @@ class Tracks:
         for (network, slot), track in self.robots.items():
             if track.theory.now is not None:
                 yield network, slot, track.theory.now
-
-    def _add_inner(self, robot_id: RobotId, tick: int, inner: dict[str, float]) -> None:
-        for name, value in inner.items():
-            series = self.inner.setdefault(name, {}).get(robot_id)
-            if series is None:
-                series = self.inner[name][robot_id] = Series()
-            series.append(tick, value)
 
 
 def wrapped(angle_rad: float) -> float:

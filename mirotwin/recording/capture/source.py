@@ -79,15 +79,11 @@ def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Transmissio
 
 def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
     passed_over: Counter[int] = Counter()
-    failure: CaptureError | None = None
     try:
         yield from pcapng_reader.iterate(given, given.label, passed_over)
-    except CaptureError as error:
-        failure = error
-    if passed_over:
-        tell(f"{given.label}: {pcapng_reader.events_line(passed_over)}")
-    if failure is not None:
-        raise failure
+    finally:
+        if passed_over:
+            tell(f"{given.label}: {pcapng_reader.events_line(passed_over)}")
 
 
 def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
