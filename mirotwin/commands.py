@@ -5,7 +5,7 @@ A command's module is loaded when the command is used, after `--engine` was read
 
 import click
 
-from mirotwin.shell.program import Lazy, LazyGroup, MainGroup, print_version
+from mirotwin.shell.program import Lazy, LazyGroup, MainGroup
 
 CAMERA = {
     "look": Lazy(
@@ -138,14 +138,7 @@ SECTIONS = {
     sections=SECTIONS,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-@click.option(
-    "--version",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=print_version,
-    help="Show the version.",
-)
+@click.version_option(package_name="mirotwin", prog_name="mirotwin", help="Show the version.")
 def main() -> None:
     """A bit-exact twin of a vision-guided soccer robot.
 

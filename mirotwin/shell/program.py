@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOWrapper
@@ -44,15 +44,6 @@ INTERRUPTED = 130
 SIGPIPE = 13
 SIGNALLED = 128
 """Plus the number of the signal: what a shell reports for a program that a signal ended."""
-
-
-def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
-    """`--version`."""
-    if wanted:
-        from importlib.metadata import version
-
-        click.echo(f"mirotwin, version {version('mirotwin')}")
-        context.exit()
 
 
 class Terminated(BaseException):
@@ -102,24 +93,29 @@ def _said(error: click.UsageError) -> str:
     return f"{what}; {hint}" if hint else f"{what}."
 
 
+Handler = Callable[[int, FrameType | None], Any]
+
+
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Within it, SIGTERM and SIGHUP raise Terminated; a signal that is ignored (nohup) stays ignored."""
-
-    def terminate(number: int, frame: FrameType | None) -> NoReturn:
-        raise Terminated(number)
-
-    before = {}
+def handled_signals(
+    names: Sequence[str], take: Handler, replaces: Callable[[Any], bool]
+) -> Iterator[dict[int, Any]]:
+    """Within it, and in the main thread, `take` gets the signals with a handler that it `replaces`; yields these."""
+    before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
-        for name in ("SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)  # not every system has both
-            if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-                before[number] = signal.signal(number, terminate)
+        for name in names:
+            number = getattr(signal, name, None)  # not every system has all
+            if number is not None and replaces(signal.getsignal(number)):
+                before[number] = signal.signal(number, take)
     try:
-        yield
+        yield before
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+    raise Terminated(number)
 
 
 def _give_up(stream: TextIO) -> None:
@@ -240,7 +236,9 @@ class MainGroup(LazyGroup):
             sys.stdout.reconfigure(errors="backslashreplace")
         settle_engine(sys.argv[1:] if args is None else args)
         try:
-            with terminable():
+            with handled_signals(
+                ("SIGTERM", "SIGHUP"), _terminate, lambda handler: handler is signal.SIG_DFL
+            ):
                 code = super().main(args, prog_name, **extra)
                 sys.stdout.flush()
         except click.exceptions.NoArgsIsHelpError as error:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from miro_exact.bad_input import one_line
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, ProgressColumn, Task, TaskID
-    from rich.text import Text
+    from rich.progress import Progress, ProgressColumn
 
 
 class ProgressBar:
@@ -33,7 +32,6 @@ class ProgressBar:
         self._shown = not quiet and stream is not None and stream.isatty()
         self._began_s = time.monotonic()
         self._progress: Progress | None = None
-        self._task: TaskID | None = None
 
     def __enter__(self) -> ProgressBar:
         return self
@@ -50,10 +48,9 @@ class ProgressBar:
             if time.monotonic() - self._began_s < self.PATIENCE_S:
                 return
             self._progress = self._bar()
-            self._task = self._progress.add_task(self.what, total=self.total, completed=self.begun, said=said)
+            self._progress.add_task(self.what, total=self.total, completed=self.begun, said="")
             self._progress.start()
-        assert self._task is not None
-        self._progress.update(self._task, completed=done, said=said)
+        self._progress.update(self._progress.task_ids[0], completed=done, said=said or self._rate(done))
 
     def _bar(self) -> Progress:
         from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
@@ -62,21 +59,10 @@ class ProgressBar:
         return Progress(*self._columns(), console=Console(stderr=True), transient=True)
 
     def _columns(self) -> list[ProgressColumn]:
-        from rich.progress import (
-            BarColumn,
-            ProgressColumn,
-            TaskProgressColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-        from rich.text import Text as Words
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-        class Rate(ProgressColumn):
-            def render(_, task: Task) -> Text:
-                return Words(self._rate(task.completed))
-
-        words = TextColumn("{task.description}", markup=False)
-        return [words, BarColumn(), TaskProgressColumn(), Rate() if self.unit else TimeRemainingColumn()]
+        words, rate = (TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]"))
+        return [words, BarColumn(), TaskProgressColumn(), rate if self.unit else TimeRemainingColumn()]
 
     def _rate(self, done: float) -> str:
         """How fast it goes since `begun`, and how long the rest takes at that rate."""
