@@ -25,7 +25,7 @@ from miro_sim.scenario.file import load
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.console import facts_table, plain_table, show
 from mirotwin.shell.options import FORCE, OUT, PATH, SEED, SET, Engine, FiniteNumber, ScenarioName
-from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
+from mirotwin.shell.outputs import OutputError, check_new, whole_file
 from mirotwin.shell.program import tell_notes
 
 SHOWN = 20
@@ -151,8 +151,7 @@ def _check_outputs(options: CalibrateOptions) -> None:
     for option, path in options.outputs.items():
         if path is None:
             continue
-        check_not_input(path, option, *inputs)
-        check_new(path, option, options.force)
+        check_new(path, option, options.force, *inputs)
         other = seen.setdefault(path.resolve(), option)
         if other != option:
             raise OutputError(path, f"is the file of {other} and of {option}", "give two files")

@@ -25,7 +25,7 @@ from mirotwin.shell.options import (
     plain_parameters,
     refuse_steps,
 )
-from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.outputs import check_new, whole_file
 from mirotwin.shell.program import DONE, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
@@ -63,8 +63,7 @@ def look(options: LookOptions) -> int:
     frame = at.ticks() // CONTROL_PERIOD_TICKS
     name = text.scenario.name
     out = options.out or Path(f"{name}-{seed}-net{network}-frame-{frame:06d}.png")
-    check_new(out, "--out", options.force)
-    check_not_input(out, "--out", scenario, options.firmware)
+    check_new(out, "--out", options.force, scenario, options.firmware)
     image = load_firmware(options.firmware)
 
     from mirotwin.camera.view import view_of  # loads the pictures' library

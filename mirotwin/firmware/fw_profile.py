@@ -28,7 +28,7 @@ from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import SourceFolders, source_folders, with_debug_files
 from mirotwin.shell.options import FORCE, JSON, OUT
-from mirotwin.shell.outputs import check_new, check_not_input
+from mirotwin.shell.outputs import check_new
 
 
 class ProfileOptions(WindowOptions, frozen=True, kw_only=True):
@@ -159,5 +159,4 @@ def coverage(options: CoverageOptions) -> int:
 
 
 def _check(path: Path, options: WindowOptions, may_be_there: bool) -> None:
-    check_not_input(path, "--out", *options.files)
-    check_new(path, "--out", may_be_there, more="add to it with --append, ")
+    check_new(path, "--out", may_be_there, *options.files, more="add to it with --append, ")

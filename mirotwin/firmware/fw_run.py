@@ -32,7 +32,7 @@ from mirotwin.firmware.bare_options import (
 )
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
-from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.outputs import check_file, whole_file
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -151,8 +151,7 @@ def run(options: FwRunOptions) -> int:
     """
     image, bare, dump = options.image, options.bare, options.dump
     if dump is not None:
-        check_file(dump, "--dump")
-        check_not_input(dump, "--dump", image, *options.more, *bare.files)
+        check_file(dump, "--dump", image, *options.more, *bare.files)
     if options.terminal:
         check_terminal(bare)
     loaded = load_bare_image(image, bare, named=False)

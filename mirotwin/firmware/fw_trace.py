@@ -16,7 +16,7 @@ from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import FORCE, OUT
-from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.outputs import check_new, whole_file
 from mirotwin.shell.program import show_line
 
 
@@ -35,8 +35,7 @@ def trace(options: TraceOptions) -> int:
     """
     out = options.out
     if out is not None:
-        check_not_input(out, "--out", *options.files)
-        check_new(out, "--out", options.force)
+        check_new(out, "--out", options.force, *options.files)
     run = open_window(options)
 
     image = with_debug_files(run.image)
@@ -72,8 +71,7 @@ def vcd(options: VcdOptions) -> int:
     out = options.out
     save = out.with_suffix(SAVE_SUFFIX)
     for path in (out, save):
-        check_not_input(path, "--out", *options.files)
-        check_new(path, "--out", options.force)
+        check_new(path, "--out", options.force, *options.files)
     if save == out:
         raise BadInput(
             "",

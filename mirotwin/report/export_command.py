@@ -21,7 +21,7 @@ from mirotwin.recording.decode_command import FORMAT
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine
-from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.outputs import check_new, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -127,8 +127,7 @@ def export(options: ExportOptions) -> int:
     """
     out, network, quiet = options.out, options.network, options.quiet
     if out != STDIN:
-        check_new(Path(out), "--out", options.force)
-        check_not_input(Path(out), "--out", options.file)
+        check_new(Path(out), "--out", options.force, options.file)
     to = options.target or DEFAULTS.get(Path(out).suffix, "pcapng")
     if to == "foxglove" and network is not None:
         raise click.UsageError("--network does not go with --as foxglove, which writes all networks.")

@@ -80,14 +80,12 @@ class OutputFolder:
 
     def __enter__(self) -> OutputFolder:
         try:
-            self._made = not self.path.is_dir()
-            self.path.mkdir(parents=True, exist_ok=True)
-            self._lock = _lock(self.path)
-            _check(self.path, self._force, self.names, self._ours)  # another run may have filled it since
-            self._remove_parts()
-        except OSError as error:
-            _release(self._lock)
-            raise OutputError(self.path, reason_of(error), "choose another folder with --out") from None
+            with _refused(self.path, "choose another folder with --out"):
+                self._made = not self.path.is_dir()
+                self.path.mkdir(parents=True, exist_ok=True)
+                self._lock = _lock(self.path)
+                _check(self.path, self._force, self.names, self._ours)  # another run may have filled it since
+                self._remove_parts()
         except OutputError:
             _release(self._lock)
             raise
@@ -98,11 +96,10 @@ class OutputFolder:
     ) -> None:
         try:
             if kind is None:
-                self._publish()
+                with _refused(self.path, "choose another folder with --out"):
+                    self._publish()
             elif isinstance(error, OSError) and error.errno in FULL:
                 raise OutputError(self.path, reason_of(error), _make_room("folder", "--out")) from None
-        except OSError as failure:
-            raise OutputError(self.path, reason_of(failure), "choose another folder with --out") from None
         finally:
             self._leave()
 
@@ -203,14 +200,12 @@ def _ways_out(names: Sequence[str]) -> str:
 
 def make_folder(path: Path, option: str) -> None:
     """Makes a folder and those above it, if they are not there. Raises OutputError."""
-    try:
+    with _refused(path, f"choose another folder with {option}"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(path, reason_of(error), f"choose another folder with {option}") from None
 
 
-def check_file(path: Path, option: str) -> None:
-    """Whether a single file could be written there, asked before the work that fills it. Raises OutputError."""
+def check_file(path: Path, option: str, *inputs: str | Path | None) -> None:
+    """Whether a single file could be written there, which is none of those that are read. Raises OutputError."""
     remedy = f"choose another file with {option}"
     if path.is_dir():
         raise OutputError(path, "is a folder", remedy)
@@ -226,21 +221,17 @@ def check_file(path: Path, option: str) -> None:
         raise OutputError(path, f"there is no folder {folder}", remedy)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(path, f"the folder {folder} cannot be written to", remedy)
+    for given in inputs:
+        if given is not None and path.exists() and os.path.exists(given) and os.path.samefile(path, given):
+            raise OutputError(path, "is the input itself", remedy)
 
 
-def check_new(path: Path, option: str, force: bool, more: str = "") -> None:
+def check_new(path: Path, option: str, force: bool, *inputs: str | Path | None, more: str = "") -> None:
     """The same for an output that replaces a file only by `force`; `more` is another way out. Raises OutputError."""
-    check_file(path, option)
+    check_file(path, option, *inputs)
     if path.exists() and not force:
         ways = f"choose another file with {option}, {more}or replace it with --force"
         raise OutputError(path, "is there already", ways)
-
-
-def check_not_input(path: Path, option: str, *inputs: str | Path | None) -> None:
-    """Refuses to write over what is being read. Raises OutputError."""
-    for given in inputs:
-        if given is not None and path.exists() and os.path.exists(given) and os.path.samefile(path, given):
-            raise OutputError(path, "is the input itself", f"choose another file with {option}")
 
 
 @contextmanager
@@ -255,20 +246,15 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     import tempfile  # slow to load
 
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
-    try:
+    with _refused(path, f"choose another file with {option}"):
         handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)
-    except OSError as error:
-        raise OutputError(path, reason_of(error), f"choose another file with {option}") from None
     os.close(handle)
     staging = Path(name)
     try:
-        yield staging
-        staging.chmod(mode)
-        os.replace(staging, target)
-    except OSError as error:
-        if error.errno not in FULL:
-            raise
-        raise OutputError(path, reason_of(error), _make_room("file", option)) from None
+        with told_when_full(path, option, "file"):
+            yield staging
+            staging.chmod(mode)
+            os.replace(staging, target)
     finally:
         staging.unlink(missing_ok=True)
 
@@ -284,6 +270,15 @@ def told_when_full(path: Path | None, option: str, kind: str = "folder") -> Iter
         if path is None or error.errno not in FULL:
             raise
         raise OutputError(path, reason_of(error), _make_room(kind, option)) from None
+
+
+@contextmanager
+def _refused(path: Path, remedy: str) -> Iterator[None]:
+    """What the system does not allow becomes an OutputError of the path."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(path, reason_of(error), remedy) from None
 
 
 def _make_room(kind: str, option: str) -> str:

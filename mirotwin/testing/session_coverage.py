@@ -19,7 +19,7 @@ from miro_robot.mcs51.cpu import Cpu, on_load
 from mirotwin.firmware import coverage_files as firmware_coverage
 from mirotwin.firmware.coverage_files import Report, table, write
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.outputs import check_file, check_not_input
+from mirotwin.shell.outputs import check_file
 
 OUTPUT = "firmware_coverage"
 """Under this name a pytest-xdist worker hands over its counts."""
@@ -37,8 +37,7 @@ class FirmwareCoverage:
         self.counters = Counters()
         try:
             self.image = load_firmware(config.getoption("--firmware-image"))
-            check_file(self.out, "--firmware-coverage")
-            check_not_input(self.out, "--firmware-coverage", self.image.path)
+            check_file(self.out, "--firmware-coverage", self.image.path)
             _check_folders(config.getoption("--firmware-sources"))
         except ValueError as error:
             raise pytest.UsageError(str(error)) from None

@@ -22,7 +22,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
-from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
+from mirotwin.shell.outputs import check_file, told_when_full, whole_file
 from mirotwin.shell.program import (
     BAD_INPUT,
     DONE,
@@ -194,8 +194,7 @@ def test(options: TestOptions) -> int:
         what = "a case is judged by what is inside the twin, which no port shows"
         raise BadInput(case, "--port", what, "leave it out, or send it with `mirotwin replay`")
     if junit is not None:
-        check_file(junit, "--junit")
-        check_not_input(junit, "--junit", *chosen)
+        check_file(junit, "--junit", *chosen)
     settings = (*options.settings, *as_settings(options.expected))
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []

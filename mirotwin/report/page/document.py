@@ -11,7 +11,7 @@ from typing import Any
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.report.page.bokeh_page import document_json, island, javascript, require_bokeh
-from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.outputs import check_new, whole_file
 from mirotwin.shell.program import DONE, show_line
 
 MOST_BYTES = 50_000_000
@@ -70,8 +70,7 @@ def place_of_page(out: Path | None, force: bool, *inputs: str | None) -> Path:
     if out is None:
         out = Path("report.html")
         force = force or is_page(out)
-    check_new(out, "--out", force)
-    check_not_input(out, "--out", *inputs)
+    check_new(out, "--out", force, *inputs)
     require_bokeh()
     return out
 

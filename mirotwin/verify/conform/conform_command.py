@@ -28,7 +28,7 @@ from mirotwin.shell.options import (
     Engine,
     StackFrom,
 )
-from mirotwin.shell.outputs import check_file, check_not_input, told_when_full, whole_file
+from mirotwin.shell.outputs import check_file, told_when_full, whole_file
 from mirotwin.shell.program import (
     DONE,
     EXPECTATION_FAILED,
@@ -175,8 +175,7 @@ def conform(options: ConformOptions) -> int:
         _list(rules, options.as_json)
         return DONE
     if junit is not None:
-        check_file(junit, "--junit")
-        check_not_input(junit, "--junit", options.image)
+        check_file(junit, "--junit", options.image)
     at_port = options.desk.port
     if at_port:
         if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
