@@ -16,9 +16,10 @@ after a simulated one the caches hold nothing of this.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Any
+
+import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.plugins import PluginError
@@ -57,7 +58,6 @@ def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
         )
 
 
-T = TypeVar("T")
 Expected = Mapping[RobotId, Sequence[Check]]
 _FROM_RECEIVED = ("frame", "damaged")
 _RESTARTS = ("reset", "power")
@@ -87,19 +87,12 @@ class Checks:
         self.world = world
         if expected is None:
             expected = expectations_of(world.scenario, world.scenario.name)
-        end_tick = world.periods * CONTROL_PERIOD_TICKS
         self.robots = [
-            _RobotMonitors(
-                world,
-                network,
-                robot,
-                expected.get((network.index, robot.slot), ()),
-                end_tick,
-                cut,
-            )
+            _RobotMonitors(world, network, robot, expected.get((network.index, robot.slot), ()), cut)
             for network in world.networks
             for robot in network.robots
         ]
+        self._each(_RobotMonitors.begin)
         self.finished = False
         self.index = world.index
         self.untold: list[tuple[Period, int]] = []  # and where the world stood at their end
@@ -113,16 +106,14 @@ class Checks:
             )
         self.index += 1
         self.untold.append((period, self.world.tick))
-        for watched in self.robots:
-            watched.period_over()
+        self._each(_RobotMonitors.period_over)
         if len(self.untold) >= self.together:
             self._tell()
 
     def _tell(self) -> None:
         """Tells of the control periods that were not told of."""
         untold, self.untold = self.untold, []
-        for index, watched in enumerate(self.robots):
-            watched.look([(period.robots[index], period.tick, tick) for period, tick in untold])
+        self._each(lambda watched: watched.look(untold))
 
     def finish(self) -> None:
         """The run is over, by itself or because it was broken off."""
@@ -130,8 +121,15 @@ class Checks:
             self.finished = True
             self.world.observers.remove(self._look)
             self._tell()
-            for watched in self.robots:
-                watched.end(self.world.tick)
+            self._each(_RobotMonitors.end)
+
+    def _each(self, tell: Callable[[_RobotMonitors], None]) -> None:
+        """Calls `tell` for each robot. A monitor may be a user's own: what it raises is a PluginError with its name."""
+        for watched in self.robots:
+            try:
+                tell(watched)
+            except (Exception, SystemExit) as error:
+                raise watched.cannot_judge(error) from error
 
     @property
     def monitors(self) -> list[Monitor[Any]]:
@@ -158,84 +156,77 @@ class Checks:
 
 
 class _RobotMonitors:
-    """One robot and its monitors. `lost`: events that the log no longer held when they were asked for.
-
-    A monitor may be a user's own: whatever it raises becomes a PluginError with its name.
+    """One robot and its monitors. `check`: whose monitor is being told something. `lost`: events that the log no longer
+    held when they were asked for.
     """
 
     def __init__(
-        self,
-        world: World,
-        network: Network,
-        robot: Robot,
-        checks: Sequence[Check],
-        end_tick: int,
-        cut: bool,
+        self, world: World, network: Network, robot: Robot, checks: Sequence[Check], cut: bool
     ) -> None:
-        first_slot = network.robots[0].slot
-        subject = Subject(robot, network.spec.robots, end_tick, first_slot, network.downlink, cut)
+        self.world = world
         self.network = network
         self.robot = robot
-        self.monitors = [self._guarded(check, partial(checked_monitor, check, subject)) for check in checks]
-        self.of_ends = [one for one in self.monitors if type(one).period_over is not Monitor.period_over]
-        self.of_periods = [one for one in self.monitors if type(one).period is not Monitor.period]
-        self.of_times = [one for one in self.monitors if type(one).until is not Monitor.until]
+        self.place = world.robots.index(robot)
+        self.checks = checks
+        end_tick, first_slot = world.periods * CONTROL_PERIOD_TICKS, network.robots[0].slot
+        self.subject = Subject(robot, network.spec.robots, end_tick, first_slot, network.downlink, cut)
+        self.monitors: list[Monitor[Any]] = []
         self.of_events: dict[str, list[Monitor[Any]]] = {}
-        for monitor in self.monitors:
-            for what in monitor.EVENTS:
-                self.of_events.setdefault(what, []).append(monitor)
         self.receiver: RobotReceiver | None = None
-        if any(what in self.of_events for what in _FROM_RECEIVED):
-            self.receiver = RobotReceiver(network.spec.robots)
-        self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
-        self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
-        if self.receiver is not None:
-            self.heard_of_board.add("received")
-        self.later = not self.heard_of_board and all(monitor.LATER for monitor in self.monitors)
         self.of_board, self.of_pc = Cursor(robot.log), Cursor(network.log)
         self.faults = len(robot.board.faults)
         self.waiting: list[Event] = []
         self.lost = 0
 
+    def begin(self) -> None:
+        """Makes the monitors."""
+        for check in self.checks:
+            self.check = check
+            monitor = checked_monitor(check, self.subject)
+            self.monitors.append(monitor)
+            for what in monitor.EVENTS:
+                self.of_events.setdefault(what, []).append(monitor)
+        self.of_ends, self.of_periods, self.of_times = map(
+            self._that_have, ("period_over", "period", "until")
+        )
+        self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
+        self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
+        if any(what in self.of_events for what in _FROM_RECEIVED):
+            self.receiver = RobotReceiver(self.network.spec.robots)
+            self.heard_of_board.add("received")
+        self.later = not self.heard_of_board and all(monitor.LATER for monitor in self.monitors)
+
+    def _that_have(self, method: str) -> list[Monitor[Any]]:
+        """The monitors with a method of their own; telling the others would cost time."""
+        return [one for one in self.monitors if getattr(type(one), method) is not getattr(Monitor, method)]
+
     def period_over(self) -> None:
         """A control period is over."""
         for monitor in self.of_ends:
-            try:
-                monitor.period_over()
-            except (Exception, SystemExit) as error:
-                raise self._cannot_judge(monitor.check, error) from error
+            self.check = monitor.check
+            monitor.period_over()
 
-    def look(self, periods: Sequence[tuple[Any, int, int]]) -> None:
-        """Tells the monitors of control periods: the record of each, its first tick, and the first one after it."""
-        self._tell_faults()
-        self._gather()
-        for record, begun_tick, tick in periods:
-            for monitor in self.of_periods:
-                try:
-                    monitor.period(record, begun_tick)
-                except (Exception, SystemExit) as error:
-                    raise self._cannot_judge(monitor.check, error) from error
-            self._tell(tick)
-
-    def _tell_faults(self) -> None:
+    def look(self, periods: Sequence[tuple[Period, int]]) -> None:
+        """Tells the monitors of control periods, each with the first tick after it."""
         faults = self.robot.board.faults
-        if len(faults) > self.faults:
-            for fault in faults[self.faults :]:
-                for monitor in self.monitors:
-                    self._guarded(monitor.check, partial(monitor.fault, fault))
-            self.faults = len(faults)
+        for fault in faults[self.faults :]:
+            for monitor in self.monitors:
+                self.check = monitor.check
+                monitor.fault(fault)
+        self.faults = len(faults)
+        self._gather()
+        for period, tick in periods:
+            for monitor in self.of_periods:
+                self.check = monitor.check
+                monitor.period(period.robots[self.place], period.tick)
+            self._tell(tick)
 
     def _gather(self) -> None:
         """What is new in the logs."""
-        if not self.of_events:
-            return
-        self.lost += self.of_pc.lost
-        for _, event in self.of_pc.read(self.heard_of_pc):
-            if event.what not in _RESTARTS or event.slot == self.robot.slot:
-                self.waiting.append(event)
-        if self.heard_of_board:
-            self.lost += self.of_board.lost
-            self.waiting += [event for _, event in self.of_board.read(self.heard_of_board)]
+        for log, kinds in ((self.of_pc, self.heard_of_pc), (self.of_board, self.heard_of_board)):
+            if kinds:
+                self.lost += log.lost
+                self.waiting += [event for _, event in log.read(kinds)]
         self.waiting.sort(key=_BY_TICK)
 
     def _tell(self, tick: int) -> None:
@@ -246,6 +237,8 @@ class _RobotMonitors:
                 break
             told += 1
             if event.what in _RESTARTS:
+                if event.slot != self.robot.slot:
+                    continue
                 self._restart(event.tick)
             self._tell_one(event)
             if event.what == "received" and self.receiver is not None:
@@ -253,58 +246,47 @@ class _RobotMonitors:
                     self._tell_one(heard)
         del self.waiting[:told]
         for monitor in self.of_times:
-            self._guarded(monitor.check, partial(monitor.until, tick))
+            self.check = monitor.check
+            monitor.until(tick)
 
     def _restart(self, tick: int) -> None:
         if self.receiver is not None:
             self.receiver = RobotReceiver(self.network.spec.robots)
         for monitor in self.monitors:
-            self._guarded(monitor.check, partial(monitor.restarted, tick))
+            self.check = monitor.check
+            monitor.restarted(tick)
 
     def _tell_one(self, event: Event) -> None:
         for monitor in self.of_events.get(event.what, ()):
-            try:
-                monitor.event(event)
-            except (Exception, SystemExit) as error:
-                raise self._cannot_judge(monitor.check, error) from error
+            self.check = monitor.check
+            monitor.event(event)
 
-    def end(self, tick: int) -> None:
+    def end(self) -> None:
         """The run is over, perhaps within a control period."""
-        self._tell_faults()
-        self._gather()
+        tick = self.world.tick
+        self.look(())
         self._tell(tick + 1)
         for monitor in self.monitors:
-            self._guarded(monitor.check, partial(monitor.end, tick))
+            self.check = monitor.check
+            monitor.end(tick)
 
-    def _guarded(self, check: Check, call: Callable[[], T]) -> T:
-        try:
-            return call()
-        except (Exception, SystemExit) as error:
-            raise self._cannot_judge(check, error) from error
-
-    def _cannot_judge(self, check: Check, error: BaseException) -> PluginError:
+    def cannot_judge(self, error: BaseException) -> PluginError:
         """What to raise for what a check raised."""
-        named = f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
+        named = f"net{self.network.index}/robot{self.robot.slot}: check {self.check.name!r} cannot judge"
         if isinstance(error, PluginError):
             return PluginError(f"{named}: {error.what}", error.remedy)
         return PluginError(f"{named}: {raised(error)}", "repair the check")
 
 
 def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool) -> Expectation:
-    failures = sorted((one for monitor in monitors for one in monitor.failures), key=_BY_TICK)
-    failed = 0
-    judged = 0
-    for monitor in monitors:
-        failed += monitor.failed
-        judged += monitor.judged
+    failed, judged = sum(one.failed for one in monitors), sum(one.judged for one in monitors)
     open_ = judged == 0 or (lost and any(monitor.EVENTS for monitor in monitors))
-    first = failures[0] if failures else None
+    failures = (one for monitor in monitors for one in monitor.failures)
+    first = min(failures, key=_BY_TICK, default=None)
     return Expectation(
         name=name,
         kind=monitors[0].check.KIND,
         verdict="failed" if failed else "not judged" if open_ else "passed",
         failures=failed,
-        first=None
-        if first is None
-        else FirstFailure(first.network, first.slot, first.tick, first.wanted, first.found),
+        first=None if first is None else msgspec.convert(first, FirstFailure, from_attributes=True),
     )
