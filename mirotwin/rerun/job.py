@@ -67,26 +67,24 @@ def sent_in(script: Iterable[ScriptItem]) -> list[Transmission]:
     return [one for one in script if isinstance(one, Transmission) and one.direction == DOWN]
 
 
-def check_script(script: Sequence[ScriptItem], path: str, networks: int) -> None:
-    """Raises BadInput for transmissions of a network that overlap, or that is not there."""
+def check_script(script: Sequence[ScriptItem], path: str, scenario: Scenario | None = None) -> None:
+    """Raises BadInput for transmissions of a network that overlap, and for a network or robot that is not there.
+
+    Without a scenario any robot of as many networks as there can be.
+    """
+    networks = MAX_NETWORKS if scenario is None else len(scenario.networks)
     before: dict[int, Transmission] = {}
     for one in script:
         if one.network >= networks:
             what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
             raise BadInput(path, f"tick {one.tick}", what)
-        if not isinstance(one, Transmission):
-            continue
-        last = before.get(one.network)
-        if last is not None and one.tick < last.end_tick:
-            what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
-            raise BadInput(path, f"tick {one.tick}", what, "move it back")
-        before[one.network] = one
-
-
-def check_actions(script: Sequence[ScriptItem], path: str, scenario: Scenario) -> None:
-    """Raises BadInput for what is done to a robot that is not there."""
-    for one in script:
-        if isinstance(one, Reset | Power):
+        if isinstance(one, Transmission):
+            last = before.get(one.network)
+            if last is not None and one.tick < last.end_tick:
+                what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
+                raise BadInput(path, f"tick {one.tick}", what, "move it back")
+            before[one.network] = one
+        elif isinstance(one, Reset | Power) and scenario is not None:
             slots = [robot.slot for robot in scenario.networks[one.network].robot]
             if one.slot not in slots:
                 there = f"there is {', '.join(map(str, slots))}"
@@ -109,14 +107,13 @@ def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | N
         what = "is for a bare processor and not for the robot"
         raise BadInput(path, "header: bare", what, "`mirotwin replay FILE --firmware IMAGE.ihx` plays it")
     script = script_of_stream(sent)
-    if not script and (header is None or header.scenario is None):
-        raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")
     if header is None or header.scenario is None:
-        check_script(script, path, MAX_NETWORKS)
+        if not script:
+            raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")
+        check_script(script, path)
         return _default_scenario(script, path)
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
-    check_script(script, path, len(scenario.networks))
-    check_actions(script, path, scenario)
+    check_script(script, path, scenario)
     end_tick = scenario.end_tick
     for one in script:
         # What was recorded may still be on the air when its run ends.
@@ -307,30 +304,27 @@ def load_job(
             complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
-        image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
-        named = firmware is not None or image is None
-        runs_on = load_firmware(firmware, stack_from=stack_from) if named else image
-        assert runs_on is not None
-        return _job_of_recording(recording, file, settings, image, runs_on, seed)
-    _refuse_other_formats(data, file)
-    given = stream.decode(data, file)
+        if firmware is None:
+            image = image_of(recording, file)
+            return _job_of_recording(recording, file, settings, image, image, seed)
+        runs_on = load_firmware(firmware, stack_from=stack_from)
+        return _job_of_recording(recording, file, settings, image_if_any(recording, file), runs_on, seed)
+    given = _stream(data, file)
     header = given.header
     image = load_firmware(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
-    _check_firmware(header, image, file, firmware)
-    reseeded = seed not in (None, header.seed or 0)
-    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded
-    case = Case(header.verdict or "", header.end_tick or 0, other)
-    return _job_of_stream(given, file, settings, image, seed, case)
+    wanted = header.firmware_sha256
+    if wanted not in (None, image.sha256):
+        what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
+        if firmware is None:
+            raise BadInput(file, "header", what, "name the image with --firmware")
+        complain(f"{file}: {what}")  # to run another one is what a replay is for
+    return _job_of_stream(given, file, settings, image, seed)
 
 
 def load_stream(file: str, firmware: str | None) -> Job:
     """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
-    data = read_input(file)
-    _refuse_other_formats(data, file)
-    given = stream.decode(data, file)
-    case = Case(given.header.verdict or "", given.header.end_tick or 0)
-    return _job_of_stream(given, file, (), load_firmware(firmware), None, case)
+    return _job_of_stream(_stream(read_input(file), file), file, (), load_firmware(firmware), None)
 
 
 def rerun_job(
@@ -358,7 +352,8 @@ _BINARY = re.compile(rb"[\0-\x08\x0e-\x1f]")
 _WRITE_TIMES = "of bytes alone make a stream file, whose lines are `TICK > HEX BYTES` (24 000 ticks are 1 ms)"
 
 
-def _refuse_other_formats(data: bytes, path: str) -> None:
+def _stream(data: bytes, path: str) -> stream.StreamFile:
+    """The stream file with this content. Raises BadInput for another format, StreamError for what is wrong in it."""
     format, _ = detect(data[:HEAD_BYTES])
     if format == "pcapng":
         line = command_line("export", operand(path), "--out", "NAME.stream")
@@ -369,6 +364,7 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
     if format != "stream" and _BINARY.search(data[:4096]):
         what = "neither a recording nor a stream file (UTF-8 text)"
         raise BadInput(path, "offset 0", what, f"give a run.mcap that `mirotwin run` wrote; {_WRITE_TIMES}")
+    return stream.decode(data, path)
 
 
 def _job_of_recording(
@@ -382,21 +378,18 @@ def _job_of_recording(
     source = recording.source
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
     script = script_of(recording.periods)
-    check_script(script, path, len(scenario.networks))
-    check_actions(script, path, scenario)
+    check_script(script, path, scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
-    state = source.state if as_it_was and silent else ""
-    own = source.seed if seed is None else seed
     return Job(
         scenario,
-        own,
+        source.seed if seed is None else seed,
         script,
         recording.periods,
         path,
         runs_on,
         image,
-        state,
+        source.state if as_it_was and silent else "",
         resumed=source.resumed,
         origin=source.origin,
         firmware=source.firmware,
@@ -404,25 +397,13 @@ def _job_of_recording(
 
 
 def _job_of_stream(
-    given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None, case: Case
+    given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
-    sent = given.script()
-    header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
-    scenario = changed(
-        scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
-    )
-    check_actions(sent, path, scenario)
-    own = given.header.seed or 0
-    script = script_of_stream(sent)
+    header, sent = given.header, given.script()
+    keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}}), *settings]
+    scenario = changed(scenario_of_stream(sent, path, header), path, keys, expectations_of)
+    script, own = script_of_stream(sent), header.seed or 0
+    check_script(script, path, scenario)
+    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or seed not in (None, own)
+    case = Case(header.verdict or "", header.end_tick or 0, other)
     return Job(scenario, own if seed is None else seed, script, (), path, image, case=case)
-
-
-def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:
-    """An image that was named may be another one: that is what a replay is for."""
-    wanted = header.firmware_sha256
-    if wanted is None or wanted == image.sha256:
-        return
-    what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
-    if firmware is None:
-        raise BadInput(path, "header", what, "name the image with --firmware")
-    complain(f"{path}: {what}")
