@@ -12,7 +12,6 @@ import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pytest
@@ -26,24 +25,25 @@ from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.rig_options import marker_options, rig_options
+from mirotwin.verify.rig_options import RigOptions, marker_options, rig_options
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
 RIG = pytest.StashKey[Rig]()
 
 
+def options_of(item: pytest.Item, firmware: Path | None, seed: int) -> RigOptions:
+    """What the markers of a test ask for. Raises ValueError for what cannot be had."""
+    marks = [(mark.args, mark.kwargs) for mark in item.iter_markers("mirotwin")]
+    return rig_options(marker_options(marks), item.path.parent, firmware, seed)
+
+
 def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
     """The rig of a test; what its marker asks for and cannot have is an error of one line."""
-    rig: Rig | None = None
-    said = ""
     try:
-        mark = marker_options([(mark.args, mark.kwargs) for mark in item.iter_markers("mirotwin")])
-        rig = Rig(rig_options(mark, item.path.parent, firmware, seed))
+        rig = Rig(options_of(item, firmware, seed))
     except ValueError as error:
-        said = f"{item.nodeid}: {error}"
-    if rig is None:
-        pytest.fail(said, pytrace=False)
+        pytest.fail(f"{item.nodeid}: {error}", pytrace=False)
     item.stash[RIG] = rig
     return rig
 
@@ -60,20 +60,16 @@ def judge(item: pytest.Item) -> None:
 
 def at_the_tests_line(item: pytest.Item, error: ValueError | TimeoutError) -> BaseException:
     """The error as the test sees it: without the frames of the world below the test's own line; a wait in words."""
-    frames = []
-    trace = error.__traceback__
+    last = trace = error.__traceback__
     while trace is not None:
-        frames.append(trace)
+        if not trace.tb_frame.f_globals.get("__name__", "").startswith(OWN):
+            last = trace
         trace = trace.tb_next
-    while len(frames) > 1 and frames[-1].tb_frame.f_globals.get("__name__", "").startswith(OWN):
-        frames.pop()
-    kept = None
-    for frame in reversed(frames):
-        kept = TracebackType(kept, frame.tb_frame, frame.tb_lasti, frame.tb_lineno)
-    shown: BaseException = error
-    if isinstance(error, WaitExpired):
-        shown = WaitFailed.of(error, item.stash[RIG].world)
-    return shown.with_traceback(kept)
+    if last is not None:
+        last.tb_next = None
+    world = item.stash[RIG].world
+    shown = WaitFailed.of(error, world) if isinstance(error, WaitExpired) else error
+    return shown.with_traceback(error.__traceback__)
 
 
 def tell(
@@ -86,41 +82,39 @@ def tell(
 ) -> None:
     """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
     rig = item.stash[RIG]
-    failed = report.failed
-    nodeid = (
-        str(item.nodeid).replace(f"-seed{rig.options.seed}]", "]").replace(f"[seed{rig.options.seed}]", "")
-    )
+    seed = rig.options.seed
+    nodeid = item.nodeid.replace(f"-seed{seed}]", "]").replace(f"[seed{seed}]", "")
     file, _, name = nodeid.partition("::")
     file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
-    again = test_line(f"{file}::{name}", rig.options.seed, _relative(item.config, firmware))
-    failures = _judged(rig) if failed else ()
+    again = test_line(f"{file}::{name}", seed, _relative(item.config, firmware))
+    failures = _judged(rig) if report.failed else ()
     facts: dict[str, Any] = {**rig.facts(), "mirotwin_reproduce": again}
     report.user_properties += list(facts.items())
     item.user_properties += list(facts.items())  # JUnit takes them with the report of the teardown
     folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
     if folder is not None:
         clear(folder, SUMMARY)
-    if not failed:
+    if not report.failed:
         return
-    lines = [again]
-    error = caught.value if caught is not None else None
-    case = case_of(rig, failures, error)
-    where = ""
+    case = case_of(rig, failures, None if caught is None else caught.value)
+    lines, page = [again], ""
     if folder is not None:
-        where = str(_relative(item.config, folder))
-        own = foreign_path(rig.options.image) is None
-        lines += [] if case is None else case_lines(where, own)
-    text = story(rig, failures, lines)
-    if folder is not None and not rig.written:
-        text += f"\n{report_line(where)}"
+        where = f"{_relative(item.config, folder)}"
+        lines += [] if case is None else case_lines(where, foreign_path(rig.options.image) is None)
+        page = "" if rig.written else f"\n{report_line(where)}"
+    text = story(rig, failures, lines) + page
     report.sections.append(("mirotwin", text))
-    if folder is not None:
-        leave_test(folder, rig, failures, text, case)
-        if pages and not rig.written:
-            from mirotwin.report.report_command import leave_page  # loads readers of recordings
+    if folder is None:
+        return
+    sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
+    summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
+    others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
+    leave(folder, text + "\n", case, sent, rig.options.image, others)
+    if pages and not rig.written:
+        from mirotwin.report.report_command import leave_page  # loads readers of recordings
 
-            with suppress(ValueError):  # a report of a failure does not fail, nor where Bokeh is missing
-                leave_page(folder, item.nodeid)
+        with suppress(ValueError):  # a report of a failure does not fail, nor where Bokeh is missing
+            leave_page(folder, item.nodeid)
 
 
 def let_go(item: pytest.Item) -> None:
@@ -190,11 +184,3 @@ def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None)
         if case is not None:
             return case
     return case_of_checks(rig.world, rig.trace, rig.checks) if failures else None
-
-
-def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None) -> None:
-    """Writes the folder."""
-    sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
-    summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
-    others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
-    leave(folder, text + "\n", case, sent, rig.options.image, others)
