@@ -97,7 +97,7 @@ def steps(debugger: Debugger, seconds: float) -> tuple[list[float], list[float],
     for _ in range(ROUNDS):
         tick = chance.randrange(int(0.2 * TICKS_PER_SECOND), int(seconds * TICKS_PER_SECOND))
         places.append(cpu_ms(lambda tick=tick: debugger.timeline.go_to(tick)))  # type: ignore[misc]
-        instructions += [cpu_ms(lambda: debugger.step("into", True, True)) for _ in range(5)]
+        instructions += [cpu_ms(lambda: debugger.move("rstepi")) for _ in range(5)]
         lines += [cpu_ms(editor.line_back) for _ in range(5)]
     return lines, instructions, places
 
@@ -109,7 +109,7 @@ def plain_ratio(scenario: str, seconds: float) -> float:
         bare = run_of(scenario, seconds)
         plain.append(cpu_ms(lambda run=bare: run.to(int(seconds * TICKS_PER_SECOND))))  # type: ignore[misc]
         debugger = debugger_of(run_of(scenario, seconds))
-        debugger.add("never", [0x1FFF])
+        debugger.add("0x1fff")
         debugged.append(
             cpu_ms(partial(debugger.timeline.find, debugger._traps(), int(seconds * TICKS_PER_SECOND)))
         )
@@ -149,8 +149,8 @@ def main() -> None:
         show(f"{robots}: an instruction back", instructions, f"{5 * factor} ms")
         show(f"{robots}: to a random tick", places, "-")
         debugger.timeline.go_to(end)
-        debugger.add("never", [0x1FFF])
-        back = [cpu_ms(lambda one=debugger: one.go_on(back=True))]  # type: ignore[misc]
+        debugger.add("0x1fff")
+        back = [cpu_ms(lambda one=debugger: one.move("rcontinue"))]  # type: ignore[misc]
         show(f"{robots}: reverse-continue over {length:.1f} s without a hit", back, f"{1000 * factor} ms")
         debugger.breakpoints.clear()
         debugger.timeline.go_to(end)

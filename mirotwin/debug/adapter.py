@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import bisect
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import PureWindowsPath as AnyPath
 from typing import Any
@@ -20,7 +20,7 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
 from miro_robot.mcs51.opcodes import BITS, LENGTH, SFRS, disassemble
 from mirotwin.debug.console import VERBS, Console, shown_value
-from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
+from mirotwin.debug.debugger import STEPPED, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
 from mirotwin.debug.subject import launched, open_subject
 from mirotwin.debug.symbols import SIZES, Moment
@@ -133,7 +133,7 @@ class Adapter:
         """Goes on from reset to the first line of C: an editor shows nothing of what is before. Why it stopped."""
         if why != "begin" or self.timeline.tick or not self.symbols.line_begins:
             return why
-        found = self.its.step("into")
+        found = self.its.move("step")
         return why if found == STEPPED else found
 
     def use(self, debugger: Debugger) -> None:
@@ -158,27 +158,22 @@ class Adapter:
 
     def on_setBreakpoints(self, given: Message) -> Message:
         path = given["source"].get("path") or given["source"].get("name") or ""
-        at_line = self.symbols.at_line
-        return self._set(f"breakpoint in {path}", given, lambda one: at_line(path, one["line"])[0])
+        return self._set(f"breakpoint in {path}", given, lambda one: f"{path}:{one['line']:d}")
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
-        return self._set("function breakpoint", given, lambda one: self.symbols.at(one["name"])[0])
+        return self._set("function breakpoint", given, lambda one: one["name"])
 
     def on_setInstructionBreakpoints(self, given: Message) -> Message:
-        def address(one: Message) -> list[int]:
-            return [int(one["instructionReference"], 16) + one.get("offset", 0)]
+        def place(one: Message) -> str:
+            return f"{int(one['instructionReference'], 16) + one.get('offset', 0):#x}"
 
-        return self._set("instruction breakpoint", given, address)
+        return self._set("instruction breakpoint", given, place)
 
     def on_setDataBreakpoints(self, given: Message) -> Message:
-        def value(one: Message) -> Value:
-            space, address, count = one["dataId"].split(":")
-            return Value(CType("int", int(count)), space, int(address))
+        return self._set("data breakpoint", given, lambda one: one["dataId"])
 
-        return self._set("data breakpoint", given, value)
-
-    def _set(self, kind: str, given: Message, place: Callable[[Message], Collection[int] | Value]) -> Message:
-        """All breakpoints of a kind, which replace those before. `place`: where one is, or what it watches."""
+    def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
+        """All breakpoints of a kind, which replace those before."""
         there, before = self.its.breakpoints, self.kinds.get(kind, ())
         there[:] = [one for one in there if one.number not in before]
         self.kinds[kind] = []
@@ -187,29 +182,25 @@ class Adapter:
         for one in given.get("breakpoints") or ():
             asked = one.get("condition") or "", one.get("hitCondition") or ""
             try:
-                log = _logged(one["logMessage"]) if one.get("logMessage") else None
                 where = place(one)
-                if isinstance(where, Value):
-                    made = self.its.watch(one["dataId"], *asked, where)
+                log = _logged(one["logMessage"]) if one.get("logMessage") else None
+                if kind == "data breakpoint":
+                    space, address, size = where.split(":")
+                    made = self.its.watch(where, *asked, Value(CType("int", int(size)), space, int(address)))
                 else:
-                    made = self.its.add("", where, *asked)
-                made.log = log
+                    made = self.its.add(where, *asked)
             except _UNUSABLE as error:
                 found.append({"verified": False, "message": str(error)})
                 continue
+            made.log = log
             self.kinds[kind].append(made.number)
-            found.append({"verified": True, "id": made.number, **self._where(made, one.get("line"))})
+            at: Message = {"verified": True, "id": made.number, "message": made.note or None}
+            if made.written is None:
+                first = min(made.addresses)
+                line = self.symbols.line(first)
+                at |= {"instructionReference": f"{first:#06x}", "line": None if line is None else line.line}
+            found.append(at)
         return {"breakpoints": found}
-
-    def _where(self, made: Breakpoint, asked: int | None) -> Message:
-        """Where a breakpoint stands that was asked for in a line, and whether it was moved."""
-        if made.written is not None:
-            return {}
-        address = min(made.addresses)
-        line = self.symbols.line(address)
-        at = {"instructionReference": f"{address:#06x}", "line": None if line is None else line.line}
-        moved = asked is not None and asked != at["line"]
-        return {**at, "message": "the line has no code: the next one that has some"} if moved else at
 
     def on_dataBreakpointInfo(self, given: Message) -> Message:
         name = given["name"]
@@ -305,14 +296,13 @@ class Adapter:
         return {"threads": [{"id": at, "name": core.name} for at, core in cores]}
 
     def on_stackTrace(self, given: Message) -> Message:
-        thread, symbols = self._thread(given), self.symbols
-        frames = symbols.unwinder.frames(self.timeline.cores[thread].cpu)
+        thread = self._thread(given)
+        frames = self._moment(thread * _MOST_FRAMES + 1).frames()
         found: list[Message] = []
-        for at, (frame, place) in enumerate(zip(frames, symbols.unwinder.places(frames), strict=True)):
-            name = symbols.function(place) + (" (interrupt)" if frame.by_interrupt else "")
+        for identity, frame in enumerate(frames, thread * _MOST_FRAMES + 1):
+            name = self.symbols.function(frame.place) + (" (interrupt)" if frame.by_interrupt else "")
             nowhere = {"line": 0, "column": 0, "presentationHint": "subtle"}
-            where = {**self._place(place, "source"), "column": 1} if symbols.line(place) else nowhere
-            identity = thread * _MOST_FRAMES + at + 1
+            where = {"column": 1, **place} if (place := self._place(frame.place, "source")) else nowhere
             next_one = f"{frame.pc:#06x}"
             found.append({"id": identity, "name": name, **where, "instructionPointerReference": next_one})
         if not frames[-1].known:

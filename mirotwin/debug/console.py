@@ -166,19 +166,13 @@ class Console:
                 self.tell(f"{one.number}  {one.text}")
             return
         place, _, condition = (part.strip() for part in rest.partition(" if "))
-        addresses, line = self.symbols.at(place)
-        number = self.debugger.add(rest, addresses, condition).number
-        note = ""
-        if line is not None and ":" in place and not place.endswith(f":{line.line}"):
-            note = f" ({place} has no code: the next line that has some)"
-        if not self.symbols.instructions.issuperset(addresses):
-            note = " (no instruction is known to begin there)"
-        self.tell(f"breakpoint {number}: {self.symbols.place(addresses[0])}{note}")
+        one = self.debugger.add(place, condition)
+        note = f" ({one.note})" if one.note else ""
+        self.tell(f"breakpoint {one.number}: {self.symbols.place(min(one.addresses))}{note}")
 
     def _watch(self, rest: str) -> None:
         name, _, condition = (part.strip() for part in rest.partition(" if "))
         one = self.debugger.watch(name, condition)
-        one.text = f"watch {rest}"
         self.tell(f"breakpoint {one.number}: before {name} is written")
 
     def _delete(self, rest: str) -> None:
@@ -207,9 +201,9 @@ class Console:
 
     def _show(self, frames: list[StackFrame], chosen: int = -1) -> None:
         """One line a frame, the innermost first."""
-        for at, place in enumerate(self.symbols.unwinder.places(frames)):
-            how = "  <- interrupt" if frames[at].by_interrupt else ""
-            self.tell(f"{'*' if at == chosen else ' '}#{at}  {self.symbols.place(place)}{how}")
+        for at, frame in enumerate(frames):
+            how = "  <- interrupt" if frame.by_interrupt else ""
+            self.tell(f"{'*' if at == chosen else ' '}#{at}  {self.symbols.place(frame.place)}{how}")
         if not frames[-1].known:
             self.tell("    the stack cannot be told from here on")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from typing import Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -24,9 +24,7 @@ from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
 from mirotwin.rerun.inspected_run import RobotRun
 
-How = Literal["into", "over", "out"]
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
-_STEPS: dict[str, How] = {"step": "into", "stepi": "into", "next": "over", "finish": "out"}
 _BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}
 _COUNTS: dict[str, Callable[[int, int], bool]] = {
     "": int.__eq__, "=": int.__eq__, "==": int.__eq__, ">": int.__gt__, ">=": int.__ge__, "<": int.__lt__,
@@ -38,7 +36,8 @@ class Breakpoint(msgspec.Struct, eq=False):
     """Stops, or with `log` tells something, before an instruction at one of `addresses`: where `condition` is true,
     `written` is written, and `count` fits how often that was so since the run began.
 
-    `hits`: (cycle, processor) of those that are counted, up to `counted_to`.
+    `text`: as one asks for it; `note`: what is to be told about its place. `hits`: (cycle, processor) of those that are
+    counted, up to `counted_to`.
     """
 
     number: int
@@ -47,6 +46,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     condition: Term | None = None
     count: Callable[[int], bool] | None = None
     written: Bytes | None = None
+    note: str = ""
     log: Callable[[Moment], str] | None = None
     hits: list[tuple[int, int]] = []
     counted_to: int = 0
@@ -98,24 +98,32 @@ class Debugger:
 
     # Breakpoints
 
-    def add(self, text: str, addresses: Collection[int], condition: str = "", count: str = "") -> Breakpoint:
-        """A breakpoint at `addresses`. Raises BadInput for a condition or a count that is not one."""
-        if not all(0 <= address < SIZES["code"] for address in addresses):
-            raise BadInput("", "breakpoint", "is beyond the last code address", "use 0x0000 to 0xffff")
-        self._numbers += 1
-        term = expression(condition, self.symbols.known) if condition else None
-        counts = _counting(count) if count else None
-        self.breakpoints.append(Breakpoint(self._numbers, text, frozenset(addresses), term, counts))
-        return self.breakpoints[-1]
+    def add(self, place: str, condition: str = "", count: str = "") -> Breakpoint:
+        """A breakpoint at FILE:LINE, a symbol or an address. Raises BadInput."""
+        addresses, line = self.symbols.at(place)
+        note = ""
+        if line is not None and ":" in place and not place.endswith(f":{line.line}"):
+            note = f"{place} has no code: the next line that has some"
+        elif not self.symbols.instructions.issuperset(addresses):
+            note = "no instruction is known to begin there"
+        return self._added(place, addresses, condition, count, note=note)
 
     def watch(
         self, text: str, condition: str = "", count: str = "", place: Value | None = None
     ) -> Breakpoint:
         """A data breakpoint: before an instruction that writes what `text` means. Raises BadInput."""
         written = self.bytes_of(text, place)
-        found = self.add(text, self._writers(written), condition, count)
-        found.written = written
-        return found
+        return self._added(f"watch {text}", self._writers(written), condition, count, written=written)
+
+    def _added(
+        self, text: str, addresses: Collection[int], condition: str, count: str, **more: Any
+    ) -> Breakpoint:
+        term = expression(condition, self.symbols.known) if condition else None
+        counts = _counting(count) if count else None
+        self._numbers += 1
+        whole = f"{text} if {condition}" if condition else text
+        self.breakpoints.append(Breakpoint(self._numbers, whole, frozenset(addresses), term, counts, **more))
+        return self.breakpoints[-1]
 
     def bytes_of(self, text: str, place: Value | None = None) -> Bytes:
         """Where `text` lies. Raises NoValue for what lies in no memory that is written."""
@@ -152,22 +160,20 @@ class Debugger:
 
     def _traps(self, step: Trap | None = None, silent: bool = False) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
-        table: dict[int, list[Breakpoint]] = {}
-        for one in self.breakpoints:
-            for address in one.addresses:
-                table.setdefault(address, []).append(one)
+        places = frozenset[int]().union(*(one.addresses for one in self.breakpoints))
 
         def ask(core: Core) -> object:
-            place = core.cpu.pc
-            found = next((one for one in table.get(place, ()) if self._stops(one, core, silent)), None)
-            if found is None and step is not None and core is self.timeline.core and place in step.addresses:
+            pc = core.cpu.pc
+            there = (one for one in self.breakpoints if pc in one.addresses)
+            found = next((one for one in there if self._stops(one, core, silent)), None)
+            if found is None and step is not None and core is self.timeline.core and pc in step.addresses:
                 return step.ask(core)
             return found
 
         cores = range(len(self.timeline.cores)) if self.everyone else [self.timeline.focus]
-        traps = {at: Trap(table, ask) for at in cores}
+        traps = {at: Trap(places, ask) for at in cores}
         if step is not None:
-            traps[self.timeline.focus] = Trap({*table, *step.addresses}, ask)
+            traps[self.timeline.focus] = Trap(places.union(step.addresses), ask)
         return traps
 
     def _is_met(self, one: Breakpoint, core: Core) -> bool:
@@ -205,19 +211,18 @@ class Debugger:
     # Moving
 
     def move(self, verb: str, by_instruction: bool = False) -> str:
-        """`continue`, `step`, `next`, `finish` or `stepi`; with an `r` before it backwards. Raises BadInput."""
+        """`continue`, `step`, `next`, `finish` or `stepi`; with an `r` before it backwards. Raises BadInput.
+
+        Steps are lines, or instructions where that is asked for or the image has no lines.
+        """
         back, name = verb[0] == "r", verb.removeprefix("r")
         if name == "continue":
-            return self.go_on(back)
-        return self.step(_STEPS[name], back, by_instruction or name == "stepi")
-
-    def go_on(self, back: bool = False) -> str:
-        """To the next breakpoint, or the one before."""
-        if not back:
-            return self._forward()
-        self._count_hits()
-        hit = self.timeline.find_back(self._traps(silent=True))
-        return self._at_begin() if hit is None else _named(hit)
+            return self._back() if back else self._forward()
+        if name == "finish":
+            return self._out_back() if back else self._out()
+        if by_instruction or name == "stepi" or not self.symbols.line_begins:
+            return self._instruction_back(name == "next") if back else self._instruction(name == "next")
+        return self._line_back(name == "next") if back else self._line(name == "next")
 
     def go_to(self, tick: int) -> str:
         """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
@@ -230,14 +235,6 @@ class Debugger:
             return self._at_end() or "goto"
         return self._at_end() or INTERRUPTED
 
-    def step(self, how: How, back: bool = False, by_instruction: bool = False) -> str:
-        """One line, or one instruction where it asks for that or the image has no lines. Raises BadInput."""
-        if how == "out":
-            return self._out_back() if back else self._out()
-        if by_instruction or not self.symbols.line_begins:
-            return self._instruction_back(how) if back else self._instruction(how)
-        return self._line_back(how) if back else self._line(how)
-
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()
         self._count_hits()
@@ -248,6 +245,11 @@ class Debugger:
             return self._at_end() or INTERRUPTED
         self.told = [one for one in self.told if one[:2] <= hit[:2]]
         return _named(hit)
+
+    def _back(self) -> str:
+        self._count_hits()
+        hit = self.timeline.find_back(self._traps(silent=True))
+        return self._at_begin() if hit is None else _named(hit)
 
     def _at_begin(self) -> str:
         return INTERRUPTED if self.timeline.tick > self.timeline.begin_tick else BEGINS
@@ -262,19 +264,19 @@ class Debugger:
 
     # By instruction
 
-    def _instruction(self, how: How) -> str:
+    def _instruction(self, over: bool) -> str:
         cpu, pc, sp = self.cpu, self.cpu.pc, self.cpu.sp
-        if how == "over" and is_call(cpu.code_at(pc)):
+        if over and is_call(cpu.code_at(pc)):
             after = (pc + LENGTH[cpu.code_at(pc)]) & 0xFFFF
             return self._forward(Trap({after}, lambda core: core.cpu.sp == sp or None))
         self.timeline.step()
         return self._at_end() or STEPPED
 
-    def _instruction_back(self, how: How) -> str:
+    def _instruction_back(self, over: bool) -> str:
         base = self.symbols.unwinder.base(self.cpu)
         while self.timeline.step_back():
             frames = self.frames()
-            if how != "over" or frames[0].base <= base or len(frames) < 2:
+            if not over or frames[0].base <= base or len(frames) < 2:
                 return STEPPED
             self._out_back()
             if not frames[0].by_interrupt:
@@ -311,13 +313,13 @@ class Debugger:
         level = cpu.peripherals.interrupts.in_service
         return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, cpu.pc == entry)
 
-    def _line(self, how: How) -> str:
-        """On to where another line begins, of this function, of its caller, or (`into`) of one that it calls.
+    def _line(self, over: bool) -> str:
+        """On to where another line begins, of this function, of its caller, or (not `over`) of one that it calls.
 
         Code without lines, as before `main`, is passed to the next line, wherever that is.
         """
         here = self._line_of(self.cpu)
-        over = how == "over" and here.line is not None
+        over = over and here.line is not None
         callers = self.frames()[1:] if here.line is not None else []
         without_lines = [frame.pc for frame in callers if self.symbols.line(frame.pc) is None]
 
@@ -329,7 +331,7 @@ class Debugger:
 
         return self._forward(Trap({*self.symbols.line_begins, *without_lines}, ask))
 
-    def _line_back(self, how: How) -> str:
+    def _line_back(self, over: bool) -> str:
         """Back to where a line began: this one if some of it was executed, else the one before.
 
         Going back past the entry of a function leaves it: from there on only its callers are looked at.
@@ -342,7 +344,7 @@ class Debugger:
         for hit in self.timeline.hits_back({self.timeline.focus: trap}, closely=True):
             there = hit.found
             assert isinstance(there, _Line)
-            if there.base > outermost and (how == "over" or there.level != here.level):
+            if there.base > outermost and (over or there.level != here.level):
                 continue
             if line is not None and there[:2] != line[:2]:
                 break

@@ -7,8 +7,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import msgspec
 
 from miro_robot.image import Image
@@ -24,10 +22,12 @@ _LCALL_BYTES, _ACALL_BYTES = 3, 2
 class StackFrame(msgspec.Struct, frozen=True):
     """A function under way: `pc` is what it executes next, `entry` where it was entered, `base` SP at that moment.
 
-    `by_interrupt`: the hardware called it. `known`: whether the frames outside of it can be told.
+    `place`: what it executes, which for an outer frame is the call. `by_interrupt`: the hardware called it. `known`:
+    whether the frames outside of it can be told.
     """
 
     pc: int
+    place: int
     entry: int
     base: int
     by_interrupt: bool
@@ -92,28 +92,19 @@ class Unwinder:
     def frames(self, cpu: Cpu) -> list[StackFrame]:
         """From the innermost outwards. The last one is `known` if it is that of reset."""
         found: list[StackFrame] = []
-        pc, sp = cpu.pc, cpu.sp
+        pc, place, sp = cpu.pc, cpu.pc, cpu.sp
         while len(found) < _MOST_FRAMES:
             height, entry = self.heights.get(pc, (0, -1))
             base = sp - height
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
-            known = entry >= 0 and (
-                entry == 0 or (base > 0 and (by_interrupt or self.call_before(back) >= 0))
-            )
-            found.append(StackFrame(pc, entry if entry >= 0 else pc, base, by_interrupt, known))
+            call = back if by_interrupt else self.call_before(back)
+            known = entry >= 0 and (entry == 0 or (base > 0 and call >= 0))
+            found.append(StackFrame(pc, place, entry if entry >= 0 else pc, base, by_interrupt, known))
             if entry == 0 or not known:
                 break
-            pc, sp = back, base - 2
+            pc, place, sp = back, call, base - 2
         return found
-
-    def places(self, frames: list[StackFrame]) -> list[int]:
-        """What each of the frames executes: the innermost its next instruction, others the call under way."""
-        outer = [
-            frame.pc if inner.by_interrupt else self.call_before(frame.pc)
-            for inner, frame in pairwise(frames)
-        ]
-        return [frames[0].pc, *outer]
 
     def call_before(self, address: int) -> int:
         """Where the call stands that returns to `address`; -1 where none does."""

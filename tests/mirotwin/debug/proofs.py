@@ -139,7 +139,7 @@ def compiled(folder, source, *options):
     return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
 
 
-MOVES = ("go", "back", "into", "over", "out", "instruction", "goto", "near", "break")
+MOVES = ("continue", "rcontinue", "step", "next", "finish", "stepi", "goto", "near", "break")
 
 
 def walk(debugger, steps, end_tick, seed):
@@ -151,17 +151,16 @@ def walk(debugger, steps, end_tick, seed):
         if move == "break":
             debugger.breakpoints.clear()
             address = chance.choice(places)
-            debugger.add("one", [address], chance.choice(["", "R7 > 3", "tick % 7 == 0"]))
-        elif move in ("go", "back"):
-            debugger.go_on(back=move == "back")
+            debugger.add(f"{address:#x}", chance.choice(["", "R7 > 3", "tick % 7 == 0"]))
+        elif move.endswith("continue"):
+            debugger.move(move)
         elif move == "goto":
             debugger.go_to(chance.randrange(end_tick))
         elif move == "near":
             debugger.go_to(min(max(timeline.tick + chance.randrange(-50_000, 50_000), 0), end_tick))
-        elif move == "instruction":
-            debugger.step(chance.choice(["into", "over"]), back, by_instruction=True)
-        elif move != "out" or len(debugger.frames()) > 1:
-            debugger.step(move, back)
+        elif move != "finish" or len(debugger.frames()) > 1:
+            over = move == "stepi" and chance.random() < 0.5
+            debugger.move(f"{'r' if back else ''}{'next' if over else move}", move == "stepi")
         yield timeline.tick, timeline.state()
 
 

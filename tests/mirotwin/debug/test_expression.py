@@ -79,9 +79,9 @@ def test_what_has_no_value_is_refused(text):
 @pytest.fixture(scope="module")
 def debugger():
     debugger = debugger_of(robot_run())
-    debugger.add("take_body", debugger.symbols.at("take_body")[0])
+    debugger.add("take_body")
     debugger.go_to(SECOND // 2)
-    debugger.go_on()
+    debugger.move("continue")
     return debugger
 
 
@@ -118,8 +118,8 @@ def test_names_mean_variables_registers_bits_chips_and_memories(debugger, text, 
 )
 def test_what_is_not_live_says_so(function, name, frame, why):
     look = debugger_of(robot_run())
-    look.add("look", look.symbols.at(function)[0])
-    look.go_on()
+    look.add(function)
+    look.move("continue")
     with pytest.raises(NoValue, match=why):
         shown(look, name, frame)
 
@@ -137,8 +137,8 @@ def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp
     (tmp_path / "two.c").write_text(OVERLAID)
     children.run(["sdcc", "-mmcs51", "--debug", "two.c"], cwd=tmp_path, check=True)
     debugger = debugger_of(BareRun(BareMachine(load_hex(tmp_path / "two.ihx")), None, None))
-    debugger.add("less", debugger.symbols.at("less")[0])
-    debugger.go_on()
+    debugger.add("less")
+    debugger.move("continue")
     assert shown(debugger, "less_PARM_2") == 1
     with pytest.raises(NoValue, match="is not live: its memory is shared, and twice is not under way"):
         shown(debugger, "twice_PARM_2")

@@ -51,7 +51,7 @@ def test_next_stops_where_another_line_of_the_function_or_its_caller_begins(mome
     on_lines = [at for at in some(moments, 300, 2) if moments[at].pc in starts and line(moments[at].pc)][:30]
     for at in on_lines:
         stand(debugger, moments[at])
-        debugger.step("over")
+        debugger.move("next")
         expected = next_line(moments, at, starts, line)
         assert (debugger.cpu.cycles, debugger.cpu.pc) == (expected.cycle, expected.pc)
 
@@ -61,19 +61,19 @@ def test_a_line_back_undoes_a_line_forward(moments, debugger):
     debugger.breakpoints.clear()
     for at in some(moments, 12, 3):
         stand(debugger, moments[at])
-        debugger.step("over")  # to where a line begins
+        debugger.move("next")  # to where a line begins
         stops = []
         for _ in range(6):
             frames = debugger.frames()
             stops.append((debugger.timeline.tick, line(debugger.cpu.pc), len(frames)))
-            debugger.step("over")
+            debugger.move("next")
         depth = min(deep for _, _, deep in stops)
         outer = [stop for stop in stops if stop[2] == depth]
         if len(outer) < len(stops):
             continue  # it returned meanwhile: a line back goes over the call as a whole
         debugger.go_to(stops[-1][0])
         for tick, _, _ in reversed(stops[:-1]):
-            debugger.step("over", back=True)
+            debugger.move("rnext")
             assert debugger.timeline.tick == tick
 
 
@@ -82,10 +82,10 @@ def test_finish_returns_to_the_caller_and_its_reverse_to_the_call(moments, debug
     for at in deep:
         back, _, _ = moments[at].calls[-1]
         stand(debugger, moments[at])
-        debugger.step("out")
+        debugger.move("finish")
         assert debugger.cpu.pc == back
         stand(debugger, moments[at])
-        debugger.step("out", back=True)
+        debugger.move("rfinish")
         call = moments[max(to for to in range(at) if moments[to].calls == moments[at].calls[:-1])]
         assert (debugger.cpu.cycles, debugger.cpu.pc) == (call.cycle, call.pc)
 
@@ -93,10 +93,10 @@ def test_finish_returns_to_the_caller_and_its_reverse_to_the_call(moments, debug
 def test_an_instruction_forward_and_back_are_neighbours(moments, debugger):
     for at in some(moments, 40, 5):
         stand(debugger, moments[at + 1])
-        debugger.step("into", back=True, by_instruction=True)
+        debugger.move("rstepi")
         slept = debugger.cpu.idle
         assert slept or (debugger.cpu.cycles, debugger.cpu.pc) == moments[at][:2]
-        debugger.step("into", by_instruction=True)
+        debugger.move("stepi")
         assert slept or (debugger.cpu.cycles, debugger.cpu.pc) == moments[at + 1][:2]
 
 
@@ -110,36 +110,35 @@ def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
     debugger.watch("ticks")
     forward = []
     while len(forward) < 40 and debugger.cpu.cycles < changes[-1]:
-        debugger.go_on()
+        debugger.move("continue")
         forward.append(debugger.cpu.cycles)
     assert set(changes) <= set(forward)
     backward = []
-    while debugger.go_on(back=True).startswith("breakpoint"):
+    while debugger.move("rcontinue").startswith("breakpoint"):
         backward.append(debugger.cpu.cycles)
     assert backward == forward[-2::-1]
 
 
 def test_hits_are_counted_from_the_begin_of_the_run_in_both_directions(debugger):
-    place = debugger.symbols.at("failsafe_tick")[0]
-    debugger.add("each", place)
+    debugger.add("failsafe_tick")
     cycles = []
     for _ in range(7):
-        debugger.go_on()
+        debugger.move("continue")
         cycles.append(debugger.cpu.cycles)
     debugger.breakpoints.clear()
-    debugger.add("third", place, count="% 3")
-    assert debugger.go_on(back=True) == "breakpoint 2"
+    debugger.add("failsafe_tick", count="% 3")
+    assert debugger.move("rcontinue") == "breakpoint 2"
     assert debugger.cpu.cycles == cycles[5]
-    debugger.go_on(back=True)
+    debugger.move("rcontinue")
     assert debugger.cpu.cycles == cycles[2]
-    debugger.go_on()
+    debugger.move("continue")
     assert debugger.cpu.cycles == cycles[5]
 
 
 def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
-    one = debugger.add("log", debugger.symbols.at("failsafe_tick")[0])
+    one = debugger.add("failsafe_tick")
     one.log = lambda moment: "tick"
-    debugger.add("stop", debugger.symbols.at("failsafe_fresh")[0])
+    debugger.add("failsafe_fresh")
     console = Console(debugger)
     console.run("continue")
     lines = capsys.readouterr().out.splitlines()
