@@ -60,7 +60,6 @@ class Adapter:
         self.its: Debugger
         self.console: Console
         self.began = False
-        self.kinds: dict[str, list[int]] = {}  # numbers of breakpoints; those of lines by file
         self.children: list[dict[str, Shown]] = []
         self.paused = self.changed = self.ended = False
         self.run_after: Callable[[], object] | None = None
@@ -174,9 +173,7 @@ class Adapter:
 
     def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
         """All breakpoints of a kind, which replace those before."""
-        there, before = self.its.breakpoints, self.kinds.get(kind, ())
-        there[:] = [one for one in there if one.number not in before]
-        self.kinds[kind] = []
+        self.its.breakpoints[:] = [one for one in self.its.breakpoints if one.kind != kind]
         self.changed = True
         found = []
         for one in given.get("breakpoints") or ():
@@ -192,8 +189,7 @@ class Adapter:
             except _UNUSABLE as error:
                 found.append({"verified": False, "message": str(error)})
                 continue
-            made.log = log
-            self.kinds[kind].append(made.number)
+            made.kind, made.log = kind, log
             at: Message = {"verified": True, "id": made.number, "message": made.note or None}
             if made.written is None:
                 first = min(made.addresses)
@@ -277,7 +273,7 @@ class Adapter:
     def _stopped(self, why: str, text: str = "") -> None:
         word, _, digits = why.partition(" ")
         number = int(digits) if word == "breakpoint" else 0
-        kind = next((kind for kind, numbers in self.kinds.items() if number in numbers), "")
+        kind = next((one.kind for one in self.its.breakpoints if one.number == number), "")
         self.children.clear()
         self._event(
             "stopped",

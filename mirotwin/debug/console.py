@@ -6,8 +6,8 @@ What it prints of a moment is a time that `goto` takes, why it stopped, the plac
 from __future__ import annotations
 
 import re
-import shlex
 import signal
+from cmd import Cmd
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,7 +22,6 @@ from mirotwin.debug.expression import Value, children, content, expression
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.times import TimeType
 
-PROMPT = "(mirotwin) "
 LINES_AROUND = 5
 _HEX = re.compile("0[xX][0-9a-fA-F]+")
 MOVES = {
@@ -54,18 +53,36 @@ VERBS = {
 """By name, with their help; where several begin alike, the first is meant by their beginning."""
 
 
-class Console:
-    """Does commands. `lines`: what came of the last one."""
+class Console(Cmd):
+    """Does commands. `lines`: what came of the last one; `done`: whether all could be done."""
+
+    prompt = "(mirotwin) "
 
     def __init__(self, debugger: Debugger) -> None:
+        super().__init__()
         self.debugger = debugger
         self.symbols = debugger.symbols
         self.timeline = debugger.timeline
         self.lines: list[str] = []
         self.tell = self.lines.append
         self.frame = 0
+        self.done = True
         self.ended = False
         self.last = ""
+
+    def onecmd(self, line: str) -> bool:
+        """Runs a line that was typed; whether it is the last one."""
+        if line == "EOF":
+            self.ended = True
+        else:
+            self.done = self.run(line) and self.done
+        return self.ended
+
+    def completenames(self, text: str, *ignored: object) -> list[str]:
+        return [verb for verb in sorted(VERBS) if verb.startswith(text)]
+
+    def completedefault(self, text: str, *ignored: object) -> list[str]:
+        return [name for name in self.symbols.known if name.startswith(text)]
 
     def run(self, line: str) -> bool:
         """Does one command; the last step again where the line is empty. False where it could not, which it says.
@@ -136,18 +153,17 @@ class Console:
         self.say(self.debugger.go_to(tick))
 
     def _until(self, rest: str) -> None:
-        try:
-            name, *keys = shlex.split(rest) or [""]
-        except ValueError as error:
-            raise BadInput("", rest, str(error)) from None
+        name, *keys = rest.split() or [""]
         if name not in CONDITIONS:
             raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
-        core, kind = self.timeline.core, CONDITIONS[name]
-        if core.board is None:
+        robot, kind = self.timeline.core.robot, CONDITIONS[name]
+        if robot is None:
             what = "is a condition of a robot's world"
             raise BadInput("", name, what, "stop the bare processor by breakpoints")
         fields = kind.__struct_fields__
-        given: dict[str, Any] = {"network": core.network, **({"slot": core.slot} if "slot" in fields else {})}
+        given: dict[str, Any] = {"network": robot.network} | (
+            {"slot": robot.slot} if "slot" in fields else {}
+        )
         for key, _, value in (word.partition("=") for word in keys):
             given[key] = int(value, 16) if _HEX.fullmatch(value) else value
         try:

@@ -8,11 +8,9 @@ import sys
 from contextlib import redirect_stdout, suppress
 from typing import Annotated, TextIO
 
-import click
-
 from miro_exact.bad_input import BadInput
 from mirotwin.debug.adapter import Adapter
-from mirotwin.debug.console import PROMPT, VERBS, Console
+from mirotwin.debug.console import Console
 from mirotwin.debug.subject import DebugSubject, open_subject
 from mirotwin.debug.wire import Wire
 from mirotwin.shell.command import Option, command_of
@@ -53,8 +51,6 @@ def debug(options: DebugOptions) -> int:
         with redirect_stdout(sys.stderr):  # what anything prints must not get between the messages
             source = os.fdopen(_stdin("connect to --listen").fileno(), "rb", closefd=False)
             return _serve(Wire(source, sink))
-    if not options.subject:
-        raise click.UsageError("Missing argument 'SUBJECT'.")
     debugger, said, why = open_subject(options)
     console = Console(debugger)
     console.say(why)
@@ -63,7 +59,7 @@ def debug(options: DebugOptions) -> int:
     if not options.commands:
         return _interact(console)
     for line in options.commands:
-        show_line(f"{PROMPT}{line}")
+        show_line(f"{console.prompt}{line}")
         if not console.run(line):
             return BAD_INPUT
         if console.ended:
@@ -95,37 +91,17 @@ def _serve(wire: Wire) -> int:
 def _interact(console: Console) -> int:
     """Commands from standard input, with history and completion where it is a terminal."""
     terminal = _stdin("give commands by -x").isatty()
-    if terminal:
-        _complete(console)
-    done = True
+    if not terminal:
+        console.prompt = console.completekey = ""
     while not console.ended:
         try:
-            line = input(PROMPT if terminal else "")
-        except EOFError:
-            break
+            console.cmdloop()
         except KeyboardInterrupt:
             complain("interrupted; `quit` leaves")
-            continue
-        done = console.run(line) and done
-    return DONE if done or terminal else BAD_INPUT
+    return DONE if console.done or terminal else BAD_INPUT
 
 
 def _stdin(remedy: str) -> TextIO:
     if sys.stdin is None:
         raise BadInput("", "stdin", "is closed", remedy)
     return sys.stdin
-
-
-def _complete(console: Console) -> None:
-    try:
-        import readline
-    except ImportError:  # not on every system
-        return
-    names = console.symbols.known
-
-    def offer(text: str, state: int) -> str | None:
-        words = names if " " in readline.get_line_buffer().lstrip() else VERBS
-        return dict(enumerate(one for one in sorted({*words}) if one.startswith(text))).get(state)
-
-    readline.set_completer(offer)
-    readline.parse_and_bind("tab: complete")

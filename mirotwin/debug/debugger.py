@@ -36,8 +36,8 @@ class Breakpoint(msgspec.Struct, eq=False):
     """Stops, or with `log` tells something, before an instruction at one of `addresses`: where `condition` is true,
     `written` is written, and `count` fits how often that was so since the run began.
 
-    `text`: as one asks for it; `note`: what is to be told about its place. `hits`: (cycle, processor) of those that are
-    counted, up to `counted_to`.
+    `text`: as one asks for it; `note`: what is to be told about its place; `kind`: an editor's, which it sets together.
+    `hits`: (cycle, processor) of those that are counted, up to `counted_to`.
     """
 
     number: int
@@ -47,6 +47,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     count: Callable[[int], bool] | None = None
     written: Bytes | None = None
     note: str = ""
+    kind: str = ""
     log: Callable[[Moment], str] | None = None
     hits: list[tuple[int, int]] = []
     counted_to: int = 0

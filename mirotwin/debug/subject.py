@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from functools import partial
+import re
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import click
@@ -13,12 +13,13 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
+from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.firmware.subject import SubjectOptions, open_run, which_robot
+from mirotwin.firmware.subject import SubjectOptions, open_run
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
-from mirotwin.rerun.job import Job, load_job
+from mirotwin.rerun.job import Job
 from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, debugged_image, load_images
 from mirotwin.shell.options import AT, RESUME
@@ -27,7 +28,7 @@ from mirotwin.shell.times import Time
 from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
-from mirotwin.verify.cases.case import has_header, is_bare_case
+from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.rerun import CaseVerdict
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
@@ -49,26 +50,23 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
 
 
 def launched(given: Mapping[str, Any]) -> DebugSubject:
-    """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput."""
-    words: list[str] = []
+    """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput.
+
+    `linesFrom` is `--lines-from` there.
+    """
     fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "check")]
-    names = {_key(name): name for name in fields}
-    for key in names.keys() & {key for key, value in given.items() if value is not None}:
-        option = f"--{'set' if key == 'set' else names[key].replace('_', '-')}"
-        values = given[key] if isinstance(given[key], list) else [given[key]]
-        words += [word for value in values for word in (option, f"{value}")]
+    options = ["set" if name == "settings" else name.replace("_", "-") for name in fields]
+    keys = {re.sub("-(.)", lambda found: found[1].upper(), option): option for option in options}
+    words: list[str] = []
+    for key, option in keys.items():
+        values = given[key] if isinstance(given.get(key), list) else [given.get(key)]
+        words += [word for value in values if value is not None for word in (f"--{option}", f"{value}")]
     command: Any = command_of(DebugSubject)(lambda options: options)  # type: ignore[arg-type, return-value]
     try:
         found: DebugSubject = command.main([*words, "--", given.get("subject") or ""], standalone_mode=False)
     except click.UsageError as error:
-        raise BadInput("", "launch", error.format_message(), f"its keys are {', '.join(names)}") from None
+        raise BadInput("", "launch", error.format_message(), f"its keys are {', '.join(keys)}") from None
     return found
-
-
-def _key(name: str) -> str:
-    """`lines_from` as configurations write it: `linesFrom`; `settings` is `set`."""
-    first, *others = ("set" if name == "settings" else name).split("_")
-    return first + "".join(one.capitalize() for one in others)
 
 
 def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugger, list[str], str]:
@@ -82,11 +80,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     if os.path.isdir(subject):
         subject = file_in(subject, (*RECORDINGS, *CASES))
         options = msgspec.structs.replace(options, subject=subject)
-    case, judge = _opened(options)
-    if options.check is not None and not isinstance(case, CaseRun):
-        raise BadInput(subject, "--check", "is for a case of a bare processor", "leave it out")
-    run = case if case is not None else open_run(options)
-    assert isinstance(run, RobotRun | BareRun | CaseRun)
+    run, verdict = _opened(options)
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
@@ -99,9 +93,10 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     elif not symbols.has_sources():
         said.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
-        if judge is not None:
+        if isinstance(run, RobotRun) and run.job is not None and run.job.case.verdict:
+            verdict = _judged(timeline, run.world, run.job)
+        if verdict is not None:
             why = "case"
-            verdict = judge(timeline)
             said += verdict.lines
             if verdict.failure is not None:
                 _stand_at(timeline, verdict.failure, options.slot)
@@ -110,36 +105,24 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     return debugger, said, why
 
 
-Judge = Callable[[Timeline], CaseVerdict]
-"""Gives what the check of a case says this time."""
-
-
-def _opened(options: DebugSubject) -> tuple[RobotRun | CaseRun | None, Judge | None]:
-    """A case and how it is judged; None for what is not one."""
+def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, CaseVerdict | None]:
+    """The run, and the verdict on a case of a bare processor."""
     path = options.subject
-    if not has_header(path):
-        return None, None
     if is_bare_case(path):
-        return _bare_case(options)
-    job = load_job(path, options.firmware, options.settings)
-    if not job.case.verdict:
-        return None, None
-    world = job.world_of()
-    return RobotRun(world, *which_robot(world, options)), partial(_judge, job)
+        image = load_case_firmware(path, options.firmware)
+        again, verdict = rerun_bare_case(path, image, options.check)
+        end_tick = again.end_tick if again.failure is None else max(again.end_tick, again.failure.tick)
+        playback = BarePlayback(image, again.line, again.script, end_tick, path)
+        return CaseRun(playback), verdict
+    if options.check is not None:
+        raise BadInput(path, "--check", "is for a case of a bare processor", "leave it out")
+    run = open_run(options)
+    assert isinstance(run, RobotRun | BareRun)
+    return run, None
 
 
-def _bare_case(options: DebugSubject) -> tuple[CaseRun, Judge]:
-    path = options.subject
-    image = load_case_firmware(path, options.firmware)
-    again, verdict = rerun_bare_case(path, image, options.check)
-    end_tick = again.end_tick if again.failure is None else max(again.end_tick, again.failure.tick)
-    playback = BarePlayback(image, again.line, again.script, end_tick, path)
-    return CaseRun(playback), lambda timeline: verdict
-
-
-def _judge(job: Job, timeline: Timeline) -> CaseVerdict:
-    assert isinstance(timeline.run, RobotRun)
-    world = timeline.run.world
+def _judged(timeline: Timeline, world: World, job: Job) -> CaseVerdict:
+    """What the check of a case says this time."""
     checks = Checks(world, job.expectations_of_case())
     timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
     checks.finish()
@@ -148,8 +131,9 @@ def _judge(job: Job, timeline: Timeline) -> CaseVerdict:
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
     place = (failure.network, failure.slot if slot is None else slot)
-    places = [(core.network, core.slot) for core in timeline.cores]
-    timeline.focus = places.index(place) if place in places else timeline.focus
+    for at, core in enumerate(timeline.cores):
+        if core.robot is not None and (core.robot.network, core.robot.slot) == place:
+            timeline.focus = at
     timeline.go_to(failure.tick)
 
 

@@ -2,8 +2,7 @@
 
 A run is bits, so going back is going forward again from a saved state. A moment is a machine cycle at which the
 processor in focus stands between two instructions. States are saved at the end of each control period, and closer to
-what is looked at closely; pages that do not differ from those before are shared, and when they take more than their
-budget, every second state of the older half goes.
+what is looked at closely; when they take more than their budget, every second state of the older half goes.
 
     checkpoint ──► load ──► run, asking at marked instructions ──► hits ──► go to the first or the last one
 """
@@ -13,6 +12,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
@@ -24,13 +24,13 @@ from miro_robot.inspect.marks import MarkInspector
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event, HostLog
+from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
 from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.shell.progress import ProgressBar
 
 BUDGET_BYTES = 16 << 20
 CLOSE_TICKS = 48_000  # 2 ms
-_PAGE = 4096
 _TICK, _ORDER = attrgetter("tick"), itemgetter(0, 1)  # of a checkpoint, of a hit
 _LONGEST_CYCLES = 4  # of an instruction
 _WAKES = frozenset((0, *range(0x03, 0x34, 8)))  # where a processor that slept goes on
@@ -41,9 +41,11 @@ class Core(NamedTuple):
 
     name: str
     cpu: Cpu
-    board: Board | None = None
-    network: int = 0
-    slot: int = 0
+    robot: Robot | None = None
+
+    @property
+    def board(self) -> Board | None:
+        return None if self.robot is None else self.robot.board
 
 
 class Hit(NamedTuple):
@@ -63,7 +65,7 @@ class Trap(NamedTuple):
 
 class _Checkpoint(NamedTuple):
     tick: int
-    pages: list[bytes]
+    state: bytes
     log_ends: list[int]
 
 
@@ -81,12 +83,9 @@ class Timeline:
         self._restore: Callable[[bytes], None]
         if isinstance(run, RobotRun):
             networks = run.world.networks
-            robots = [(one.network, one.slot, one.board) for network in networks for one in network.robots]
-            self.cores = [
-                Core(f"net{network}/robot{slot}", board.cpu, board, network, slot)
-                for network, slot, board in robots
-            ]
-            self._logs = [*(board.log for _, _, board in robots), *(network.log for network in networks)]
+            robots = [robot for network in networks for robot in network.robots]
+            self.cores = [Core(f"net{one.network}/robot{one.slot}", one.board.cpu, one) for one in robots]
+            self._logs = [*(one.board.log for one in robots), *(network.log for network in networks)]
             self.code_in_ram = False
             self.state, self._restore = run.world.state.save, run.world.go_on_from
         else:
@@ -137,21 +136,15 @@ class Timeline:
         if at < len(self._kept) and self._kept[at].tick == tick:
             return
         state = self.state()
-        before = self._kept[at - 1].pages if at else []
-        pages = [state[start : start + _PAGE] for start in range(0, len(state), _PAGE)]
-        for index, old in enumerate(before[: len(pages)]):
-            if pages[index] == old:
-                pages[index] = old
-                self.kept_bytes -= len(old)
-        self._kept.insert(at, _Checkpoint(tick, pages, [log.end for log in self._logs]))
+        self._kept.insert(at, _Checkpoint(tick, state, [log.end for log in self._logs]))
         self.kept_bytes += len(state)
         if self.kept_bytes > BUDGET_BYTES:
             del self._kept[1 : len(self._kept) // 2 : 2]
-            self.kept_bytes = sum({id(page): len(page) for one in self._kept for page in one.pages}.values())
+            self.kept_bytes = sum(len(one.state) for one in self._kept)
 
     def _load(self, at: int) -> None:
         one = self._kept[at]
-        self._restore(b"".join(one.pages))
+        self._restore(one.state)
         for log, end in zip(self._logs, one.log_ends, strict=True):
             log.cut(end)
         for board in filter(None, (core.board for core in self.cores)):
@@ -193,12 +186,15 @@ class Timeline:
                 if core.board is not None:
                     core.board.sync(self._now)
 
-    def _run_to(self, tick: int) -> None:
+    def _run_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> None:
+        """`stops` is asked between two pieces."""
         while self._now < tick and not self.run.over:
             end_tick = (self._now // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
             self.run.to(min(tick, end_tick))
             if self._now == end_tick:
                 self._save()
+            if stops():
+                break
 
     def land(self, hit: Hit) -> None:
         """To a hit, with its processor in focus."""
@@ -265,23 +261,17 @@ class Timeline:
         None, and no further than the end of the run, `until_tick` or an interruption, if there is none.
         """
         here = (self.core.cpu.cycles, self.focus)
-        found: list[Hit] = []
+        with self._asking(traps, lambda hit: hit[:2] > here) as found:
 
-        def tell(hit: Hit) -> bool:
-            if hit[:2] > here:
-                found.append(hit)
-            return hit[:2] > here
+            def later() -> list[Hit]:
+                return [hit for hit in found if hit[:2] > here]
 
-        with self._asking(traps, tell):
-            while not (found or self.run.over or self._now >= until_tick):
-                self._run_to(min(until_tick, (self._now // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS))
-                if self.interrupted():
-                    break
-        if not found:
+            self._run_to(until_tick, lambda: bool(later()) or self.interrupted())
+        hit = min(later(), key=_ORDER, default=None)
+        if hit is None:
             self._settle()
-            return None
-        hit = min(found, key=_ORDER)
-        self.land(hit)
+        else:
+            self.land(hit)
         return hit
 
     def hits_back(self, traps: Mapping[int, Trap], closely: bool = False) -> Iterator[Hit]:
@@ -297,8 +287,7 @@ class Timeline:
             at = self._before(end_tick)
             begin_tick, first = self._kept[at].tick, at == 0
             self._load(at)
-            found: list[Hit] = []
-            with self._asking(traps, lambda hit, found=found: bool(found.append(hit))):  # type: ignore[misc]
+            with self._asking(traps) as found:
                 self._run_to(end_tick)
             found.sort(key=_ORDER, reverse=True)
             yield from (hit for hit in found if hit[:2] < here)
@@ -327,25 +316,33 @@ class Timeline:
 
     def radio_events(self) -> list[Event]:
         """Frames on the air of the network of the robot in focus, up to now."""
-        if not isinstance(self.run, RobotRun):
+        robot = self.core.robot
+        if robot is None or not isinstance(self.run, RobotRun):
             return []
-        log = self.run.world.networks[self.core.network].log
+        log = self.run.world.networks[robot.network].log
         return [event for _, event in log.since(0, ("sent", "answer")) if event.tick <= self.tick]
 
     @contextmanager
-    def _asking(self, traps: Mapping[int, Trap], tell: Callable[[Hit], bool]) -> Iterator[None]:
+    def _asking(
+        self, traps: Mapping[int, Trap], enough: Callable[[Hit], bool] = lambda hit: False
+    ) -> Iterator[list[Hit]]:
+        """Within it what the traps find is listed; a trap that finds `enough` is not asked again."""
+        found: list[Hit] = []
+
+        def ask(at: int, trap: Trap) -> bool:
+            it = trap.ask(self.cores[at])
+            if it is None:
+                return False
+            found.append(Hit(self.cores[at].cpu.cycles, at, it))
+            return enough(found[-1])
+
         others = None if isinstance(self.run, RobotRun) else self.run.marks
-        asking = []
-        for at, trap in traps.items():
-            core = self.cores[at]
-
-            def ask(at: int = at, trap: Trap = trap, core: Core = core) -> bool:
-                found = trap.ask(core)
-                return found is not None and tell(Hit(core.cpu.cycles, at, found))
-
-            asking.append(MarkInspector(core.cpu, trap.addresses, ask, others))
+        asking = [
+            MarkInspector(self.cores[at].cpu, trap.addresses, partial(ask, at, trap), others)
+            for at, trap in traps.items()
+        ]
         try:
-            yield
+            yield found
         finally:
             for one in asking:
                 one.detach()

@@ -153,7 +153,7 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         raise BadInput(options.subject, "", f"is no image, {option} does not apply to it", "leave it out")
     subject = options.subject
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
-    periods = None
+    periods = job = None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         text = load(subject, options.settings)
         tell_notes(text.notes)
@@ -167,11 +167,11 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         periods = job.recorded[-1].index + 1 if job.recorded else None
         with plain_parameters(subject):
             world = job.world_of()
-    network, index = which_robot(world, options)
-    return RobotRun(world, network, index, periods)
+    network, index = _which_robot(world, options)
+    return RobotRun(world, network, index, periods, job)
 
 
-def which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
+def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
     """(network, place among its robots) of the robot that was asked for. Raises BadInput."""
     network = options.network or 0
     if network >= len(world.networks):

@@ -11,6 +11,7 @@ from miro_robot.image import Image
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.world import World
+from mirotwin.rerun.job import Job
 from mirotwin.verify.bare.run import BarePlayback
 
 PIECE_TICKS = CONTROL_PERIOD_TICKS
@@ -45,16 +46,25 @@ class Run:
 class RobotRun(Run):
     """The robot in place `index` of network `network` (slot order) of a world, which runs as a whole.
 
-    `periods`: after so many control periods it is over (default: as many as the scenario has).
+    `periods`: after so many control periods it is over (default: as many as the scenario has). `job`: what it repeats,
+    if anything.
     """
 
-    def __init__(self, world: World, network: int = 0, index: int = 0, periods: int | None = None) -> None:
+    def __init__(
+        self,
+        world: World,
+        network: int = 0,
+        index: int = 0,
+        periods: int | None = None,
+        job: Job | None = None,
+    ) -> None:
         board = world.networks[network].robots[index].board
         end_tick = (periods or world.periods) * CONTROL_PERIOD_TICKS
         super().__init__(board.cpu, world.image, end_tick, TICKS_PER_SECOND, board)
         self.world = world
         self.network = network
         self.index = index
+        self.job = job
 
     @property
     def over(self) -> bool:

@@ -127,7 +127,6 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
-        ("until edge 'pin", "No closing quotation"),
         ("until edge pins=txd", "until edge: pins: unknown key; did you mean pin?"),
         ("until answer slot=9", "until answer: slot: is out of range; must be <= 4"),
         ("until answer seq=x", "until answer: seq: expected a whole number, got a string"),
