@@ -25,23 +25,17 @@ from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.rig_options import RigOptions, marker_options, rig_options
+from mirotwin.verify.rig_options import rig_options
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
 RIG = pytest.StashKey[Rig]()
 
 
-def options_of(item: pytest.Item, firmware: Path | None, seed: int) -> RigOptions:
-    """What the markers of a test ask for. Raises ValueError for what cannot be had."""
-    marks = [(mark.args, mark.kwargs) for mark in item.iter_markers("mirotwin")]
-    return rig_options(marker_options(marks), item.path.parent, firmware, seed)
-
-
 def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
     """The rig of a test; what its marker asks for and cannot have is an error of one line."""
     try:
-        rig = Rig(options_of(item, firmware, seed))
+        rig = Rig(rig_options(item.iter_markers("mirotwin"), item.path.parent, firmware, seed))
     except ValueError as error:
         pytest.fail(f"{item.nodeid}: {error}", pytrace=False)
     item.stash[RIG] = rig

@@ -14,9 +14,9 @@ from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import NotObservable, RobotPort, check_observable
-from mirotwin.testing.items import options_of
 from mirotwin.testing.link import Link
 from mirotwin.testing.waiting import WaitFailed
+from mirotwin.verify.rig_options import rig_options
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -44,7 +44,8 @@ class PortFixtures:
     def world(self, request: pytest.FixtureRequest, _mirotwin_seed: int) -> Generator[RobotPort, None, None]:
         """The robots at the port, standing, and told to stand again when the test is over."""
         try:
-            asked = options_of(request.node, None, _mirotwin_seed)
+            marks = request.node.iter_markers("mirotwin")
+            asked = rig_options(marks, request.node.path.parent, None, _mirotwin_seed)
             check_observable(asked.scenario)
             if asked.scenario.expect:
                 names = ", ".join(asked.scenario.expect)

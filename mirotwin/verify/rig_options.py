@@ -10,10 +10,10 @@ how the printed line repeats a test.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -25,6 +25,9 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check
+
+if TYPE_CHECKING:
+    import pytest
 
 MARKER = "@pytest.mark.mirotwin"
 
@@ -39,37 +42,22 @@ class RigOptions(msgspec.Struct, frozen=True):
     boot: bool
 
 
-class MarkerOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """The keys of a test's markers, put together; None where none says anything."""
-
-    scenario: str | Path | dict[str, Any] | None = None
-    settings: tuple[str, ...] = ()
-    firmware: str | Path | None = None
-    seed: int | None = None
-    expect: dict[str, Any] = {}
-    boot: bool | None = None
-
-
-def marker_options(marks: Sequence[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> MarkerOptions:
-    """From the arguments of markers, the innermost one first. Raises BadInput for keys and values that cannot be."""
-    found: dict[str, Any] = {}
-    settings: list[str] = []
-    expect: dict[str, Any] = {}
-    for positional, keys in marks:
-        if positional:
-            what = f"{positional[0]!r} has no name"
-            raise BadInput(
-                "", MARKER, what, f"write scenario={positional[0]!r}, or another of {', '.join(KEYS)}"
-            )
-        for key, value in keys.items():
+def _together(marks: Iterable[pytest.Mark]) -> dict[str, Any]:
+    """The keys of markers, the innermost one first, put together."""
+    found: dict[str, Any] = {"settings": [], "expect": {}}
+    for mark in marks:
+        if mark.args:
+            remedy = f"write scenario={mark.args[0]!r}, or another of {', '.join(KEYS)}"
+            raise BadInput("", MARKER, f"{mark.args[0]!r} has no name", remedy)
+        for key, value in mark.kwargs.items():
             _check_key(key, value)
             if key == "settings":
-                settings[:0] = value
+                found[key] = [*value, *found[key]]
             elif key == "expect":
-                expect = {**value, **expect}
+                found[key] = value | found[key]
             else:
                 found.setdefault(key, value)
-    return MarkerOptions(**found, settings=tuple(settings), expect=expect)
+    return found
 
 
 _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
@@ -94,33 +82,34 @@ def _check_key(key: str, value: Any) -> None:
         raise BadInput("", MARKER, f"settings={value!r}", f"give {what}")
 
 
-def rig_options(mark: MarkerOptions, folder: Path, firmware: str | Path | None, seed: int) -> RigOptions:
-    """What a marker and the session ask for. `folder`: that of the test, from which the marker's paths go; `firmware`:
-    the session's, None for the robot's own. Raises BadInput.
+def rig_options(
+    marks: Iterable[pytest.Mark], folder: Path, firmware: str | Path | None, seed: int
+) -> RigOptions:
+    """What the markers of a test, the innermost one first, and the session ask for.
+
+    `folder`: that of the test, from which the markers' paths go; `firmware`: the session's, None for the robot's own.
+    Raises BadInput.
     """
     if not 0 <= seed <= MAX_SEED:
         raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")
-    scenario = _scenario(mark, folder)
+    mark = _together(marks)
+    scenario = _scenario(mark.get("scenario"), mark["settings"], folder)
     if scenario.step:
         what = f"scenario {scenario.name} has {amount(len(scenario.step), 'step')}, which a test in Python does not do"
         raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
-    if mark.firmware is not None:
-        firmware = _near(mark.firmware, folder)
-    image = load_firmware(firmware)
-    if mark.expect:
-        scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark.expect})
-    boot = mark.boot if mark.boot is not None else all(one.host == "silent" for one in scenario.networks)
+    image = load_firmware(_near(mark["firmware"], folder) if "firmware" in mark else firmware)
+    scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark["expect"]})
+    boot = mark.get("boot", all(one.host == "silent" for one in scenario.networks))
     return RigOptions(scenario, image, seed, expectations_of(scenario, scenario.name), boot)
 
 
-def _scenario(mark: MarkerOptions, folder: Path) -> Scenario:
-    source = mark.scenario
+def _scenario(source: str | Path | dict[str, Any] | None, settings: Sequence[str], folder: Path) -> Scenario:
     if source is None or isinstance(source, dict):
-        settings = [f"{key}={_toml(value)}" for key, value in (source or {}).items()]
-        return silent_scenario((*settings, *mark.settings))
+        tables = [f"{key}={_toml(value)}" for key, value in (source or {}).items()]
+        return silent_scenario((*tables, *settings))
     text = str(source)
     is_path = isinstance(source, Path) or text.endswith(".toml") or "/" in text
-    return load(str(_near(text, folder)) if is_path else text, mark.settings).scenario
+    return load(str(_near(text, folder)) if is_path else text, settings).scenario
 
 
 def _near(path: str | Path, folder: Path) -> Path:

@@ -16,14 +16,14 @@ from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.rig_options import marker_options, rig_options
+from mirotwin.verify.rig_options import rig_options
 from tests.mirotwin.conftest import hex_file
 
 HERE = Path(__file__).parent
 
 
 def options(*markers, seed=0):
-    return rig_options(marker_options([((), keys) for keys in markers]), HERE, None, seed)
+    return rig_options([pytest.mark.mirotwin(**keys).mark for keys in markers], HERE, None, seed)
 
 
 def rig(seed=0, **keys):
@@ -130,23 +130,19 @@ def test_a_marker_that_cannot_be_met_is_refused_with_the_remedy(keys, said):
 
 def test_a_marker_without_names_is_refused():
     with pytest.raises(BadInput, match="'fig6' has no name; write scenario='fig6'"):
-        marker_options([(("fig6",), {})])
+        rig_options([pytest.mark.mirotwin("fig6").mark], HERE, None, 0)
 
 
 def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
-    inner = {"seed": 1, "settings": ["duration_s=2"], "expect": {"inside_pitch": True}}
+    inner = {"boot": False, "settings": ["duration_s=2"], "expect": {"inside_pitch": True}}
     outer = {
-        "seed": 2,
+        "boot": True,
         "scenario": {"duration_s": 9},
         "settings": ["duration_s=3", "network.robots=5"],
         "expect": {"inside_pitch": False, "frames_accepted_min": 1},
     }
-    found = marker_options([((), inner), ((), outer)])
-    assert found.seed == 1
-    assert found.settings == ("duration_s=3", "network.robots=5", "duration_s=2")
-    assert found.expect == {"inside_pitch": True, "frames_accepted_min": 1}
     made = options(inner, outer)
-    assert (made.scenario.duration_s, made.scenario.networks[0].robots) == (2, 5)
+    assert (made.boot, made.scenario.duration_s, made.scenario.networks[0].robots) == (False, 2, 5)
     added = [check.name for check in made.expected[0, 0]][len(ALWAYS_ON) :]
     assert added == ["inside_pitch", "frames_accepted_min"]
 
