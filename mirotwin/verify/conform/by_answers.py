@@ -130,15 +130,13 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     last = script.ask(gap_ms=36.0)
     fresh = script.fresh % 256
 
+    @script.expects(last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", by_answers=True)
     def counted(seen: Observed) -> Found:
         said = [one.said for one in seen.answers if one.frame.seq == last.seq and one.said is not None]
         found = f"{said[-1].accepted}" if said else "no answer"
         if found != f"{fresh}":
             yield seen.end_tick, found
 
-    script.expect(
-        last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", counted, by_answers=True
-    )
     sent = _whole(script.said)
     port.greet((script.n,), sent)
     cursor, begun = Cursor(port.log), len(port.late_ticks)

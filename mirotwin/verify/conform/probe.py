@@ -65,7 +65,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
         said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
         script.said += other.said
         script.wait_until(other.now)
-        script.expect(script.now, "", lambda observed: iter(()))
+        script.expects(script.now, "")(lambda observed: iter(()))
 
     rule = Rule("P24", "", ways, (topology,))
     (listener,) = listen(trial_of(rule), image, seed)

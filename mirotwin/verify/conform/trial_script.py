@@ -31,7 +31,6 @@ from miro_protocol.table import (
 )
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_NAME
-from miro_sim.periods import Axis
 from mirotwin.verify.checks.orders import Order, saturated
 from mirotwin.verify.conform.hints import (
     characters,
@@ -258,14 +257,21 @@ class TrialScript:
 
     # ---- expecting -----------------------------------------------------------------------------------------
 
-    def expect(
-        self, tick: int, wanted: str, test: Test, slots: tuple[int, ...] = (), by_answers: bool = False
-    ) -> None:
-        self.expected.append(Expectation(tick, wanted, test, slots or self.topology.slots, by_answers))
+    def expects(
+        self, tick: int, wanted: str, slots: tuple[int, ...] = (), by_answers: bool = False
+    ) -> Callable[[Test], Test]:
+        """Stands before the test of an expectation."""
+
+        def keep(test: Test) -> Test:
+            self.expected.append(Expectation(tick, wanted, test, slots or self.topology.slots, by_answers))
+            return test
+
+        return keep
 
     def obeyed(self, frame: Frame) -> Frame:
         """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
 
+        @self.expects(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms")
         def test(observed: Observed) -> Found:
             told = observed.both_told(frame.acted_tick)
             wanted = frame.for_robot(observed.slot)
@@ -274,7 +280,6 @@ class TrialScript:
                 found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
                 yield frame.acted_tick, found + _instead(observed, frame, told)
 
-        self.expect(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test)
         return frame
 
     def ignored(self, frame: Frame) -> None:
@@ -284,17 +289,17 @@ class TrialScript:
     def unchanged(self, after_tick: int, until_tick: int, wanted: str) -> None:
         """In between no wheel is told anything but what it was told last."""
 
+        @self.expects(until_tick, wanted)
         def test(observed: Observed) -> Found:
             for order in observed.ordered(after_tick, until_tick):
                 before = observed.told(order.side, after_tick)
                 if (order.what, order.velocity) != (before.what, before.velocity):
                     yield order.tick, f"the {order.side} wheel told {in_words(order)}"
 
-        self.expect(until_tick, wanted, test)
-
     def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
         """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
 
+        @self.expects(frame.acted_tick, f"{frame.what} not acted on", slots)
         def test(observed: Observed) -> Found:
             for event in observed.wrote(frame.tick, frame.acted_tick):
                 found = str(event).partition(" command ")[2]
@@ -302,24 +307,11 @@ class TrialScript:
                     found += f": the failsafe counts on from {since.what}"
                 yield event.tick, found
 
-        self.expect(frame.acted_tick, f"{frame.what} not acted on", test, slots)
-
-    def chips_keep(
-        self, after_tick: int, until_tick: int, wanted: str, wrong: Callable[[str, Axis], str]
-    ) -> None:
-        """`wrong` says nothing of a chip, by its side and state at the start of each control period in between."""
-
-        def test(observed: Observed) -> Found:
-            for tick, side, chip in observed.chips(after_tick, until_tick):
-                if found := wrong(side, chip):
-                    yield tick, found
-
-        self.expect(until_tick, wanted, test)
-
     def answered(self, question: Frame, wanted: str = "", says: Says | None = None) -> None:
         """The robot that it asks answers in time, and with this number."""
         slot, deadline = question.seq % self.n, over_by(question)
 
+        @self.expects(deadline, wanted or f"an answer to {question.what}", (slot,), by_answers=True)
         def test(observed: Observed) -> Found:
             answers = within(observed.answers, question.last_tick, deadline)
             said = answers[0].said if answers else None
@@ -330,17 +322,14 @@ class TrialScript:
             elif says is not None and (what := says(said, answers[0], observed)):
                 yield answers[0].tick, what
 
-        self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,), by_answers=True)
-
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
         """The PC hears nothing in between."""
 
+        @self.expects(until_tick, f"silence: {why}", by_answers=True)
         def test(observed: Observed) -> Found:
             if heard := in_a_row(within(observed.heard, after_tick, until_tick)):
                 answers = within(observed.answers, heard[0].tick, heard[-1].tick)
                 yield heard[0].tick, ": ".join([characters(heard), *map(who, answers[:1])])
-
-        self.expect(until_tick, f"silence: {why}", test, by_answers=True)
 
 
 def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str:

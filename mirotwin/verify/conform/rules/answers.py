@@ -54,25 +54,23 @@ def form(script: TrialScript) -> None:
         _formed(script, script.team(ask=True, gap_ms=36.0))
     end = script.now
 
+    @script.expects(end, f"an answer to some of {3 * script.n} questions in a row")
     def any_heard(observed: Observed) -> Found:
         if not observed.heard:
             yield end, "none"
-
-    script.expect(end, f"an answer to some of {3 * script.n} questions in a row", any_heard)
 
 
 def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> None:
     """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
     until = question.end_tick + ms(56.0)
+    wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
 
+    @script.expects(until, wanted)
     def test(observed: Observed) -> Found:
         heard: Sequence[Event] = within(observed.heard, question.last_tick, until)
         heard = heard[: TELEMETRY.wire_size] if then_more else in_a_row(heard)
         if heard and (what := _badly_formed(heard, question, observed)):
             yield heard[-1].tick, f"{characters(heard)}: {what}"
-
-    wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
-    script.expect(until, wanted, test)
 
 
 def _badly_formed(heard: Sequence[Event], question: Frame, observed: Observed) -> str:
@@ -181,12 +179,11 @@ def status(script: TrialScript) -> None:
     _says(script, "the chips' status", _status, gap_ms=70.0)
     end = script.now
 
+    @script.expects(end, "an excessive error in the left LM629 alone")
     def differ(observed: Observed) -> Found:
         last = observed.periods[-1][1]
         if last.left.status == last.right.status:
             yield end, f"{last.left.status:02X}h in both"
-
-    script.expect(end, "an excessive error in the left LM629 alone", differ)
 
 
 def _run_away(script: TrialScript) -> None:

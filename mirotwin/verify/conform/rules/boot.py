@@ -6,7 +6,6 @@ from miro_exact.clock import NEVER_TICK
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import MOTOR_OFF
-from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
@@ -36,31 +35,32 @@ def reset_together(script: TrialScript) -> None:
     first = script.obeyed(script.team())
     end, up = script.now, ms(BOOTED_MS)
 
-    def shown(side: str, chip: Axis) -> str:
-        return f"{chip.status:02X}h of the {side} one" if chip.status not in (0x80, 0xC0) else ""
+    @script.expects(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on")
+    def shown(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(up, first.tick):
+            if chip.status not in (0x80, 0xC0):
+                yield tick, f"{chip.status:02X}h of the {side} one"
 
+    @script.expects(first.tick, "RSTI 0000h")
+    def other_mask(observed: Observed) -> Found:
+        for one in observed.commands:
+            if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
+                yield one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
+
+    @script.expects(end, "RESET sent to both LM629 or none")
     def alone(observed: Observed) -> Found:
         resets = [(one.tick, one.side) for one in observed.commands if one.opcode == _RESET]
         for tick, side in resets:
             if len([at for at, _ in resets if at == tick]) != len(SIDES):
                 yield tick, f"RESET to the {side} one"
 
-    def other_mask(observed: Observed) -> Found:
-        for one in observed.commands:
-            if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
-                yield one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
-
+    @script.expects(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on")
     def apart(observed: Observed) -> Found:
         for tick, left, right in observed.samples:
             if tick > up and NEVER_TICK in (left, right):
                 yield tick, "one in reset"
             if tick > up and (left - right) % SAMPLE_TICKS:
                 yield tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
-
-    script.chips_keep(up, first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
-    script.expect(first.tick, "RSTI 0000h", other_mask)
-    script.expect(end, "RESET sent to both LM629 or none", alone)
-    script.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
 
 
 @CHAPTER.rule("P03", POWER_ON, presupposes="P24", broken="it is not ready 40 ms after power-on")
@@ -73,18 +73,19 @@ def ready(script: TrialScript) -> None:
 def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
     """Expects both motors off in between; the chips have `BOOTED_MS` for their reset."""
 
+    @script.expects(until_tick, "both motors off")
     def ordered(observed: Observed) -> Found:
         for order in observed.ordered(after_tick, until_tick):
             if order.what != "off":
                 yield order.tick, f"the {order.side} one told {in_words(order)}"
 
-    def driven(side: str, chip: Axis) -> str:
-        if chip.pwm_magnitude:
-            return f"the {side} one driven"
-        return "" if chip.status & MOTOR_OFF else f"status {chip.status:02X}h of the {side} LM629"
-
-    script.expect(until_tick, "both motors off", ordered)
-    script.chips_keep(after_tick + ms(BOOTED_MS), until_tick, "both motors off", driven)
+    @script.expects(until_tick, "both motors off")
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(after_tick + ms(BOOTED_MS), until_tick):
+            if chip.pwm_magnitude:
+                yield tick, f"the {side} one driven"
+            elif not chip.status & MOTOR_OFF:
+                yield tick, f"status {chip.status:02X}h of the {side} LM629"
 
 
 @STRAPS.rule(

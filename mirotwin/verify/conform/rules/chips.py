@@ -5,12 +5,11 @@ from __future__ import annotations
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
-from miro_sim.periods import Axis
 from mirotwin.verify.conform.observed import Answer, Observed
 from mirotwin.verify.conform.rule import FRAME, PORT, POWER_ON, Chapter
 from mirotwin.verify.conform.rules.answers import flagged
 from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.trial_script import TrialScript
+from mirotwin.verify.conform.trial_script import Found, TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01
@@ -53,11 +52,13 @@ def _tells_of_them(script: TrialScript) -> None:
     for _ in range(2):
         script.wait(520.0)
         script.answered(script.ask(gap_ms=36.0), f"flags {int(both):02X}h", flagged(both, both))
+    end = script.now
 
-    def driven(side: str, chip: Axis) -> str:
-        return f"the {side} one driven" if chip.pwm_magnitude else ""
-
-    script.chips_keep(0, script.now, "both motors off", driven)
+    @script.expects(end, "both motors off")
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(0, end):
+            if chip.pwm_magnitude:
+                yield tick, f"the {side} one driven"
 
 
 def _free(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:

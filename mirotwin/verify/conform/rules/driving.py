@@ -98,6 +98,7 @@ def one_sample(script: TrialScript) -> None:
 
 
 def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) -> None:
+    @script.expects(until_tick, f"{what}: STT of both wheels in one sample")
     def test(observed: Observed) -> Found:
         left, right = observed.both_told(until_tick)
         if min(left.tick, right.tick) <= after_tick:
@@ -105,8 +106,6 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) 
         grid = observed.samples[-1][1]
         if (left.tick - grid) // SAMPLE_TICKS != (right.tick - grid) // SAMPLE_TICKS:
             yield max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
-
-    script.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
 
 
 @CHAPTER.rule("P28", TURNS, presupposes="P19", broken="velocities are not kept between frames")
@@ -134,13 +133,12 @@ def _why_not_reached(observed: Observed, tick: int) -> str:
 def _reached(script: TrialScript, frame: Frame) -> None:
     """Both chips run at the frame's velocities 20 ms after it."""
     after_tick, until_tick = frame.end_tick + ms(20.0), script.now
+    assert until_tick - after_tick > CONTROL_PERIOD_TICKS
 
+    @script.expects(until_tick, f"both LM629 at the velocities of {frame.what}")
     def test(observed: Observed) -> Found:
         wanted = frame.for_robot(observed.slot)
         for tick, record in observed.periods:
             found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
             if after_tick <= tick <= until_tick and found != wanted:
                 yield tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(observed, tick)}"
-
-    assert until_tick - after_tick > CONTROL_PERIOD_TICKS
-    script.expect(until_tick, f"both LM629 at the velocities of {frame.what}", test)

@@ -13,7 +13,6 @@ from miro_protocol.table import (
 )
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
-from miro_sim.periods import Axis
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.observed import Observed
@@ -95,6 +94,7 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
     """From one control period to the next the velocities fall by what the acceleration makes in 97 or 98 samples."""
     samples = CONTROL_PERIOD_TICKS // SAMPLE_TICKS
 
+    @script.expects(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2")
     def test(observed: Observed) -> Found:
         before: dict[str, int] = {}
         steps = 0
@@ -111,18 +111,15 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
         if any(before.values()):
             yield until_tick, "a wheel that still turns"
 
-    script.expect(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2", test)
-
 
 def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
     """No abrupt stop, and the motors stay on."""
 
+    @script.expects(until_tick, "a smooth stop")
     def test(observed: Observed) -> Found:
         for order in observed.ordered(last.acted_tick, until_tick):
             if order.abrupt or order.what == "off":
                 yield order.tick, f"the {order.side} wheel told {in_words(order)}"
-
-    script.expect(until_tick, "a smooth stop", test)
 
 
 @CHAPTER.rule(
@@ -136,11 +133,13 @@ def off(script: TrialScript) -> None:
     last = script.ping()
     off_behind(script, last)
     script.wait_until(last.end_tick + ms(700.0))
+    end = script.now
 
-    def driven(side: str, chip: Axis) -> str:
-        return f"the {side} one on" if chip.pwm_magnitude or not chip.status & MOTOR_OFF else ""
-
-    script.chips_keep(last.end_tick + ms(501.0), script.now, "both motors off", driven)
+    @script.expects(end, "both motors off")
+    def driven(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(last.end_tick + ms(501.0), end):
+            if chip.pwm_magnitude or not chip.status & MOTOR_OFF:
+                yield tick, f"the {side} one on"
 
 
 @CHAPTER.rule("P33", WHEELS, presupposes="P28")
@@ -157,6 +156,7 @@ def _turning(script: TrialScript, frame: Frame) -> None:
     """Both wheels turn as told, as seen from the encoders, when they had time for it."""
     until = frame.end_tick + ms(60.0)
 
+    @script.expects(until, f"wheels that turn as by {frame.what}")
     def test(observed: Observed) -> Found:
         *_, one, other = (record for tick, record in observed.periods if tick <= until)
         left = other.left.real_position - one.left.real_position
@@ -167,8 +167,6 @@ def _turning(script: TrialScript, frame: Frame) -> None:
                 found = f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}"
                 loaded = observed.set_to(side, until)
                 yield until, found + ("" if loaded else ": no filter was loaded into its LM629 (LFIL, UDF)")
-
-    script.expect(until, f"wheels that turn as by {frame.what}", test)
 
 
 def stops_behind(script: TrialScript, last: Frame) -> None:
@@ -190,6 +188,16 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
         order = observed.told(side, tick)
         return order.what == "off" if what == "off" else not order.moves
 
+    def when(observed: Observed, side: str) -> str:
+        after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]
+        tick = next((one for one in after if done(observed, side, one)), None)
+        if tick is None:
+            return f"{side} not within {in_ms(observed.end_tick - last.end_tick)}"
+        return f"{side} at {in_ms(tick - last.end_tick)}"
+
+    window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"
+
+    @script.expects(latest, f"{wanted} {window} after the end of {last.what}")
     def test(observed: Observed) -> Found:
         for side in SIDES:
             order = observed.told(side, earliest)
@@ -199,16 +207,6 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
                 yield order.tick, f"the {side} one {in_ms(order.tick - last.end_tick)} after its end"
         if not all(done(observed, side, latest) for side in SIDES):
             yield latest, ", ".join(when(observed, side) for side in SIDES)
-
-    def when(observed: Observed, side: str) -> str:
-        after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]
-        tick = next((one for one in after if done(observed, side, one)), None)
-        if tick is None:
-            return f"{side} not within {in_ms(observed.end_tick - last.end_tick)}"
-        return f"{side} at {in_ms(tick - last.end_tick)}"
-
-    window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"
-    script.expect(latest, f"{wanted} {window} after the end of {last.what}", test)
 
 
 def in_ms(ticks: int) -> str:

@@ -46,13 +46,12 @@ def _filter_taken(
     wanted: str = "kp, ki, kd, il = ",
     slots: tuple[int, ...] = (),
 ) -> None:
+    @script.expects(frame.acted_tick, f"{wanted}{_listed(words)} in force after {frame.what}", slots)
     def test(observed: Observed) -> Found:
         for side in SIDES:
             found = observed.set_to(side, frame.acted_tick)
             if found != words:
                 yield frame.acted_tick, f"{_listed(found)} in the {side} one"
-
-    script.expect(frame.acted_tick, f"{wanted}{_listed(words)} in force after {frame.what}", test, slots)
 
 
 def _listed(words: Words | None) -> str:
@@ -105,12 +104,11 @@ def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
     """The frame is obeyed, and this acceleration is in force."""
     script.obeyed(frame)
 
+    @script.expects(frame.acted_tick, f"acceleration {number(value, 8)} in force with {frame.what}")
     def test(observed: Observed) -> Found:
         for order in observed.both_told(frame.acted_tick):
             if order.acceleration != value:
                 yield frame.acted_tick, f"{number(order.acceleration, 8)} in the {order.side} one"
-
-    script.expect(frame.acted_tick, f"acceleration {number(value, 8)} in force with {frame.what}", test)
 
 
 @CHAPTER.rule("P38", FRAME, presupposes="P35 P36", topologies=(Topology(3, (0, 1, 2)), Topology(5, (0, 4))))

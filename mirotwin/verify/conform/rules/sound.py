@@ -9,10 +9,10 @@ from miro_protocol.actions import Power, Reset
 from miro_protocol.table import SYNC
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
-from miro_sim.periods import Axis
+from mirotwin.verify.conform.observed import Observed
 from mirotwin.verify.conform.rule import FAULTS, FRESHNESS, POWER_ON, THREE, TURNS, Chapter
 from mirotwin.verify.conform.rules.boot import keeps_off
-from mirotwin.verify.conform.trial_script import BOOTED_MS, TrialScript, ms
+from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Soundness")
 LONG = Chapter("Long trials")
@@ -26,11 +26,13 @@ _WRAPS_MS = (2560.0, (1 << 23) / 1000, 8542.5, (1 << 24) / 1000, 32768.0, (1 << 
 
 def nothing_refused(script: TrialScript) -> None:
     """Expects that no LM629 refused a command up to now."""
+    end = script.now
 
-    def refused(side: str, chip: Axis) -> str:
-        return f"command error of the {side} one" if chip.status & COMMAND_ERROR else ""
-
-    script.chips_keep(0, script.now, "no command that an LM629 refuses", refused)
+    @script.expects(end, "no command that an LM629 refuses")
+    def refused(observed: Observed) -> Found:
+        for tick, side, chip in observed.chips(0, end):
+            if chip.status & COMMAND_ERROR:
+                yield tick, f"command error of the {side} one"
 
 
 @CHAPTER.rule(
