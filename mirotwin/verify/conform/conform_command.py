@@ -17,17 +17,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.options import (
-    ALL,
-    ARTIFACTS,
-    JSON,
-    JUNIT,
-    NAME,
-    QUIET,
-    SEED,
-    Engine,
-    StackFrom,
-)
+from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, QUIET, SEED, Engine, StackFrom
 from mirotwin.shell.outputs import check_file, told_when_full, whole_file
 from mirotwin.shell.program import (
     DONE,
@@ -38,13 +28,7 @@ from mirotwin.shell.program import (
     show_line,
 )
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.cases.artifacts import (
-    FIRMWARE,
-    IMAGE_FILES,
-    case_lines,
-    leave_image,
-    report_line,
-)
+from mirotwin.verify.cases.artifacts import FIRMWARE, IMAGE_FILES, case_lines, leave_image, report_line
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
