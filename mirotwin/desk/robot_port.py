@@ -387,14 +387,11 @@ class RobotPort:
 def _check_address(url: str) -> None:
     """Refuses a network address without a port: what pyserial says of it is a fault of its own."""
     scheme = url.partition("://")[0].lower()
-    if scheme not in ("socket", "rfc2217"):
-        return
     with suppress(ValueError):  # letters, or beyond 65535
-        if urlsplit(url).port is not None:
+        if scheme not in ("socket", "rfc2217") or urlsplit(url).port is not None:
             return
-    raise PortError(
-        url, "", "names no port", f"write {scheme}://HOST:PORT, such as {scheme}://127.0.0.1:7000"
-    )
+    remedy = f"write {scheme}://HOST:PORT, such as {scheme}://127.0.0.1:7000"
+    raise PortError(url, "", "names no port", remedy)
 
 
 def _opened(url: str) -> Any:

@@ -74,11 +74,7 @@ def decode(options: DecodeOptions) -> int:
         layouts = look(source, None if robots is None else int(robots), complain, direction is None)
         with ProgressBar("decoding", given.size, options.quiet or sys.stdout.isatty()) as bar:
             found = rows(_counted(source.sent, given, bar), layouts.of)
-            return (
-                _print_json(given, source, found)
-                if options.as_json
-                else _print_table(given, source, layouts, found)
-            )
+            return _print(given, source, layouts, found, options.as_json)
 
 
 def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
@@ -93,34 +89,26 @@ def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> It
             bar.to(shown)
 
 
-def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[DecodedRow]) -> int:
-    out = sys.stdout
-    totals = render.Totals()
-    out.write(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
-    out.write(f"{render.head_line(source.timed)}\n")
+def _print(given: Input, source: Source, layouts: Layouts, found: Iterable[DecodedRow], as_json: bool) -> int:
+    def put(line: object) -> None:
+        sys.stdout.write(f"{line}\n")
+
+    if as_json:
+        head = {"file": given.label, "format": source.format, "timed": source.timed}
+        put(render.json_event("input", **head, units=render.UNITS))
+    else:
+        put(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}")
+        put(render.units_line())
+        put(render.head_line(source.timed))
+    totals, line_of = render.Totals(), render.json_line if as_json else render.table_line
     try:
         for row in found:
             totals.add(row)
-            out.write(f"{render.table_line(row, source.timed)}\n")
-    finally:
-        out.write(f"{totals}\n")
-    return DONE
-
-
-def _print_json(given: Input, source: Source, found: Iterable[DecodedRow]) -> int:
-    def put(line: bytes) -> None:
-        sys.stdout.write(line.decode() + "\n")
-
-    totals = render.Totals()
-    head = {"file": given.label, "format": source.format, "timed": source.timed}
-    put(render.json_event("input", **head, units=render.UNITS))
-    try:
-        for row in found:
-            totals.add(row)
-            put(render.json_line(row, source.timed))
+            put(line_of(row, source.timed))
     except READ_ERRORS as error:
-        put(render.json_event("error", text=str(error)))
+        if as_json:
+            put(render.json_event("error", text=str(error)))
         raise
     finally:
-        put(render.json_event("end", **totals.as_dict()))
+        put(render.json_event("end", **totals.as_dict()) if as_json else totals)
     return DONE

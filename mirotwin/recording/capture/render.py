@@ -98,7 +98,7 @@ def _shown(value: Any) -> str:
     return ("+".join(value) or "none") if isinstance(value, list) else str(value)
 
 
-def json_line(row: DecodedRow, timed: bool) -> bytes:
+def json_line(row: DecodedRow, timed: bool) -> str:
     """One row as a JSON object."""
     event = row.event
     position = {
@@ -109,15 +109,11 @@ def json_line(row: DecodedRow, timed: bool) -> bytes:
         "network": row.network,
     }
     if isinstance(event, Damaged):
-        found = {"event": "damage", **position, "reason": reason(event), "data": event.data.hex()}
-        return msgspec.json.encode(found)
-    frame: dict[str, Any] = {"event": "frame", **position, "type": kind(event, row.message), "seq": event.seq}
-    frame["fresh"] = row.fresh
-    frame["fields"] = None if row.message is None else _fields(row.message)
-    if row.unknown:
-        frame["unknown"] = row.unknown
-    frame["data"] = event.data.hex()
-    return msgspec.json.encode(frame)
+        return json_event("damage", **position, reason=reason(event), data=event.data.hex())
+    fields = None if row.message is None else _fields(row.message)
+    frame = {"type": kind(event, row.message), "seq": event.seq, "fresh": row.fresh, "fields": fields}
+    unknown = {"unknown": row.unknown} if row.unknown else {}
+    return json_event("frame", **position, **frame, **unknown, data=event.data.hex())
 
 
 def _fields(message: Message) -> dict[str, Any]:
@@ -132,12 +128,12 @@ def _fields(message: Message) -> dict[str, Any]:
     return {"slot": message.slot, "flags": flags, **{name: getattr(message, name) for name in _NUMBERS}}
 
 
-def json_event(event: str, **values: Any) -> bytes:
-    """Another event. What is no UTF-8 in a text (a file's name need not be) is written out."""
+def json_event(event: str, **values: Any) -> str:
+    """An event. What is no UTF-8 in a text (a file's name need not be) is written out."""
     for name, value in values.items():
         if isinstance(value, str):
             values[name] = value.encode("utf-8", "backslashreplace").decode()
-    return msgspec.json.encode({"event": event, **values})
+    return msgspec.json.encode({"event": event, **values}).decode()
 
 
 class Totals:

@@ -14,7 +14,6 @@ from mirotwin.recording.capture.source import READ_ERRORS
 
 if TYPE_CHECKING:
     from miro_protocol.decoder import WindowDecoder
-    from miro_protocol.robot_receiver import Reception
 
 
 class DecodedRow(msgspec.Struct, frozen=True):
@@ -49,15 +48,12 @@ class _Decoding:
         self.offset = 0
         self.end_tick = 0
 
-    def hear(self, sent: Transmission) -> Iterator[DecodedRow]:
-        self.end_tick = sent.end_tick
-        return self.rows(self.robot.hear(sent) if self.robot else _answers(self.decoder.hear(sent)))
-
-    def flush(self) -> Iterator[DecodedRow]:
-        return self.rows(self.robot.flush() if self.robot else _answers(self.decoder.flush()))
-
-    def rows(self, found: Iterable[Reception]) -> Iterator[DecodedRow]:
-        for event, fresh in found:
+    def hear(self, sent: Transmission | None) -> Iterator[DecodedRow]:
+        """What these characters complete; None: what is pending cannot become a frame any more."""
+        self.end_tick = self.end_tick if sent is None else sent.end_tick
+        source = self.robot or self.decoder
+        for found in source.flush() if sent is None else source.hear(sent):
+            event, fresh = found if isinstance(found, tuple) else (found, None)
             yield self.row(event, fresh)
             self.offset += len(event.data)
 
@@ -70,11 +66,6 @@ class _Decoding:
         except ContentError as error:
             unknown = str(error)
         return DecodedRow(self.offset, self.direction, self.network, event, message, fresh, unknown)
-
-
-def _answers(events: Iterable[Event]) -> Iterator[Reception]:
-    """Freshness is of what robots receive."""
-    return ((event, None) for event in events)
 
 
 def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[DecodedRow]:
@@ -91,11 +82,11 @@ def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator
                 decodings[key] = _Decoding(one.direction, one.network, layout(one.network))
             for other in decodings.values():
                 if other.decoder.pending and one.tick >= other.end_tick + 2 * other.step:
-                    yield from other.flush()
+                    yield from other.hear(None)
             yield from decodings[key].hear(one)
     except READ_ERRORS as error:  # what is pending comes first
         failure = error
     for decoding in decodings.values():
-        yield from decoding.flush()
+        yield from decoding.hear(None)
     if failure is not None:
         raise failure
