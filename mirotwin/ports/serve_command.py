@@ -112,7 +112,9 @@ def serve(options: ServeOptions) -> int:
         show_line("serving")
         end_tick = ticks(LONGEST_S) if options.duration is None else options.duration.ticks()
         session = Session(world, Pace(options.pace), selector, ports, tell, end_tick, options.once)
-        run_files = RunFiles(folder, source, world, hold, checks, text.settings, session=session)
+        run_files = RunFiles(
+            folder, source, world, hold, checks, text.settings, move=session.run, live=session.live
+        )
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
             if checks.failures:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,8 +92,9 @@ def run(options: RunOptions) -> int:
         if saved is not None:
             saved.fill(views, hold)
         recorded = views if options.record_frames else []
+        move = player.run if player else partial(stops.move, world, folder) if stops else None
         run_files = RunFiles(
-            folder, source, world, hold, checks, text.settings, recorded, player, stops=stops
+            folder, source, world, hold, checks, text.settings, recorded, player, move, stops=stops
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, options.quiet)
         summary = run_files.fill(bar, None if options.no_figure else text.scenario.title)

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import msgspec
 from msgspec.structs import replace
@@ -123,19 +123,12 @@ def _outside(option: str, first_tick: int, end_tick: int) -> BadInput:
     )
 
 
-class LiveSession(Protocol):
-    """Moves a world by a wall clock and by what clients send."""
-
-    def run(self) -> None: ...
-    def live(self) -> LiveFigures: ...
-
-
 @dataclass
 class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
-    The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
-    it runs as fast as it can. `stops`: where it saves the world, and ends.
+    The recording gets each frame of `views`. `move` drives the world, None: it is stepped; `live` tells how it went.
+    `player`: that of a world with steps. `stops`: where the world is saved, and ends.
     """
 
     folder: OutputFolder
@@ -146,7 +139,8 @@ class RunFiles:
     settings: tuple[str, ...] = ()
     views: Sequence[View] = ()
     player: Player | None = None
-    session: LiveSession | None = None
+    move: Callable[[], object] | None = None
+    live: Callable[[], LiveFigures] | None = None
     stops: Stops | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
     _wall_s: float = field(default=0.0, init=False)
@@ -198,16 +192,7 @@ class RunFiles:
         for view in self.views:
             view.shows.append(keep_frame)
         with bar, self.hold.released():
-            runner.run(self.world, recorder, self.source.record == "full", keep, self._own_way())
-
-    def _own_way(self) -> Callable[[], None] | None:
-        """How the world moves where it is not just stepped."""
-        if self.player is not None:
-            return self.player.run
-        if self.session is not None:
-            return self.session.run
-        stops = self.stops
-        return partial(stops.move, self.world, self.folder) if stops else None
+            runner.run(self.world, recorder, self.source.record == "full", keep, self.move)
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick
@@ -220,7 +205,7 @@ class RunFiles:
             wheels=learnt_wheels(self.world.networks),
             expectations=self.checks.verdicts(),
             steps=None if self.player is None else self._steps(self.player),
-            live=None if self.session is None else self.session.live(),
+            live=None if self.live is None else self.live(),
         )
 
     def _steps(self, player: Player) -> StepResults:

@@ -30,21 +30,18 @@ def transmissions(
     """
     messages = Messages(source, source.label, (channels.WireMessage, channels.PeriodMessage))
     order = _Order()
-    broken_off = ""
+    failure: RecordingError | None = None
     try:
         yield from _ordered(messages, order, robots)
     except RecordingError as error:
-        _take_layouts(messages, robots)
-        yield from order.rest()
-        if not isinstance(error, BrokenOff) or messages.metadata is None:
-            raise
-        broken_off = str(error)
-    else:
-        _take_layouts(messages, robots)
-        yield from order.rest()
-        messages.check_ours()
-    if broken_off or messages.broken_off:
-        tell(broken_off or messages.broken_off)
+        failure = error
+    _take_layouts(messages, robots)
+    yield from order.rest()
+    if failure is not None and (not isinstance(failure, BrokenOff) or messages.metadata is None):
+        raise failure
+    messages.check_ours()
+    if broken_off := messages.broken_off if failure is None else str(failure):
+        tell(broken_off)
 
 
 def transmissions_of(periods: Iterable[Period]) -> list[Transmission]:
