@@ -91,7 +91,12 @@ class BareMachine:
         self.image = image
         self.output = output
         self.stop_on_fault = stop_on_fault
-        self.loops = _loops(image)
+        self.loops = [  # jumps to themselves, among them some in the middle of instructions
+            address
+            for first, end in image.used
+            for address in range(first, end)
+            if jumps_to_itself(image.code.__getitem__, address)
+        ]
         self.faults: list[FirmwareFault] = []  # the first hundred
         self.faults_lost = 0  # how many more there were
         self.next_feed = 0  # cycle at which to look after the inputs
@@ -238,13 +243,3 @@ class BareMachine:
         names = self.image.symbols
         for index, fault in enumerate(self.faults):
             self.faults[index] = FirmwareFault(fault.kind, fault.tick, fault.pc, names.name_at(fault.pc))
-
-
-def _loops(image: Image) -> tuple[int, ...]:
-    """Loaded addresses at which a jump to itself stands, among them some in the middle of instructions."""
-    return tuple(
-        address
-        for first, end in image.used
-        for address in range(first, end)
-        if jumps_to_itself(image.code.__getitem__, address)
-    )

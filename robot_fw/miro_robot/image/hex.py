@@ -78,7 +78,10 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
 
 def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
     """The same from the file's content; `path` is for messages and symbols."""
-    known = _parsed(content, path, limit)
+    try:
+        known = _parsed(content, limit)
+    except ImageError as error:
+        raise ImageError(path, error.place, error.what, error.remedy) from None
     return Image(
         path=path,
         code=known.code,
@@ -98,24 +101,24 @@ class _Content(msgspec.Struct, frozen=True):
     sha256: str
 
 
-@lru_cache(32)  # a test loads the robot's image hundreds of times
-def _parsed(content: bytes, path: Path, limit: int) -> _Content:
+@lru_cache(32)  # by content: a test loads the robot's image hundreds of times
+def _parsed(content: bytes, limit: int) -> _Content:
     if not content.strip():
-        raise ImageError(path, 0, "is empty", _REBUILD)
+        raise ImageError("", 0, "is empty", _REBUILD)
     code = bytearray(b"\xff" * SPACE_BYTES)
     loaded = bytearray(SPACE_BYTES)
-    for line, address, data in _data_records(content, path):
+    for line, address, data in _data_records(content):
         end = address + len(data)
         if end > limit:
             first = max(address, limit)
-            raise ImageError(path, line, f"byte at {first:#06x} does not fit {limit} bytes", _too_big(limit))
+            raise ImageError("", line, f"byte at {first:#06x} does not fit {limit} bytes", _too_big(limit))
         if any(loaded[address:end]):
             first = address + loaded[address:end].index(1)
-            raise ImageError(path, line, f"{first:#06x} is loaded a second time", "link without overlaps")
+            raise ImageError("", line, f"{first:#06x} is loaded a second time", "link without overlaps")
         code[address:end] = data
         loaded[address:end] = b"\x01" * len(data)
     if not any(loaded):
-        raise ImageError(path, 0, "holds no bytes", _REBUILD)
+        raise ImageError("", 0, "holds no bytes", _REBUILD)
     return _Content(bytes(code), bytes(loaded), _ranges(loaded), hashlib.sha256(content).hexdigest())
 
 
@@ -147,7 +150,7 @@ def _ranges(loaded: bytearray) -> tuple[tuple[int, int], ...]:
     return tuple((match.start(), match.end()) for match in re.finditer(b"\x01+", bytes(loaded)))
 
 
-def _data_records(content: bytes, path: Path) -> Iterator[tuple[int, int, bytes]]:
+def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
     """(line number, address, bytes) of each data record; checks everything that is not about the address."""
     base = 0
     ended = False
@@ -156,37 +159,37 @@ def _data_records(content: bytes, path: Path) -> Iterator[tuple[int, int, bytes]
         if not text:
             continue
         if ended:
-            raise ImageError(path, number, "has more records after its end record", _REBUILD)
-        address, kind, data = _record(text, path, number)
+            raise ImageError("", number, "has more records after its end record", _REBUILD)
+        address, kind, data = _record(text, number)
         if kind == _DATA:
             yield number, base + address, data
         elif kind == _END:
             ended = True
         elif kind in (_SEGMENT, _LINEAR):
             if len(data) != 2:
-                raise ImageError(path, number, "extended address record needs 2 bytes", _REBUILD)
+                raise ImageError("", number, "extended address record needs 2 bytes", _REBUILD)
             base = int.from_bytes(data, "big") << (4 if kind == _SEGMENT else 16)
         elif kind not in (_START_SEGMENT, _START_LINEAR):  # start addresses mean nothing to an 8051
-            raise ImageError(path, number, f"unknown record type {kind:02X}", _REBUILD)
+            raise ImageError("", number, f"unknown record type {kind:02X}", _REBUILD)
     if not ended:
-        raise ImageError(path, 0, "is truncated: it has no end record (:00000001FF)", _REBUILD)
+        raise ImageError("", 0, "is truncated: it has no end record (:00000001FF)", _REBUILD)
 
 
-def _record(text: bytes, path: Path, number: int) -> tuple[int, int, bytes]:
+def _record(text: bytes, number: int) -> tuple[int, int, bytes]:
     """One line, taken apart and checked: address, type, data."""
     if text[:1] != b":":
         raise ImageError(
-            path, number, "is not Intel HEX: a record begins with ':'", "give an .ihx or .hex file"
+            "", number, "is not Intel HEX: a record begins with ':'", "give an .ihx or .hex file"
         )
     try:
         record = bytes.fromhex(text[1:].decode("ascii"))
     except ValueError:
-        raise ImageError(path, number, "bad record: not pairs of hex digits", _REBUILD) from None
+        raise ImageError("", number, "bad record: not pairs of hex digits", _REBUILD) from None
     if len(record) < 5 or len(record) != record[0] + 5:
         declared = record[0] if record else 0
         reason = f"bad record: {max(len(record) - 5, 0)} data bytes where {declared} are declared"
-        raise ImageError(path, number, reason, _REBUILD)
+        raise ImageError("", number, reason, _REBUILD)
     if sum(record) & 0xFF:
         expected = -sum(record[:-1]) & 0xFF
-        raise ImageError(path, number, f"bad checksum {record[-1]:02X}, expected {expected:02X}", _REBUILD)
+        raise ImageError("", number, f"bad checksum {record[-1]:02X}, expected {expected:02X}", _REBUILD)
     return int.from_bytes(record[1:3], "big"), record[3], record[4:-1]

@@ -108,35 +108,30 @@ def _in_one_line(name: str) -> str:
 
 def decode(text: str, path: str) -> Tracefile:
     """A tracefile, also another program's. Raises BadInput with `path` and the line."""
-    reader = _LineReader()
-    for number, line in enumerate(text.splitlines(), start=1):
-        try:
-            reader.take(line.strip())
-        except _WrongLine as refused:
-            raise BadInput(path, number, refused.what, refused.remedy) from None
+    reader = _LineReader(path)
+    for line in text.splitlines():
+        reader.take(line.strip())
     found: Tracefile = {}
     for name, part in reader.parts:
         add(found, {name: part})
     return found
 
 
-class _WrongLine(Exception):
-    """A line that cannot be taken."""
-
-    def __init__(self, what: str, remedy: str = _NAME_ANOTHER) -> None:
-        self.what = what
-        self.remedy = remedy
-
-
 class _LineReader:
     """Takes line by line. `parts`: (source file, counts), several of one file when tracefiles are put together."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.number = 0  # of lines taken
         self.parts: list[tuple[str, FileRecord]] = []
         self._record: FileRecord | None = None
         self._leaders: dict[int, int] = {}  # first line by index: FNL, for the FNA that follow
 
+    def _wrong(self, what: str, remedy: str = _NAME_ANOTHER) -> BadInput:
+        return BadInput(self.path, self.number, what, remedy)
+
     def take(self, line: str) -> None:
+        self.number += 1
         kind, colon, value = line.partition(":")
         if kind == "SF" and value:
             self._record, self._leaders = FileRecord(), {}
@@ -148,18 +143,18 @@ class _LineReader:
         elif (kind in _DROPPED and colon) or not line or line.startswith("#"):
             pass
         elif colon and kind.isupper() and kind.isalpha() and len(kind) <= 8 and kind != "SF":
-            raise _WrongLine(f"{kind} records are not kept", _USE_LCOV)
+            raise self._wrong(f"{kind} records are not kept", _USE_LCOV)
         else:
-            raise _WrongLine("is no record of a tracefile")
+            raise self._wrong("is no record of a tracefile")
 
     def _count(self, kind: str, value: str) -> None:
         match = _RECORDS[kind].fullmatch(value)
         if match is None and kind == "BRDA" and _OTHER_BRANCH.fullmatch(value):
-            raise _WrongLine("branches that are marked or named are not kept", _USE_LCOV)
+            raise self._wrong("branches that are marked or named are not kept", _USE_LCOV)
         if match is None:
-            raise _WrongLine(f"cannot be read as {kind} record")
+            raise self._wrong(f"cannot be read as {kind} record")
         if self._record is None:
-            raise _WrongLine("belongs to no source file")
+            raise self._wrong("belongs to no source file")
         self._take(self._record, kind, match.groups())
 
     def _take(self, record: FileRecord, kind: str, values: tuple[str, ...]) -> None:
@@ -171,7 +166,7 @@ class _LineReader:
             self._leaders[int(values[0])] = int(values[1])
         elif kind == "FNA":
             if int(values[0]) not in self._leaders:
-                raise _WrongLine(f"names function {values[0]}, which no FNL record before it has")
+                raise self._wrong(f"names function {values[0]}, which no FNL record before it has")
             record.functions[values[2]] = (self._leaders[int(values[0])], int(values[1]))
         elif kind == "DA":
             record.lines[int(values[0])] = int(values[1])

@@ -29,6 +29,7 @@ _CALL_BYTES = 2
 _RAM_BYTES = 0x100
 _LONGEST = 3  # bytes of an instruction
 _TABLE_JUMPS = (0x02, _SJMP, *range(0x01, 0x100, 0x20))  # LJMP, SJMP and AJMP
+_FIRST_OF_VECTORS = (0x02, _RETI, *range(0x01, 0x100, 0x20))  # others run into it from the vector before
 
 
 class Depth(msgspec.Struct, frozen=True):
@@ -73,7 +74,8 @@ class StackReader:
 
     def all(self) -> StackDepth:
         """Of the whole image."""
-        interrupts = [self.depth(at) for at in VECTORS if self._loaded(at) and self._is_vector(at)]
+        begun = [at for at in VECTORS if self._loaded(at) and self.code[at] in _FIRST_OF_VECTORS]
+        interrupts = [self.depth(at) for at in begun]
         deepest = max(interrupts, key=lambda one: one.size, default=None)
         return StackDepth(self.depth(0), deepest)
 
@@ -173,10 +175,6 @@ class StackReader:
             size = LENGTH[opcode]
             return (address + size + (self.code[address + size - 1] ^ 0x80) - 0x80) & 0xFFFF
         return None if is_call(opcode) else target(self.code, address)
-
-    def _is_vector(self, address: int) -> bool:
-        """Whether code begins there by itself: not what runs into it from the vector before."""
-        return self.code[address] in (0x02, 0x01, 0x21, 0x41, 0x61, 0x81, 0xA1, 0xC1, 0xE1, _RETI)
 
     def _loaded(self, address: int) -> bool:
         return any(first <= address < end for first, end in self.used)

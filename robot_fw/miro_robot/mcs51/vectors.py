@@ -105,7 +105,7 @@ class VectorRunner:
         self.bus.latches.clear()
         self.cpu.step()
         after = self._registers()
-        iram = self._iram()
+        iram = [self.cpu.peek_iram(address) for address in range(256)]
         listed = {address for address, _ in initial.sfr}
         strays = [address for address in REGISTERS if before[address] != after[address]]
         known = {address for address, _ in initial.iram}
@@ -146,9 +146,6 @@ class VectorRunner:
 
     def _registers(self) -> dict[int, int]:
         return {address: self.cpu.sfr(address) for address in REGISTERS}
-
-    def _iram(self) -> list[int]:
-        return [self.cpu.peek_iram(address) for address in range(256)]
 
     def _cycles(self, initial: State) -> list[list[Access]]:
         """Fetches by rule, then external memory in the second cycle, then latches in the last."""
