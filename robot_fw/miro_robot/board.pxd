@@ -7,7 +7,6 @@ from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.plant cimport Plant
 from miro_robot.probe cimport Probe
 
-
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
 cdef int _CS, _BOTH_STROBES, _RST
 cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
@@ -53,16 +52,10 @@ cdef class Board(Bus):
     cdef int buffers
     cdef int buffer_address[8]
     cdef int buffer_mask[8]
-    cdef int hi_count
-    cdef int hi_port[8]
-    cdef int hi_bit[8]
-    cdef int hi_inverted[8]
-    cdef int hi_side[8]
+    cdef list hi_pins
 
     @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int)
     cdef _resolve_outputs(self, wiring)
-    @cython.locals(latest_tick=cython.longlong)
-    cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
     cpdef int run(self, long long until_tick) except -1
     cpdef int go_on(self, long long until_tick) except -1
@@ -87,6 +80,7 @@ cdef class Board(Bus):
     @cython.final
     cdef int _set_bridge(self, long long tick, int side, Lm629 chip) except -1
     @cython.final
+    @cython.locals(port=int, mask=int, inverted=int, side=int, high=bint)
     cdef int _drive_interrupts(self, long long tick) except -1
     @cython.final
     cdef inline int _pins(self) noexcept

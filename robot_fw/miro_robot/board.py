@@ -73,9 +73,9 @@ class Board(Bus):
     }
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
-        "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log",
-        "horizon", "strobed", "reset_pins",
+        "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_pins", "hi_seen", "forced",
+        "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log", "horizon", "strobed",
+        "reset_pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -151,22 +151,15 @@ class Board(Bus):
 
     def _resolve_inputs(self, wiring: Wiring, slot: int, robots: int) -> None:
         """Puts the straps on the CPU's pins and notes which pins follow an LM629's HI."""
-        self.hi_port = [0] * 8
-        self.hi_bit = [0] * 8
-        self.hi_inverted = [0] * 8
-        self.hi_side = [0] * 8
-        self.hi_count = 0
+        self.hi_pins: list[tuple[int, int, int, int]] = []  # port, mask, inverted, side
         straps = {f"slot.{bit}": slot >> bit & 1 for bit in range(3)}
         straps.update({"three": int(robots == 3), "0": 0, "1": 1})
         for port, bit, source, inverted in wiring.cpu_inputs():
             if source in straps:
                 if not straps[source] ^ inverted:
                     self.external[port] &= ~(1 << bit) & 0xFF
-                continue
-            index = self.hi_count
-            self.hi_port[index], self.hi_bit[index] = port, bit
-            self.hi_inverted[index], self.hi_side[index] = inverted, SIDES.index(source[:-3])
-            self.hi_count += 1
+            else:
+                self.hi_pins.append((port, 1 << bit, inverted, SIDES.index(source[:-3])))
         for port in range(PORTS):
             self.cpu.set_external(port, self.external[port], 0)
 
@@ -295,19 +288,12 @@ class Board(Bus):
         """HI of each LM629 to the CPU pins that it is wired to."""
         self.hi_seen[0] = self.left.hi
         self.hi_seen[1] = self.right.hi
-        index = 0
-        while index < self.hi_count:
-            hi = self.right.hi if self.hi_side[index] else self.left.hi
-            level = hi ^ self.hi_inverted[index]
-            port = self.hi_port[index]
-            mask = 1 << self.hi_bit[index]
-            levels = self.external[port] & (0xFF ^ mask)
-            if level:
-                levels |= mask
+        for port, mask, inverted, side in self.hi_pins:
+            high = self.hi_seen[side] != inverted
+            levels = self.external[port] | mask if high else self.external[port] & ~mask
             if levels != self.external[port]:
                 self.external[port] = levels
                 self.cpu.set_external(port, levels, tick)
-            index += 1
 
     # ---- what the serial port did --------------------------------------------------------------------------
 

@@ -24,8 +24,6 @@ SIDES = ("left", "right")
 CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
 PORTS = 4
 MAX_LATCHES = MAX_BUFFERS = 8
-MAX_HI_PINS = 8
-"""Pins of the CPU that outputs of the LM629 drive."""
 CONSTANT_BANK = PORTS + MAX_LATCHES
 """Banks of eight levels a chip input can be taken from: four ports, the latches, and one of constant ones."""
 
@@ -104,10 +102,6 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise WiringError(
                     self.name, "nets", f"P{port} is the data bus, nothing else can drive its pins"
                 )
-        driven = [source for _, _, source, _ in inputs if source.endswith(".hi")]
-        if len(driven) > MAX_HI_PINS:
-            what = f"{len(driven)} port pins follow an LM629's HI, at most {MAX_HI_PINS} can"
-            raise WiringError(self.name, "nets", what)
         return inputs
 
     def _latch_bank(self, name: str, net: str) -> int:
