@@ -34,7 +34,6 @@ cdef class FastOracle(LiveOracle):
     cpdef bint waits(self) except -1
     cpdef look(self, long long tick)
     cdef void _found(self, int code, long long tick) noexcept
-    cdef void _fault(self, long long tick, int kind, int pc) noexcept
     cdef int _pass(self, long long tick) except -1
     cdef int _pass_silence(self, int code, SilenceRule silence, long long tick) except -1
     cdef bint _is_over(self, int code, WheelOrder order) except -1

@@ -150,7 +150,8 @@ class FastOracle(LiveOracle):
             at = log._ticks[place]
             kind = log._kinds[place]
             if kind == FAULT:
-                self._fault(at, log._codes[place], log._values[place])
+                self.pc = log._values[place]
+                self._found(_NO_FAULT, at)
             else:
                 self._pass(at)
                 if kind == RECEIVED:
@@ -170,10 +171,6 @@ class FastOracle(LiveOracle):
         if self.code == 0 and (self.decided or code == _NO_FAULT):
             self.code = code
             self.tick = tick
-
-    def _fault(self, tick: int, kind: int, pc: int) -> None:
-        self.pc = pc
-        self._found(_NO_FAULT, tick)
 
     def _pass(self, tick: int) -> None:
         """What had to have happened before `tick`."""

@@ -9,7 +9,6 @@ from miro_robot.mcs51.line cimport Line
 cdef long long _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD, RESET_TICKS, _LOOK, _WAIT
 cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET
 
-
 cdef bytes _OPENING
 
 

@@ -13,7 +13,6 @@ cdef class Counters(Watcher):
     cpdef long long executed_at(self, int address)
     cpdef long long cycles_at(self, int address)
     cpdef long long jumped_at(self, int address)
-    cpdef list addresses(self)
 
 cdef int _RETI, _CALL_CYCLES, _DEPTH
 
@@ -38,4 +37,3 @@ cdef class Activity(Watcher):
     cdef int _leave(self, long long cycle) except -1
     cpdef slept(self, Cpu cpu, long long start, long long end)
     cpdef ran(self, Cpu cpu, long long start)
-    cpdef of_source(self, int source)

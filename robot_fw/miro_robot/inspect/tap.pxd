@@ -11,8 +11,7 @@ cdef long long NEVER_TICK
 cdef int _TICKS
 cdef int _RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP, _IN_SERVICE, _ROUTINE, _DATA, _SIDE
 cdef int _CS, _BUSY, _HI, _PWM, _SIGN, _MAGNITUDE, _A, _B, _PER_SIDE
-cdef int _CHIP_PINS
-cdef int _PLACES
+cdef int _CHIP_PINS, _PLACES
 
 cdef class BoardTap(Probe):
     cdef Board board

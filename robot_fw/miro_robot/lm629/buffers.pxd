@@ -1,6 +1,5 @@
 cimport cython
 
-
 cdef int _STOPS, _MODES
 cdef int _ACCELERATION, _VELOCITY, _POSITION
 cdef long long _MASK_30

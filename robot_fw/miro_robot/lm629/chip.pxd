@@ -8,7 +8,6 @@ from miro_robot.lm629.pid cimport Pid
 from miro_robot.lm629.signals cimport Signals
 from miro_robot.lm629.trajectory cimport ProfileGenerator
 
-
 cdef long long NEVER_TICK, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
@@ -22,7 +21,6 @@ cdef int _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS
 cdef int _LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR
 cdef unsigned char _WORDS_IN[256]
 cdef unsigned char _WORDS_OUT[256]
-
 
 cdef int _side(long long value) noexcept
 
@@ -79,8 +77,5 @@ cdef class Lm629:
     cdef _trajectory_word(self, int word)
     cdef int _filter_word(self, int word) except -1
     cdef int _load(self, int opcode) except -1
-    cpdef int data_out(self, long long tick) noexcept
-    cpdef int after_load(self) except -1
     cpdef int check_times(self, long long earliest_tick) except -1
-    cpdef int status_at(self, long long tick) noexcept
     cdef long long _due_tick(self) noexcept

@@ -27,7 +27,7 @@ connection diagram of the 28-pin package.
 
 from __future__ import annotations
 
-from miro_exact.clock import NEVER_TICK
+from miro_exact.clock import LM629_CLOCK_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
@@ -35,7 +35,7 @@ from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer, fit_15, sig
 from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 from miro_robot.lm629.encoder import Encoder
 from miro_robot.lm629.host_port import HostPort
-from miro_robot.lm629.options import DEFAULT_OPTIONS, TICKS_PER_CLOCK, Lm629Options
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_robot.lm629.pid import Pid
 from miro_robot.lm629.signals import Signals
 from miro_robot.lm629.trajectory import ProfileGenerator
@@ -126,7 +126,7 @@ class Lm629:
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
         self.options = options
-        self.reset_ticks = options.reset_clocks * TICKS_PER_CLOCK
+        self.reset_ticks = options.reset_clocks * LM629_CLOCK_TICKS
         self.rounds_down = 1 if options.output_rounding == "down" else 0
         self.negative = options.sign_of_negative
         self.pulse_late = 1 if options.pulse_at == "end" else 0
@@ -135,7 +135,7 @@ class Lm629:
         self.error_full = 1 if options.error_test == "full" else 0
         self.error_repeats = 1 if options.error_flag_repeats else 0
         self.clamps = 1 if options.out_of_range == "clamped" else 0
-        self.port = HostPort(options.busy_clocks * TICKS_PER_CLOCK, options)
+        self.port = HostPort(options.busy_clocks * LM629_CLOCK_TICKS, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
         self.pid = Pid(options.pid_saturates, options.sum_rounding == "down")
@@ -169,7 +169,7 @@ class Lm629:
             self.threshold = 0x7FFF
             self.encoder.settle(tick)
             self._enter_reset(_HELD, _HARDWARE_RESET, NEVER_TICK)
-        elif tick - self.reset_tick >= self.options.reset_pulse_clocks * TICKS_PER_CLOCK:
+        elif tick - self.reset_tick >= self.options.reset_pulse_clocks * LM629_CLOCK_TICKS:
             self.mode = _RESETTING
             self.next_tick = (tick + 3 & -4) + self.reset_ticks
 

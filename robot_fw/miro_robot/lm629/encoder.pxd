@@ -1,6 +1,5 @@
 cimport cython
 
-
 cdef long long NEVER_TICK
 
 

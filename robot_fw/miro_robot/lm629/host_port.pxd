@@ -1,6 +1,5 @@
 cimport cython
 
-
 cdef int _OPEN, _SOFTWARE_RESET
 cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE
 cdef int _IGNORED, _ACCEPTED, _REFUSED

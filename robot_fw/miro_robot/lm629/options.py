@@ -11,9 +11,6 @@ from typing import Literal, get_args, get_type_hints
 
 import msgspec
 
-TICKS_PER_CLOCK = 4
-"""24 MHz ticks in one period of the chip's 6 MHz clock."""
-
 
 class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Readings of the undocumented corners. Lengths are in chip clocks.

@@ -1,8 +1,6 @@
 cimport cython
 
-
 cdef long long _saturated(long long value) noexcept
-cdef long long _bottom(long long value) noexcept
 
 
 @cython.final

@@ -20,11 +20,6 @@ def _saturated(value: int) -> int:
     return value
 
 
-def _bottom(value: int) -> int:
-    """The bottom 16 bits, two's complement."""
-    return ((value + 32768) & 65535) - 32768
-
-
 class Pid:
     """u(n) = kp*e(n) + ki*sum(e) + kd*(e(n') - e(n'-1)), n' = every (ds+1)-th sample."""
 
@@ -86,7 +81,8 @@ class Pid:
         return self.error_sum >> 8
 
     def _narrow(self, value: int) -> int:
-        return _saturated(value) if self.saturates else _bottom(value)
+        """16 bits, limited or the bottom ones."""
+        return _saturated(value) if self.saturates else ((value + 32768) & 65535) - 32768
 
     def _limited(self, value: int) -> int:
         return max(-self.il, min(value, self.il))

@@ -1,6 +1,5 @@
 cimport cython
 
-
 cdef int _INTERRUPTS
 
 

@@ -1,11 +1,8 @@
 cimport cython
 
-
 cdef long long NEVER_TICK, _HALF_SPACE, _SPACE_MASK
 
-
 cdef long long _wrapped(long long position) noexcept
-
 
 cdef long long _stopping_distance(long long speed, long long acceleration) noexcept
 
