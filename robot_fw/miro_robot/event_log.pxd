@@ -1,7 +1,6 @@
 cimport cython
 
-cdef long long CAPACITY
-cdef long long _MASK
+cdef long long CAPACITY, _MASK
 cdef int _COMMAND
 
 

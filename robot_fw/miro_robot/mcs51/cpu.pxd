@@ -5,8 +5,7 @@ from miro_robot.mcs51.line cimport Line
 from miro_robot.mcs51.peripherals cimport Peripherals
 
 cdef long long NEVER_TICK
-cdef int _OUTSIDE
-cdef int _MARK
+cdef int _OUTSIDE, _MARK
 cdef int _STOP_REQUESTED, _REPLAN
 cdef int _WIRE_FULL
 cdef int _P0, _PCON, _IE, _IP
@@ -23,26 +22,18 @@ cdef class Cpu(Executor):
     cdef long long next_event, blocked
     cdef public long long main_loop_limit
     cdef long long next_mark, marks
-    cdef readonly int code_limit
     cdef public int stop_asleep
     cdef public object inspector
 
+    @cython.locals(address=int, first=int, end=int)
     cpdef load(self, bytes image, used=*)
     cdef void _erase(self) noexcept
-    cdef int _program(self, bytes image) except -1
-    cdef void _use(self, int first, int end) noexcept
     cpdef int write_code(self, int address, int value) except -1
     cpdef is_loaded(self, int address)
     cpdef int code_at(self, int address) noexcept
-    cpdef reset(self)
-    cpdef hold(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int go_on(self, long long until_cycle) except -1
     cpdef int step(self) except -1
-    cpdef int before_save(self) except -1
-    cpdef int after_load(self) except -1
-    cpdef int run_until_pc(self, int address, long long until_cycle) except -1
-    cpdef int run_until_any(self, tuple addresses, long long until_cycle) except -1
     cpdef request_stop(self)
     cdef void replan(self) noexcept
     cpdef int set_external(self, int port, int levels, long long tick) except -1

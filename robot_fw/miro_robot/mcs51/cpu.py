@@ -21,7 +21,7 @@
    pins -> ports -> INT0 INT1, T0 T1, T2 T2EX, RXD -> timers, serial port -> flags -> interrupts -> LCALL
                                    instructions -> SFRs -> timers, serial port, latches -> pins
 
-Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. README.md in this folder draws how `Core`,
+Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. README.md in this folder draws how
 `Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1, ..) are in it, and sources like 4316E.
 """
 
@@ -35,8 +35,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.core import LAST_CYCLE
-from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, WIRE_FULL, Executor
+from miro_robot.mcs51.execute import BREAKPOINT, LAST_CYCLE, REACHED, STOPPED, WIRE_FULL, Executor
 from miro_robot.mcs51.peripherals import Peripherals
 
 __all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
@@ -83,7 +82,7 @@ class Cpu(Executor):
     }
     NOT_STATE: tuple[str, ...] = (
         *Executor.NOT_STATE,
-        "code_limit", "inspector", "limit", "main_loop_limit", "next_event", "next_mark", "rxd", "stop",
+        "inspector", "limit", "main_loop_limit", "next_event", "next_mark", "rxd", "stop",
         "stop_asleep", "txd",
     )  # fmt: skip
 
@@ -100,7 +99,6 @@ class Cpu(Executor):
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
         self.next_mark = NEVER_TICK
         self.marks = 0  # marks passed since interrupts took over
-        self.code_limit = 0x10000
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
         self.inspector: CpuInspector | None = None
         self._erase()
@@ -112,11 +110,12 @@ class Cpu(Executor):
         a fault.
         """
         self._erase()
-        self._program(image)
-        self.code_limit = 0
+        for address in range(min(len(image), 0x10000)):
+            self.rom[address] = image[address]
+        self.rom[0x10000], self.rom[0x10001] = self.rom[0], self.rom[1]
         for first, end in ((0, len(image)),) if used is None else used:
-            self._use(first, end)
-            self.code_limit = max(self.code_limit, end)
+            for address in range(first, end):
+                self.lines[address] = self.line_at(address)
         loaded = on_load.get()
         if loaded is not None:
             loaded(self)
@@ -127,19 +126,6 @@ class Cpu(Executor):
             self.rom[address] = 0xFF
         for address in range(0x10000):
             self.lines[address] = _OUTSIDE
-
-    def _program(self, image: bytes) -> None:
-        """The bytes of `image` from address 0 on; the first two again behind the end."""
-        size = min(len(image), 0x10000)
-        for address in range(size):
-            self.rom[address] = image[address]
-        for address in range(2):
-            self.rom[0x10000 + address] = self.rom[address]
-
-    def _use(self, first: int, end: int) -> None:
-        """Executing at `first` .. `end` - 1 is legal."""
-        for address in range(first, end):
-            self.lines[address] = self.line_at(address)
 
     def write_code(self, address: int, value: int) -> None:
         """One byte of code memory, which from now on counts as loaded."""
@@ -178,12 +164,7 @@ class Cpu(Executor):
         """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
         now = self.cycles
         self.peripherals.clear(now)
-        self.pc = 0
-        self.a = 0
-        self.b = 0
-        self.sp = 7
-        self.dptr = 0
-        self.write_psw(0)
+        self.clear()
         self.pcon = 0
         self.idle = 0
         self.powered_down = 0

@@ -1,16 +1,38 @@
 cimport cython
 
-from miro_robot.mcs51.core cimport Core
+from miro_robot.mcs51.bus cimport Bus
 
-cdef int _BREAKPOINT, _REACHED
-cdef int _UNDEFINED_OPCODE
-cdef int _STACK_OVERFLOW
-cdef int _STACK_UNDERFLOW
-cdef int _MOV_DATA
-cdef int _CORE
-cdef int _OUTSIDE_IMAGE
+cdef int _BREAKPOINT, _REACHED, _UNDEFINED_OPCODE, _STACK_OVERFLOW, _STACK_UNDERFLOW, _OUTSIDE_IMAGE
+cdef int _MOV_DATA, _CORE, _SPREAD_FROM, _SPREAD_TO, _DEPTH
 
-cdef class Executor(Core):
+cdef class Executor:
+    cdef readonly Bus bus
+    cdef unsigned char rom[65538]
+    cdef unsigned int lines[65536]
+    cdef unsigned short line_of[256]
+    cdef unsigned char iram[256]
+    cdef public int pc, a, b, sp, dptr, cy, ac, ov, user_flags, bank
+    cdef readonly long long cycles, start, at
+    cdef long long limit, until
+    cdef int stop
+    cdef readonly long long instructions, idle_cycles, faults
+    cdef unsigned char[::1] edges
+    cdef int edge_mask, edge_before, edge_depth
+    cdef int edge_outer[8]
+    cdef public int highest_sp
+    cdef readonly int stack_floor, stack_end
+
+    cdef int clear(self) except -1
+    cpdef begin_edges(self)
+    @cython.final
+    @cython.locals(place='unsigned int')
+    cdef void count_edge(self, int target) noexcept
+    @cython.final
+    cdef void enter_edges(self) noexcept
+    @cython.final
+    cdef void leave_edges(self) noexcept
+    @cython.locals(line='unsigned int')
+    cdef unsigned int line_at(self, int address) noexcept
     cpdef int run(self, long long until_cycle) except -1
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
                    pc='long long', line='unsigned long long', row=int, at='long long', address=int, value=int)
@@ -65,3 +87,15 @@ cdef class Executor(Core):
     cdef inline void decimal_adjust(self) noexcept
     @cython.final
     cdef int fault(self, int kind) except -1
+
+    cdef int begin_run(self) except -1
+    cdef int end_run(self) except -1
+    cdef int boundary(self) except -1
+    cdef int end_of_interrupt(self) except -1
+    cdef int read_sfr(self, int address) except -1
+    cdef int read_latch(self, int address) except -1
+    cdef int write_sfr(self, int address, int value) except -1
+    cdef int write_sfr_bit(self, int address, int mask, int level) except -1
+    cdef int page(self) noexcept
+    cdef int movx_read(self, int address) except -1
+    cdef int movx_write(self, int address, int value) except -1

@@ -18,7 +18,6 @@ cdef class Interrupts:
     cpdef long long next_boundary(self, long long now) noexcept
     cpdef void enter(self, int source) noexcept
     cpdef void leave(self) noexcept
-    cpdef int after_load(self) except -1
 
 @cython.final
 cdef class ExternalInterrupts:

@@ -19,12 +19,9 @@ from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
 
-SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
-INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
-
 
 class Interrupts:
-    """IE, IP, the sources' windows and the two in-service flip-flops."""
+    """IE, IP, the sources' windows (0 to 5 in polling order) and the two in-service flip-flops."""
 
     STATE = {
         "ie": ("i", 0, 0xFF),
@@ -36,18 +33,16 @@ class Interrupts:
     NOT_STATE = ("asked",)
 
     def __init__(self) -> None:
-        self.ie = 0
-        self.ip = 0
-        self.in_service = 0  # bit 0 a low-priority, bit 1 a high-priority routine
         self.since = [0] * 6
         self.until = [0] * 6
         self.asked = 0  # bit per source: its window has not passed yet, or is not known to have
+        self.clear()
 
     def clear(self) -> None:
         """As after reset."""
         self.ie = 0
         self.ip = 0
-        self.in_service = 0
+        self.in_service = 0  # bit 0 a low-priority, bit 1 a high-priority routine
         for source in range(6):
             self.since[source] = 0
             self.until[source] = 0

@@ -1,8 +1,6 @@
 cimport cython
 
-cdef long long NEVER_TICK
-cdef long long _SIZE
-cdef long long _WAITING
+cdef long long NEVER_TICK, _SIZE, _WAITING
 
 @cython.final
 cdef class Line:

@@ -21,9 +21,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK, Items
 
 _SIZE = 4096  # places of a new ring; always a power of two
-WAITING = 2048
-"""Edges that may wait for the listener before the line is full."""
-_WAITING = 2048
+_WAITING = 2048  # edges that may wait for the listener before the line is full
 _MOST = 1 << 22  # edges of a saved line: more than the longest delay keeps
 
 

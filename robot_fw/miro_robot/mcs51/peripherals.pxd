@@ -9,8 +9,7 @@ from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
 cdef long long NEVER_TICK
-cdef int _UNIMPLEMENTED
-cdef int _P0
+cdef int _UNIMPLEMENTED, _P0
 cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1
 cdef int _SCON, _SBUF, _IE, _IP
 cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
@@ -18,8 +17,7 @@ cdef int _TF2, _RCLK, _TCLK
 cdef int _S5P2
 cdef int _SERIAL, _TIMER2, _BOTH_TIMERS
 cdef int _REN, _SETTINGS, _RI_TI
-cdef long long _NO_PERIOD
-cdef long long STOPPED_TICK
+cdef long long _NO_PERIOD, STOPPED_TICK
 
 @cython.final
 cdef class Peripherals:
@@ -41,7 +39,6 @@ cdef class Peripherals:
     cdef readonly long long p3_reads
 
     cpdef int clear(self, long long cycle) except -1
-    cpdef int after_load(self) except -1
     cpdef int check_times(self, long long cycle) except -1
     cpdef int freeze(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
@@ -72,7 +69,6 @@ cdef class Peripherals:
     cpdef int write(self, int address, int value, long long cycle) except -1
     cdef inline int _write_timer(self, int address, int value, long long cycle) except -1
     cdef inline void _note_timers(self) noexcept
-    cdef inline int writes_flags(self, int value) noexcept
     cdef void _note_clocks(self, int mode) noexcept
     cdef int write_serial(self, int address, int value, long long cycle) except -1
     cpdef long long bit_ticks(self) noexcept

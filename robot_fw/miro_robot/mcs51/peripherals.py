@@ -81,11 +81,9 @@ class Peripherals:
         self.frozen = 0  # power-down: the oscillator stands
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
         self.now = 0  # cycle below which everything has been done that can be noticed
-        self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag; -1: to be worked out
-        self.serial_wait = -1  # tick before which the serial port raises no flag; -1: to be worked out
-        self.quiet = -1  # cycle up to which nothing is due
         self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
+        self.look_again()
 
     def clear(self, cycle: int) -> None:
         """Reset: all registers but the port latches, which `Cpu` writes."""
@@ -113,6 +111,12 @@ class Peripherals:
         self.frozen = 1
 
     # Time
+
+    def look_again(self) -> None:
+        """What timers and serial port wait for has to be worked out (-1)."""
+        self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag
+        self.serial_wait = -1  # tick before which the serial port raises no flag
+        self.quiet = -1  # cycle up to which nothing is due
 
     def sync(self, cycle: int) -> None:
         """Does everything that happens in cycles below `cycle` and that the core can notice."""
@@ -146,12 +150,6 @@ class Peripherals:
             self.quiet = serial if serial < self.timer_wait else self.timer_wait
             if self.ports.next_cycle < self.quiet:
                 self.quiet = self.ports.next_cycle
-
-    def look_again(self) -> None:
-        """What timers and serial port wait for has to be worked out."""
-        self.timer_wait = -1
-        self.serial_wait = -1
-        self.quiet = -1
 
     def settle(self) -> None:
         """Brings timers and serial port up to where the rest is."""
@@ -403,7 +401,8 @@ class Peripherals:
         self.sync(cycle)
         if _TCON <= address <= _TH1:
             return self._write_timer(address, value, cycle)
-        if address == _SCON and self.writes_flags(value):
+        if address == _SCON and self.uart.mode() != 0 and (value ^ self.uart.scon) & _SETTINGS == 0:
+            # the serial port goes on as it was, and waits for what it waited for
             sooner = 1 if value & ~self.uart.scon & _RI_TI else 0
             self.uart.write_scon(value, cycle)
             return sooner
@@ -443,10 +442,6 @@ class Peripherals:
         """A flag of timers 0 and 1 may come at another time."""
         self.timer_wait = self.timers.next_flag(_BOTH_TIMERS)
         self._note_quiet()
-
-    def writes_flags(self, value: int) -> int:
-        """SCON keeps mode, SM2 and REN: the serial port goes on as it was, and waits for what it waited for."""
-        return 1 if self.uart.mode() != 0 and (value ^ self.uart.scon) & _SETTINGS == 0 else 0
 
     def write_serial(self, address: int, value: int, cycle: int) -> None:
         """A register of the serial port or of timer 2, with both settled."""

@@ -9,7 +9,6 @@ cdef class Ports:
     cdef readonly list pending
     cdef readonly long long next_cycle
 
-    cpdef int after_load(self) except -1
     cpdef int level(self, int port) noexcept
     cpdef int push(self, int port, int levels, long long tick) except -1
     cpdef int apply(self, long long cycle) except -1

@@ -9,18 +9,8 @@ before it (P1, P2). The latch changes at the end of an instruction and the pin w
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from msgspec import Meta
-
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
-
-_Push = tuple[
-    Annotated[int, Meta(ge=0, le=1 << 55)],
-    Annotated[int, Meta(ge=0, le=3)],
-    Annotated[int, Meta(ge=0, le=0xFF)],
-]
 
 
 class Ports:

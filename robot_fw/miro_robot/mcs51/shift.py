@@ -36,10 +36,7 @@ class Shift:
         self.uart = uart
         self.data = Line()
         self.data.unread = True  # only ever asked for its level of now
-        self.flag = 0  # what its end sets: TI sending, RI receiving, 0 idle
-        self.value = 0
-        self.number = 0  # bits done
-        self.cycle = 0  # cycle of the next bit
+        self._begin(0, 0, 0)
 
     def abort(self) -> None:
         self.flag = 0
@@ -54,10 +51,10 @@ class Shift:
             self._begin(_RI, 0, cycle + 1)
 
     def _begin(self, flag: int, value: int, cycle: int) -> None:
-        self.flag = flag
+        self.flag = flag  # what its end sets: TI sending, RI receiving, 0 idle
         self.value = value
-        self.number = 0
-        self.cycle = cycle
+        self.number = 0  # bits done
+        self.cycle = cycle  # of the next bit
 
     def sync(self, tick: int) -> None:
         """Everything below `tick`, which begins a cycle."""

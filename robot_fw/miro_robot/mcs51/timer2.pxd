@@ -2,13 +2,11 @@ cimport cython
 
 from miro_robot.mcs51.interrupts cimport Interrupts
 
-cdef long long NEVER_TICK
-cdef long long _NONE
+cdef long long NEVER_TICK, _NONE
 cdef int _TIMER2
 cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2
 cdef int _T2OE, _DCEN
-cdef int _FELL
-cdef int _STATES
+cdef int _FELL, _STATES
 
 @cython.final
 cdef class Timer2:
@@ -41,7 +39,6 @@ cdef class Timer2:
     cpdef void sample_external(self, int level) noexcept
     cpdef int falls(self) noexcept
     cdef void _note_sleep(self) noexcept
-    cpdef int after_load(self) except -1
     cdef void _external(self, long long cycle) noexcept
     cpdef void write_control(self, int value, long long cycle) noexcept
     cpdef void write_mode(self, int value, long long cycle) noexcept

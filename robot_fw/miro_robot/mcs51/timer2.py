@@ -45,24 +45,17 @@ class Timer2:
 
     def __init__(self, interrupts: Interrupts) -> None:
         self.interrupts = interrupts
+        self.up = 1  # pin T2EX as last sampled (DCEN: count up), or _FELL
+        self.clear(0)
+
+    def clear(self, cycle: int) -> None:
+        """As after reset in `cycle`."""
         self.control = 0  # T2CON
         self.t2mod = 0
         self.count = 0
         self.capture = 0  # RCAP2
-        self.up = 1  # pin T2EX as last sampled (DCEN: count up), or _FELL
-        self.edge_cycle = -1  # cycle in which a fall of T2 counts
+        self.edge_cycle = _NONE  # cycle in which a fall of T2 counts
         self.clock_out = 0  # level on T2 while T2OE
-        self.synced = 0
-        self.sleeps = 0  # no flag is near: overflows set none, and no fall of T2EX waits
-
-    def clear(self, cycle: int) -> None:
-        """As after reset in `cycle`."""
-        self.control = 0
-        self.t2mod = 0
-        self.count = 0
-        self.capture = 0
-        self.edge_cycle = _NONE
-        self.clock_out = 0
         self.synced = cycle
         self._note_sleep()
         self.interrupts.withdraw(_TIMER2, cycle)
@@ -174,6 +167,7 @@ class Timer2:
         self._note_sleep()
 
     def _note_sleep(self) -> None:
+        """Whether no flag is near: overflows set none, and no fall of T2EX waits."""
         self.sleeps = 1 if self.silent() and self.up != _FELL else 0
 
     def falls(self) -> int:

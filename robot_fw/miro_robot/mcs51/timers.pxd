@@ -2,8 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.interrupts cimport Interrupts
 
-cdef long long NEVER_TICK
-cdef long long _NONE
+cdef long long NEVER_TICK, _NONE
 cdef int _TIMER0, _TIMER1, _TF0, _TF1, _TR0, _TR1
 
 @cython.final
@@ -41,7 +40,6 @@ cdef class Timers:
     cdef int write(self, int number, int value) noexcept
     cdef int write_mode(self, int value) noexcept
     cdef int write_control(self, int value, long long cycle) noexcept
-    cdef void _note_flags(self, int value, long long cycle) noexcept
     cpdef void taken(self, int timer, long long cycle) noexcept
     cdef void _pass(self, long long cycle) noexcept
     cdef void _pass_cycles(self, int part, long long cycle) noexcept

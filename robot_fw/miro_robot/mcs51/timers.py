@@ -48,31 +48,19 @@ class Timers:
 
     def __init__(self, interrupts: Interrupts) -> None:
         self.interrupts = interrupts
-        self.tmod = 0
-        self.control = 0  # TCON.7:4 = TF1 TR1 TF0 TR0, in place
         self.tl = [0] * 2
         self.th = [0] * 2
         self.gates = 3  # pins INT1, INT0 as last sampled
-        self.edge_cycle = [-1] * 2  # cycle in which a fall of T0, T1 counts
-        self.synced = 0  # everything below this cycle is done
-        self.overflows1 = 0  # of timer 1 since reset: the serial port halves them
-        # A bit per part: whether it counts, on cycles or on a pin.
-        self.counts_always = 0
-        self.counts_by_tr0 = 0
-        self.counts_by_tr1 = 0
-        self.counting = 0  # as TR0 and TR1 are
-        self.on_pins = 0  # a bit per part that counts falls of a pin
-        self.steady = 0  # a bit per part that counts cycles
+        self.edge_cycle = [0] * 2  # cycle in which a fall of T0, T1 counts
         self.start = [0] * 3  # cycle in which a part that counts cycles would have stood at 0
         self.top = [0] * 3  # the count that overflows
-        self.due = NEVER_TICK  # no overflow and no fall that counts comes before this cycle
-        self._set_mode(0)
+        self.clear(0)
 
     def clear(self, cycle: int) -> None:
         """As after reset in `cycle`."""
-        self.control = 0
-        self.synced = cycle
-        self.overflows1 = 0
+        self.control = 0  # TCON.7:4 = TF1 TR1 TF0 TR0, in place
+        self.synced = cycle  # everything below this cycle is done
+        self.overflows1 = 0  # of timer 1 since reset: the serial port halves them
         for timer in range(2):
             self.tl[timer] = 0
             self.th[timer] = 0
@@ -90,8 +78,8 @@ class Timers:
     def _set_mode(self, tmod: int) -> None:
         """TMOD, with all counts in TL and TH."""
         self.tmod = tmod
-        self.steady = 0
-        self.due = NEVER_TICK
+        self.steady = 0  # a bit per part that counts cycles
+        self.due = NEVER_TICK  # no overflow and no fall that counts comes before this cycle
         self.on_pins = self.counts_pin(0) | self.counts_pin(1) << 1
         for part in range(3):
             mode = 2 if part == 2 else self.mode(part)
@@ -99,7 +87,7 @@ class Timers:
         self._note_gates()
 
     def _note_gates(self) -> None:
-        """TMOD or the gates are new: works out what counts."""
+        """TMOD or the gates are new: works out what counts, a bit per part, always and as TR0 and TR1 are."""
         split = self.mode(0) == 3
         stands = self.mode(1) == 3
         open0 = not self.tmod & 0x08 or self.gates & 1
@@ -242,17 +230,14 @@ class Timers:
             self._note_counting()
         if changed & (_TF0 | _TF1):
             started |= changed & (_TF0 | _TF1)
-            self._note_flags(value, cycle)
+            for timer in range(2):
+                if value & (_TF0 << (2 * timer)):
+                    self.interrupts.ask(1 + 2 * timer, cycle)
+                else:
+                    self.interrupts.withdraw(1 + 2 * timer, cycle)
         if self.mode(0) == 3:
             return _TIMER0 | _TIMER1
         return (_TIMER0 if started & (_TR0 | _TF0) else 0) | (_TIMER1 if started & (_TR1 | _TF1) else 0)
-
-    def _note_flags(self, value: int, cycle: int) -> None:
-        for timer in range(2):
-            if value & (_TF0 << (2 * timer)):
-                self.interrupts.ask(1 + 2 * timer, cycle)
-            else:
-                self.interrupts.withdraw(1 + 2 * timer, cycle)
 
     def taken(self, timer: int, cycle: int) -> None:
         """The CPU vectors: TF is cleared."""

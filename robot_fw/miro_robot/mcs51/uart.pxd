@@ -4,9 +4,7 @@ from miro_robot.mcs51.bus cimport Bus
 from miro_robot.mcs51.interrupts cimport Interrupts
 from miro_robot.mcs51.line cimport Line
 
-cdef long long NEVER_TICK
-cdef long long _STOPPED
-cdef long long _STOPPED_PERIOD
+cdef long long NEVER_TICK, _STOPPED, _STOPPED_PERIOD
 cdef int _SERIAL
 cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
 cdef int _ROLLOVERS, _COUNTER_BITS
@@ -42,7 +40,6 @@ cdef class Uart:
     cpdef int pulse(self, int rx, int tx, long long tick) except -1
     cpdef int level(self, long long tick) noexcept
     cpdef int write_scon(self, int value, long long cycle) except -1
-    cdef void ask_or_withdraw(self, long long cycle) noexcept
     cpdef void write_sbuf(self, int value) noexcept
     cpdef int write_latch(self, int latch, long long tick) except -1
     cpdef void raise_flag(self, int flag, long long tick) noexcept

@@ -81,44 +81,33 @@ class Uart:
         self.txd = Line()
         self.txd.unread = True  # until a listener says otherwise
         self.latch = 3
-        self.scon = 0
         self.received = 0  # SBUF as read
-        # transmitter
-        self.tx_next = _STOPPED  # next 16x tick and their distance
-        self.tx_period = _STOPPED_PERIOD
-        self.tx_phase = 0  # 16x ticks since the last rollover
         self.tx_bits = 0  # what is still to be sent, next bit lowest
-        self.tx_left = 0  # how many bits that is; 0 idle
         self.tx_value = 0
         self.tx_delay = 0  # from rollover to pin (U3); 0 before the start bit
-        self.tx_level = 1  # what the transmitter puts on TXD
-        self.tx_edge = NEVER_TICK  # tick at which tx_coming replaces it
         self.tx_coming = 1
-        # receiver
-        self.rx_next = _STOPPED
-        self.rx_period = _STOPPED_PERIOD
-        self.rx_count = 0  # 16x ticks since the fall; 0 searching
         self.rx_last = 1  # RXD at the last 16x tick
         self.rx_votes = 0
         self.rx_bits = 0
-        self.rx_done = NEVER_TICK  # tick at which rx_frame is delivered
         self.rx_frame = 0  # data, and the bit after them in bit 8
+        self.set_clock(NEVER_TICK, 0, NEVER_TICK, 0)
+        self.clear(0)
 
     def clear(self, cycle: int) -> None:
         """As after reset in `cycle`: registers and both state machines; SBUF is left as it was."""
         self.scon = 0
-        self.tx_phase = 0
+        self.tx_phase = 0  # 16x ticks since the last rollover
         self.abort(12 * cycle)
         self.interrupts.withdraw(_SERIAL, cycle)
 
     def abort(self, tick: int) -> None:
         """Both state machines to idle: reset, and a change of mode; with everything below `tick` done."""
         self.txd.append(tick, self.latch >> 1)
-        self.tx_left = 0
-        self.tx_edge = NEVER_TICK
-        self.tx_level = 1
-        self.rx_count = 0
-        self.rx_done = NEVER_TICK
+        self.tx_left = 0  # how many bits are still to be sent; 0 idle
+        self.tx_edge = NEVER_TICK  # tick at which tx_coming replaces tx_level
+        self.tx_level = 1  # what the transmitter puts on TXD
+        self.rx_count = 0  # 16x ticks since the fall; 0 searching
+        self.rx_done = NEVER_TICK  # tick at which rx_frame is delivered
 
     def mode(self) -> int:
         return self.scon >> 6
@@ -161,9 +150,6 @@ class Uart:
         if (value ^ self.scon) & (_SM0 | _SM1):
             self.abort(12 * cycle)
         self.scon = value
-        self.ask_or_withdraw(cycle)
-
-    def ask_or_withdraw(self, cycle: int) -> None:
         if self.scon & (_RI | _TI):
             self.interrupts.ask(_SERIAL, cycle)
         else:
