@@ -73,7 +73,7 @@ REFERENCES: Registry[AnyReference] = Registry(
     key="kind",
     base="miro_host.references.interface:ReferenceParameters",
     own={
-        "line": "miro_host.references.line:LineRef",
+        "line": "miro_host.references.arc:LineRef",
         "arc": "miro_host.references.arc:ArcRef",
         "sine": "miro_host.references.sine:SineRef",
         "waypoints": "miro_host.references.waypoints:WaypointsRef",

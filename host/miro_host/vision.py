@@ -18,7 +18,6 @@ from miro_exact.state import Rows
 from miro_host.posture import Posture
 
 DEGREE = 0.017453292519943295
-SIGMAS = 3.0
 _SIGMAS = 3.0
 _MEASURED = ("d", -1e6, 1e6)  # metres and radians: far more than a camera sees, and angles that `dmath` takes
 

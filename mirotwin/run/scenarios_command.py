@@ -8,8 +8,7 @@ import click
 from miro_exact.bad_input import shortened
 from miro_host.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
-from miro_sim.scenario import profiles as radio_profiles
-from miro_sim.scenario import variants as scenario_variants
+from miro_sim.scenario import profiles as scenario_profiles
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
@@ -86,8 +85,8 @@ scenarios.add_command(show)
 def profiles() -> None:
     """Lists the radio profiles and the keys that each sets, for `profile = ".."` in [network.radio]."""
     table = plain_table("profile", "what it does", "keys", bold=True)
-    for name, profile in radio_profiles.profiles().items():
-        table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
+    for name, profile in scenario_profiles.tables_of("profile").items():
+        table.add_row(name, profile["about"], _keys(scenario_profiles.keys_of(name)))
     print_result(table)
 
 
@@ -98,7 +97,7 @@ def variants() -> None:
     With --set a variant wins over the file, and over what is set before it; in a file, keys that are given win.
     """
     table = plain_table("variant", "what it is", "keys", bold=True)
-    for name, variant in scenario_variants.variants().items():
+    for name, variant in scenario_profiles.tables_of("variant").items():
         keys = _keys({key: value for key, value in variant.items() if key != "about"})
         table.add_row(name, variant["about"], keys)
     print_result(table)

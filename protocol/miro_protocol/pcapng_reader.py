@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
-from typing import Protocol
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.pcapng import (
@@ -42,14 +41,6 @@ _OTHER_EVENTS = {
 MOST_EVENTS = 4  # that are named
 
 
-class Readable(Protocol):
-    """An open file or pipe."""
-
-    def read(self, size: int, /) -> bytes:
-        """`size` bytes, fewer only at the end."""
-        ...
-
-
 class CaptureError(BadInput):
     """A capture that cannot be read on: file, offset of the block, the reason, and what to do about it."""
 
@@ -59,17 +50,17 @@ class CaptureError(BadInput):
 
 
 def iterate(
-    data: bytes | Readable, source: str = "<capture>", passed_over: Counter[int] | None = None
+    data: bytes | Callable[[int], bytes], source: str = "<capture>", passed_over: Counter[int] | None = None
 ) -> Iterator[Transmission]:
     """Reads packet by packet; CaptureError at the first place that makes no sense, after all before it.
 
-    From bytes, or from an open binary file or pipe, of which one block at a time is kept. Captures by others are
+    From bytes, or by the `read` of a file or a pipe, of which one block at a time is kept. Captures by others are
     read too: both byte orders, any time resolution, several sections. `network` is the interface's number in its
     section. Packets of other events than characters sent or received are passed over; `passed_over` counts them by
     event type, see `events_line`.
     """
-    stream = BytesIO(data) if isinstance(data, bytes) else data
-    return _BlockReader(stream, source, Counter() if passed_over is None else passed_over).packets()
+    read = BytesIO(data).read if isinstance(data, bytes) else data
+    return _BlockReader(read, source, Counter() if passed_over is None else passed_over).packets()
 
 
 def events_line(passed_over: Counter[int]) -> str:
@@ -93,8 +84,8 @@ class _Interface:
 
 
 class _BlockReader:
-    def __init__(self, stream: Readable, source: str, passed_over: Counter[int]) -> None:
-        self.stream = stream
+    def __init__(self, read: Callable[[int], bytes], source: str, passed_over: Counter[int]) -> None:
+        self.read = read
         self.source = source
         self.passed_over = passed_over
         self.offset = 0  # of the block under way
@@ -102,7 +93,7 @@ class _BlockReader:
         self.interfaces: list[_Interface] = []
 
     def packets(self) -> Iterator[Transmission]:
-        while (head := self.stream.read(_HEAD)) or self.offset == 0:
+        while (head := self.read(_HEAD)) or self.offset == 0:
             kind, body = self._block(head)
             if kind == SECTION:
                 self._section(body)
@@ -140,7 +131,7 @@ class _BlockReader:
         kind, size = struct.unpack_from(self.order + "II", head)
         if size < 12 or size % 4 or size > MAX_BLOCK:
             raise self.malformed(f"length {size}")
-        block = head + self.stream.read(size - _HEAD)
+        block = head + self.read(size - _HEAD)
         if len(block) < size:
             raise self.cut()
         (again,) = struct.unpack_from(self.order + "I", block, size - 4)

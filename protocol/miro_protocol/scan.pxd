@@ -1,6 +1,5 @@
 cimport cython
 
-cdef long long _LIMIT
 cdef int _BAD_STOP, _APART, _FRAME, _RUN, _NO_SYNC, _BAD_STOP_BIT, _BAD_SPACING, _BAD_CRC
 
 

@@ -26,8 +26,7 @@ RUN_LIMIT = 4096  # a run of garbage is reported in pieces of so many characters
 TICK_LIMIT = NEVER_TICK  # ticks beyond +- this are refused: they are 64-bit numbers here
 REASONS = tuple(Reason)
 
-_LIMIT = NEVER_TICK  # C constants when compiled
-_CAPACITY = 4160  # room for a run and the window that goes on after it
+_CAPACITY = 4160  # C constants when compiled: room for a run and the window that goes on after it
 _BAD_STOP = 1  # flaws of a character
 _APART = 2  # ... does not follow its predecessor at the right distance
 _FRAME = 1  # what a character completed

@@ -107,10 +107,16 @@ def struct_of(table: Any, kind: type[T], strict: bool = True) -> T:
         return msgspec.convert(table, kind, strict=strict)
     except msgspec.ValidationError as error:
         message = f"{error}"
+    what, path = what_and_path(message)
+    keys = () if path else getattr(kind, "__struct_encode_fields__", ())
+    raise _misfit(what, _with_names(path, table, kind, message), keys)
+
+
+def what_and_path(message: str) -> tuple[str, str]:
+    """What msgspec found, and the path of the key, without its `$`."""
     found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
     assert found is not None
-    keys = () if found[2] else getattr(kind, "__struct_encode_fields__", ())
-    raise _misfit(found[1], _with_names(found[2] or "", table, kind, message), keys)
+    return found[1], found[2] or ""
 
 
 def _with_names(path: str, table: Any, kind: type, message: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 from miro_exact import engine as engines
 from miro_host.pilot import Pilot
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_sim.scenario.file import ScenarioError, parse
 from mirotwin.recording.reader import read
 from tests.examples.rig import EXAMPLES, MIROTWIN, installed, run

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from miro_host.estimators.predict import moved
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.references.arc import Arc
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import Arc, StraightLine
 
 PATHS = [StraightLine(), StraightLine(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)]
 ANY_PATH = st.sampled_from(PATHS)

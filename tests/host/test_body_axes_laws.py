@@ -14,8 +14,8 @@ from miro_host.laws.interface import LawInput, errors
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
+from miro_host.references.arc import StraightLine
 from miro_host.references.interface import Reference
-from miro_host.references.line import StraightLine
 from tests.host.driving import ANY_PATH, PATHS, POSTURES, SPEEDS, TIMES, TURNS, apart, drive, later, starts
 from tests.naive import host_laws as naive
 

@@ -17,8 +17,7 @@ from miro_host.laws.epsilon_tracking import (
 from miro_host.laws.interface import LawInput
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.references.arc import Arc
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import Arc, StraightLine
 from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TIMES, TURNS, apart, drive, later
 from tests.naive import host_laws as naive
 from tests.naive.host_ideal_loop import drive_at_velocities

@@ -15,7 +15,7 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_host.telemetry_receiver import LastTelemetry
 from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
 

@@ -10,7 +10,7 @@ from miro_host.integrator import AdamsBashforth, Integrator, Limits, integrator_
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 
 LAW = YangKim(Gains())
 START = Posture(0.07, 0.02, -0.38)

@@ -11,9 +11,8 @@ import pytest
 from miro_host.laws.yang_kim import Gains
 from miro_host.plugins import PluginError
 from miro_host.raised import raised, raised_at
-from miro_host.references.arc import Arc, ArcRef
+from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
 from miro_host.references.interface import CheckedReference
-from miro_host.references.line import LineRef, StraightLine
 from miro_host.registries import LAWS, REFERENCES
 from miro_sim.scenario.file import parse
 from tests import children
@@ -148,7 +147,7 @@ def test_of_a_plug_in_in_this_tree_the_place_is_where_it_raised(module, place):
 
 
 WAITING = """
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_host.references.interface import ReferenceParameters
 
 class Waiting(ReferenceParameters, frozen=True, kw_only=True, tag="waiting"):

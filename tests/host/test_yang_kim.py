@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from miro_host.laws.yang_kim import Gains, YangKim, guarded_inverse, saturation, sign
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TIMES, TURNS
 from tests.naive import host_control as naive
 

@@ -75,7 +75,7 @@ def digest(name):
 def names():
     """Of all runs, the short one first."""
     from benchmarks.disturbances import CASES
-    from miro_sim.scenario.profiles import profiles
+    from miro_sim.scenario.profiles import tables_of
 
     yield SHORT
     builtin = resources.files("miro_sim.scenario") / "builtin"
@@ -86,7 +86,7 @@ def names():
     yield _name(TWO_TEAMS)
     for camera in CAMERAS:
         yield _name("fig6", camera)
-    for profile in profiles():
+    for profile in tables_of("profile"):
         yield _name("fig6", f'network.radio={{profile="{profile}"}}')
     for variant in ("ideal", "realistic"):
         yield _name("fig8", f"variant={variant}")

@@ -4,11 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.rng import Stream
 from miro_host.pilot import STANDSTILL, WheelCommand
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.scenario.keys import ControlNoise
-from miro_sim.world.control_noise import NoisyCommands
+from miro_sim.world.control_noise import noisy
 from tests.sim.world.rig import world_of
 
 WHEELS = Wheels()
@@ -36,8 +37,8 @@ def command(v_m_s, w_rad_s):
 @given(st.integers(0, 2**63 - 1), st.integers(0, 10**6), st.floats(0, 1), st.floats(0, 40))
 def test_what_is_sent_is_a_command_within_the_bounds(seed, period, v_bound, w_bound):
     """At 0.2 m/s no wheel limit is met below 0.2 + 0.4 m/s; beyond it the limit holds."""
-    noise = NoisyCommands(ControlNoise(v_m_s=v_bound, w_rad_s=w_bound), WHEELS, seed, "net0/robot0/control")
-    left, right = noise.wheels_of(command(0.2, 1.0), period)
+    bounds = ControlNoise(v_m_s=v_bound, w_rad_s=w_bound)
+    left, right = noisy(command(0.2, 1.0), bounds, WHEELS, Stream(seed, "net0/robot0/control"), period)
     assert max(abs(left), abs(right)) <= 16_633
     v_m_s = (left + right) / 2 / WHEELS.units_per_m_s
     w_rad_s = (right - left) / WHEELS.units_per_m_s / WHEELS.track_m
@@ -47,18 +48,23 @@ def test_what_is_sent_is_a_command_within_the_bounds(seed, period, v_bound, w_bo
 
 
 def test_no_bounds_are_no_noise_and_no_rounding():
-    noise = NoisyCommands(ControlNoise(), WHEELS, 1, "a")
     odd = WheelCommand(123, -456, 0.0, 0.0)  # not what v and w would give
-    assert noise.wheels_of(odd, 3) == (123, -456)
+    assert noisy(odd, ControlNoise(), WHEELS, Stream(1, "a"), 3) == (123, -456)
 
 
 def test_draws_are_even_over_the_bounds_and_new_in_each_period():
-    noise = NoisyCommands(ControlNoise(v_m_s=0.1), WHEELS, 5, "a")
-    speeds = [sum(noise.wheels_of(STANDSTILL, period)) / 2 / WHEELS.units_per_m_s for period in range(4000)]
+    def speed(period):
+        return (
+            sum(noisy(STANDSTILL, ControlNoise(v_m_s=0.1), WHEELS, Stream(5, "a"), period))
+            / 2
+            / WHEELS.units_per_m_s
+        )
+
+    speeds = [speed(period) for period in range(4000)]
     assert len(set(speeds)) > 1500
     assert abs(sum(speeds) / 4000) < 4 * 0.1 / (3 * 4000) ** 0.5
     assert sum(abs(speed) < 0.05 for speed in speeds) == pytest.approx(2000, abs=4 * 32)
-    assert noise.wheels_of(STANDSTILL, 17) == noise.wheels_of(STANDSTILL, 17)
+    assert speed(17) == speed(17)
 
 
 def run(lines, seed=2, periods=12):

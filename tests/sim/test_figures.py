@@ -11,8 +11,7 @@ import pytest
 
 from benchmarks.figures import Figure, figures, row
 from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY
-from miro_host.references.arc import ArcRef
-from miro_host.references.line import LineRef
+from miro_host.references.arc import ArcRef, LineRef
 from miro_sim.scenario.file import builtin_names, load, parse
 
 CAPTIONS = {

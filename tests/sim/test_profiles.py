@@ -73,10 +73,10 @@ def test_a_bit_error_rate_takes_the_place_of_a_profiles_signal_to_noise_ratio():
     assert radio('profile = "weak"\nbit_error_rate = 0.01').eb_n0_db is None
 
 
-@pytest.mark.parametrize("name", profiles.profiles())
+@pytest.mark.parametrize("name", profiles.tables_of("profile"))
 def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
     radio(f'profile = "{name}"')
-    assert profiles.profiles()[name]["about"]
+    assert profiles.tables_of("profile")[name]["about"]
     assert f"`{name}`" in README.read_text()
 
 
@@ -150,9 +150,9 @@ def test_a_key_that_contradicts_a_profile_is_named_with_it():
     assert refusal('profile = "slicer"\nbit_error_rate = 0.01') == needed + remedy
 
 
-@pytest.mark.parametrize("first", profiles.profiles())
+@pytest.mark.parametrize("first", profiles.tables_of("profile"))
 def test_two_profiles_go_together_or_are_both_named(first):
-    for second in profiles.profiles():
+    for second in profiles.tables_of("profile"):
         try:
             radio(f'profile = ["{first}", "{second}"]')
         except ScenarioError as error:
@@ -172,7 +172,7 @@ def test_the_command_line_lists_the_profiles_with_their_keys():
     assert result.exit_code == 0
     listed = re.sub(r"\s+", " ", result.stdout)
     assert "fade15 fading with 15 dB" in listed
-    for name in profiles.profiles():
+    for name in profiles.tables_of("profile"):
         assert name in result.stdout
 
 

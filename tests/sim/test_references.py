@@ -246,7 +246,7 @@ def test_drive_s_says_when_the_reference_stands():
 FOREIGN = """
 import msgspec
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_host.references.interface import ReferenceParameters
 
 class Odd(ReferenceParameters, frozen=True, kw_only=True, tag="odd"):

@@ -1,6 +1,5 @@
 cimport cython
 from libc cimport math
-from miro_exact cimport dmath
 
 cdef int _STEPS
 

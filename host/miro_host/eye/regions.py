@@ -13,10 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 TABLE_SIZE = 65536
-MOST_PIXELS = 4096
-"""Pixels of one window: no run is shorter than a pixel, so the arrays hold all runs of any picture."""
-
-_PIXELS = 4096  # a C constant when compiled
+_PIXELS = 4096
+"""Most of one window: no run is shorter than a pixel, so the arrays hold all runs of any picture."""
 
 
 class Region(NamedTuple):
@@ -70,7 +68,7 @@ class Regions:
     def find(self, pixels: bytearray, width: int, height: int) -> int:
         """Looks at a window as `Frame.window` gives it; returns the number of regions. ValueError for a wrong size."""
         if width < 1 or height < 1 or width > _PIXELS or height > _PIXELS or width * height > _PIXELS:
-            raise ValueError(f"a window of {width} x {height} pixels; it must have 1 to {MOST_PIXELS}")
+            raise ValueError(f"a window of {width} x {height} pixels; it must have 1 to {_PIXELS}")
         if len(pixels) != 3 * width * height:
             raise ValueError(f"{len(pixels)} bytes are not {width} x {height} pixels of 3")
         self.width = width

@@ -1,4 +1,4 @@
-"""A circular arc with a speed ramp.
+"""A circular arc or a straight line, with a speed ramp.
 
 Assumption 2 (equation 11) of the paper wants a path out of the origin of the world axes. There the polar form of
 equation (9) is 0/0; on such an arc it has a closed form without a division by rho, so that t = 0 is a time like any
@@ -37,6 +37,7 @@ class Arc(msgspec.Struct, frozen=True):
         """The reference at `t_s`; standstill at the ends outside the ramp's time."""
         s, v, v_dot = self.ramp.at(t_s)
         kappa = self.curvature_per_m
+        w_dot = kappa * v_dot if kappa != 0.0 else 0.0  # never -0.0 on a line
         half_turn = 0.5 * kappa * s
         sin_h, cos_h = sincos(half_turn)
         rho = s if kappa == 0.0 else 2.0 * sin_h / kappa
@@ -45,13 +46,13 @@ class Arc(msgspec.Struct, frozen=True):
         if self.start_x_m != 0.0 or self.start_y_m != 0.0 or abs(half_turn) >= PI:
             x, y = self.start_x_m + rho * cos_phi, self.start_y_m + rho * sin_phi
             at = Posture(x, y, wrap_pi(self.heading_rad + kappa * s))
-            return with_polar_form(at, v, kappa * v, v_dot, kappa * v_dot)
+            return with_polar_form(at, v, kappa * v, v_dot, w_dot)
         return Reference(
             posture=Posture(rho * cos_phi, rho * sin_phi, wrap_pi(self.heading_rad + kappa * s)),
             v_m_s=v,
             w_rad_s=kappa * v,
             v_dot_m_s2=v_dot,
-            w_dot_rad_s2=kappa * v_dot,
+            w_dot_rad_s2=w_dot,
             rho_m=rho,
             phi_rad=phi,
             rho_rate_m_s=v * cos_h,
@@ -65,6 +66,29 @@ class Arc(msgspec.Struct, frozen=True):
         if kappa == 0.0:
             return self.ramp.pace(step_m, math.inf)
         return self.ramp.pace(min(step_m, step_rad / kappa), 2.0 * PI / kappa)
+
+
+class StraightLine(Arc, frozen=True):
+    """An arc without curvature. Out of the origin theta_r = phi_r = the angle and rho_r = s."""
+
+    heading_rad: float = 0.0
+    curvature_per_m: float = 0.0
+
+
+class LineRef(RampedReference, frozen=True, kw_only=True, tag="line"):
+    """A straight line, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
+
+    With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
+    Without, it moves for the whole duration.
+    """
+
+    def trajectory(self, duration_s: float) -> StraightLine:
+        return StraightLine(
+            self.ramp(duration_s),
+            heading_rad=self.heading_deg * DEGREE,
+            start_x_m=self.start_x_cm / 100.0,
+            start_y_m=self.start_y_cm / 100.0,
+        )
 
 
 class ArcRef(RampedReference, frozen=True, kw_only=True, tag="arc"):

@@ -80,7 +80,7 @@ def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Transmissio
 def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
     passed_over: Counter[int] = Counter()
     try:
-        yield from pcapng_reader.iterate(given, given.label, passed_over)
+        yield from pcapng_reader.iterate(given.read, given.label, passed_over)
     finally:
         if passed_over:
             tell(f"{given.label}: {pcapng_reader.events_line(passed_over)}")

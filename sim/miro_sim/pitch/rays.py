@@ -17,7 +17,6 @@ from functools import lru_cache
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.lens import Lens
 
-TOP_UM = 75_000
 _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321

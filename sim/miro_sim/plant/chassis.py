@@ -34,19 +34,9 @@ class Body:
         "theta_rad": ("d", -0.5e6, 0.5e6),  # `dmath` takes a million
     }
     NOT_STATE: tuple[str, ...] = (
-        "left_m_rad",
-        "right_m_rad",
-        "track_m",
-        "friction_nm",
-        "mass_ll",
-        "mass_lr",
-        "mass_rr",
-        "inverse_ll",
-        "inverse_lr",
-        "inverse_rr",
-        "turned_left_rad",
-        "turned_right_rad",
-    )
+        "left_m_rad", "right_m_rad", "track_m", "friction_nm", "mass_ll", "mass_lr", "mass_rr", "inverse_ll",
+        "inverse_lr", "inverse_rr", "turned_left_rad", "turned_right_rad",
+    )  # fmt: skip
 
     def __init__(self, params: DriveParams, x_m: float, y_m: float, theta_rad: float) -> None:
         body = params.chassis

@@ -49,20 +49,9 @@ class Band:
 
     STATE = {"link_state": ("i", 0, NOISE), "transmitters": [Transmitter]}
     NOT_STATE = (
-        "alone",
-        "alone_until",
-        "burst_threshold",
-        "chained",
-        "change_tick",
-        "errors",
-        "known",
-        "latency",
-        "name",
-        "noise",
-        "params",
-        "seed",
-        "threshold",
-    )
+        "alone", "alone_until", "burst_threshold", "chained", "change_tick", "errors", "known", "latency",
+        "name", "noise", "params", "seed", "threshold",
+    )  # fmt: skip
 
     def __init__(self, params: Radio, seed: int, name: str) -> None:
         self.params = params

@@ -41,22 +41,9 @@ class Listener:
 
     STATE = {"link_state": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
     NOT_STATE = (
-        "burst_threshold",
-        "bursts",
-        "collision",
-        "dropouts",
-        "errors",
-        "false_start",
-        "idle",
-        "line",
-        "lost",
-        "lost_threshold",
-        "noise",
-        "noise_alone",
-        "perfect_idle",
-        "squelch",
-        "threshold",
-    )
+        "burst_threshold", "bursts", "collision", "dropouts", "errors", "false_start", "idle", "line", "lost",
+        "lost_threshold", "noise", "noise_alone", "perfect_idle", "squelch", "threshold",
+    )  # fmt: skip
 
     def __init__(self, line: Line, params: Radio, seed: int, name: str) -> None:
         self.line = line

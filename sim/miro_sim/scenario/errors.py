@@ -61,9 +61,7 @@ class Refused(BadInput):
 
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
     """What msgspec found, in the words of the file: path without `$`, and a remedy."""
-    match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
-    assert match is not None
-    what, path = match[1], match[2] or ""
+    what, path = toml_text.what_and_path(message)
     unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", what)
     if unknown:
         known = _keys_at(raw, path)

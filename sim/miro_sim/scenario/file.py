@@ -135,12 +135,9 @@ def _parsed(
     text: str, origin: str, settings: Sequence[str], also: Also, notes: list[str]
 ) -> tuple[dict[str, Any], Scenario, bool]:
     """The tables with the settings made, the scenario, and whether the text alone says all of it."""
-    try:
-        raw = _tables(text, origin)
-        whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
-        return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
-    except RecursionError:
-        raise _too_deep(origin) from None
+    raw = _tables(text, origin)
+    whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
+    return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
 
 
 def _tables(text: str, origin: str) -> dict[str, Any]:
@@ -152,14 +149,7 @@ def _tables(text: str, origin: str) -> dict[str, Any]:
 
 def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
     """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
-    try:
-        return _checked(raw, origin, settings)
-    except RecursionError:
-        raise _too_deep(origin) from None
-
-
-def _too_deep(origin: str) -> ScenarioError:
-    return ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels")
+    return _checked(raw, origin, settings)
 
 
 def _checked(
@@ -187,6 +177,8 @@ def _checked(
             if found is None:
                 raise blamed(error, made, raw) from error.__cause__
             dropped.setdefault(found[0], []).append(found[1])
+        except RecursionError:
+            raise ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels") from None
 
 
 def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:

@@ -16,18 +16,24 @@ Table = dict[str, Any]
 
 
 @cache
-def profiles() -> Mapping[str, Mapping[str, Any]]:
-    """Name -> `about` and keys of the profiles that come with the package, in the order of their file."""
-    text = Path(__file__).with_name("profiles.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+def tables_of(kind: str) -> Mapping[str, Mapping[str, Any]]:
+    """Name -> `about` and keys of the profiles or variants that come with the package, in the order of their file."""
+    return tomllib.loads(Path(__file__).with_name(f"{kind}s.toml").read_text(encoding="utf-8"))
+
+
+def named(kind: str, name: object) -> Mapping[str, Any]:
+    """What the profile or variant with this name says. Raises Refused."""
+    known = tables_of(kind)
+    if not isinstance(name, str) or name not in known:
+        raise Refused(
+            f"{name!r} is no {kind}", did_you_mean(str(name), known, f"{kind}s: {', '.join(known)}")
+        )
+    return known[name]
 
 
 def keys_of(name: str) -> Table:
     """The keys that a profile sets. Raises Refused."""
-    if name not in profiles():
-        remedy = did_you_mean(name, profiles(), f"profiles: {', '.join(profiles())}")
-        raise Refused(f"{name!r} is no profile", remedy)
-    return {key: value for key, value in profiles()[name].items() if key != "about"}
+    return {key: value for key, value in named("profile", name).items() if key != "about"}
 
 
 def with_profiles(radio: Table) -> Table:

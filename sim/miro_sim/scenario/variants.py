@@ -5,15 +5,10 @@ for: all keys that disturb are taken out of the scenario, and those of the varia
 it. In a file (`variant = "ideal"`) it is a default: keys that the file gives win.
 """
 
-import tomllib
 from collections.abc import Iterator, Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
-from miro_exact.bad_input import did_you_mean
-from miro_sim.scenario.errors import Refused
-from miro_sim.scenario.profiles import overridden
+from miro_sim.scenario.profiles import named, overridden
 
 Table = dict[str, Any]
 
@@ -30,16 +25,9 @@ DISTURBING_CHASSIS = (
 )
 
 
-@cache
-def variants() -> Mapping[str, Mapping[str, Any]]:
-    """Name -> `about` and keys of the variants, in the order of their file."""
-    text = Path(__file__).with_name("variants.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
-
-
 def impose(raw: Table, name: object) -> None:
     """Makes the tables of a scenario those of the variant, whatever they say. Raises Refused."""
-    variant = _named(name)
+    variant = named("variant", name)
     raw.pop("variant", None)
     if "camera" in variant:
         raw["camera"] = dict(variant["camera"])
@@ -64,7 +52,7 @@ def with_variant(raw: Table) -> Table:
 
     A camera of another kind, and a radio with a profile, are what the file says.
     """
-    variant = _named(raw["variant"])
+    variant = named("variant", raw["variant"])
     complete = {key: value for key, value in raw.items() if key != "variant"}
     complete["camera"] = _camera(raw.get("camera", {}), variant.get("camera", {}))
     complete["host"] = _filled(raw.get("host", {}), variant.get("host", {}))
@@ -92,13 +80,6 @@ def _camera(given: Any, default: Table) -> Any:
 
 def _filled(given: Any, default: Table) -> Any:
     return {**default, **given} if isinstance(given, dict) else given
-
-
-def _named(name: object) -> Mapping[str, Any]:
-    if not isinstance(name, str) or name not in variants():
-        remedy = did_you_mean(str(name), variants(), f"variants: {', '.join(variants())}")
-        raise Refused(f"{name!r} is no variant", remedy)
-    return variants()[name]
 
 
 def _table(value: object) -> Table:

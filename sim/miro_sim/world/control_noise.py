@@ -18,24 +18,12 @@ from miro_host.wheels import Wheels
 from miro_sim.scenario.keys import ControlNoise
 
 
-class NoisyCommands:
-    """The noise of one robot: command and number of the control period in, wheel speeds to send out."""
-
-    def __init__(self, bounds: ControlNoise, wheels: Wheels, seed: int, name: str) -> None:
-        self.bounds = bounds
-        self.wheels = wheels
-        self.stream = Stream(seed, name)
-
-    def __repr__(self) -> str:
-        return f"NoisyCommands({self.bounds!r}, {self.stream!r})"
-
-    def wheels_of(self, command: WheelCommand, period: int) -> tuple[int, int]:
-        """(left, right) in 1/256 count per sample, of a command sent in control period `period`."""
-        if self.bounds.v_m_s == 0.0 and self.bounds.w_rad_s == 0.0:
-            return command.left, command.right
-        v_m_s = command.v_m_s + self._draw(2 * period, self.bounds.v_m_s)
-        w_rad_s = command.w_rad_s + self._draw(2 * period + 1, self.bounds.w_rad_s)
-        return self.wheels.command(v_m_s, w_rad_s, command.left_factor, command.right_factor)
-
-    def _draw(self, index: int, bound: float) -> float:
-        return bound * (2.0 * self.stream.uniform(index) - 1.0)
+def noisy(
+    command: WheelCommand, bounds: ControlNoise, wheels: Wheels, draws: Stream, period: int
+) -> tuple[int, int]:
+    """(left, right) in 1/256 count per sample, of a command sent in control period `period`."""
+    if bounds.v_m_s == 0.0 and bounds.w_rad_s == 0.0:
+        return command.left, command.right
+    v_m_s = command.v_m_s + bounds.v_m_s * (2.0 * draws.uniform(2 * period) - 1.0)
+    w_rad_s = command.w_rad_s + bounds.w_rad_s * (2.0 * draws.uniform(2 * period + 1) - 1.0)
+    return wheels.command(v_m_s, w_rad_s, command.left_factor, command.right_factor)

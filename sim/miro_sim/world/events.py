@@ -138,25 +138,19 @@ class HostLog:
         if isinstance(one, Event):
             return one
         if isinstance(one, Transmission):
-            return self._sent(one)
-        return self._answer(one) if isinstance(one, Received) else self._heard(*one)
-
-    def _sent(self, sent: Transmission) -> Event:
-        good = not sent.bad_stop
-        return Event(tick=sent.tick, what="sent", network=self.network, data=sent.data, good_stop=good)
-
-    def _answer(self, answer: Received) -> Event:
+            good = not one.bad_stop
+            return Event(tick=one.tick, what="sent", network=self.network, data=one.data, good_stop=good)
+        if not isinstance(one, Received):
+            value, good, start_tick = one
+            tick = self.known_tick(start_tick)
+            return Event(tick=tick, what="heard", network=self.network, value=value, good_stop=good)
         try:
-            message: Message | None = answer.message(self.robots)
+            message: Message | None = one.message(self.robots)
         except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
             message = None
         slot = message.slot if isinstance(message, TelemetryFrame) else -1
-        tick = self.known_tick(answer.last_tick)
-        return Event(tick=tick, what="answer", network=self.network, value=slot, frame=answer)
-
-    def _heard(self, value: int, good_stop: bool, start_tick: int) -> Event:
-        tick = self.known_tick(start_tick)
-        return Event(tick=tick, what="heard", network=self.network, value=value, good_stop=good_stop)
+        tick = self.known_tick(one.last_tick)
+        return Event(tick=tick, what="answer", network=self.network, value=slot, frame=one)
 
     def cut(self, serial: int) -> None:
         """Forgets the events from `serial` on."""

@@ -17,7 +17,7 @@ cdef class Network:
     cdef readonly Station station
     cdef readonly Downlink downlink
     cdef readonly Uplink uplink
-    cdef readonly list robots, noisy_commands
+    cdef readonly list robots, draws
     cdef readonly str host
     cdef readonly long long compute_ticks, keyup_ticks
     cdef public long long frames_sent

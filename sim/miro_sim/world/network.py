@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
+from miro_exact.rng import Stream
 from miro_exact.state import TICK, Rows
 from miro_host.pilot import WheelCommand
 from miro_host.station import Station
@@ -19,11 +20,11 @@ from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.uplink import Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.world.actions import SETTLE_TICKS, Actions
-from miro_sim.world.control_noise import NoisyCommands
-from miro_sim.world.events import Event, HostLog, of_action
+from miro_sim.world.control_noise import noisy
+from miro_sim.world.events import HostLog, of_action
 from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
-from miro_sim.world.sight import PixelSight, Sight, sight_of
+from miro_sim.world.sight import Sight, sight_of
 
 LONGEST_TRANSMISSION_TICKS = 1 << 40
 """Twelve hours: no saved transmission ends later than so long after now."""
@@ -47,13 +48,10 @@ class Network:
         "actions": Actions,
         "heard": Rows(1 << 20, "B", "?", TICK),
     }
-    NOT_HASHED = (
-        "outbox",
-        "actions",
-        "heard",
-    )  # they depend on when input was announced and where the world stopped
+    NOT_HASHED = ("outbox", "actions", "heard")
+    """They depend on when input was announced and where the world stopped."""
     NOT_STATE = (
-        *("spec", "index", "host", "compute_ticks", "keyup_ticks", "noisy_commands"),
+        *("spec", "index", "host", "compute_ticks", "keyup_ticks", "draws"),
         *("sent", "seen", "log"),  # records
     )
 
@@ -75,12 +73,7 @@ class Network:
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
         ]
         self.sight: Sight = sight_of(scenario.camera, self.robots, seed)
-        self.noisy_commands = [
-            NoisyCommands(
-                spec.control_noise, robot.pilot.wheels, seed, f"net{index}/robot{robot.spec.slot}/control"
-            )
-            for robot in self.robots
-        ]
+        self.draws = [Stream(seed, f"net{index}/robot{robot.slot}/control") for robot in self.robots]
         self.station = Station(spec.robots, telemetry=spec.radio.telemetry)
         radio = spec.radio
         self.downlink = Downlink(radio, seed, f"net{index}/down")
@@ -115,15 +108,6 @@ class Network:
         self.seen = []
         for place, robot in enumerate(self.robots):
             self.seen.append(robot.record(tick, measured[place], commands[place]))
-
-    def show(self, bodies: list[Robot]) -> None:
-        """Lets this network's camera see the robots of all networks."""
-        if isinstance(self.sight, PixelSight):
-            self.sight.everyone = bodies
-
-    def share_frequency(self, other: Network) -> None:
-        """Lets the robots of this network hear the other one's transmitter too."""
-        self.downlink.overhear(other.downlink)
 
     def robot(self, slot: int) -> Robot:
         """The robot in `slot`. Raises ValueError where there is none."""
@@ -178,8 +162,8 @@ class Network:
         for place, robot in enumerate(self.robots):
             command = commands[place]
             if command is not None:
-                noise = self.noisy_commands[place]
-                wheels[robot.slot] = noise.wheels_of(command, self.sight.frame)
+                bounds, draws = self.spec.control_noise, self.draws[place]
+                wheels[robot.slot] = noisy(command, bounds, robot.pilot.wheels, draws, self.sight.frame)
         sent = Transmission(start_tick, DOWN, self.station.frame(wheels), self.index)
         self.outbox.post(sent, self.downlink.free_tick)
 
@@ -211,14 +195,6 @@ class Network:
             if isinstance(found, Received):
                 self.log.note(found)
         self.heard += heard
-
-    def note_touch(self, tick: int, one: Robot, other: Robot) -> None:
-        """Two robots on the pitch have begun to touch, `one` of this network."""
-        slot = one.spec.slot
-        touch = Event(
-            tick=tick, what="touch", network=self.index, value=slot, other=(other.network, other.spec.slot)
-        )
-        self.log.note(touch)
 
     def end_period(self) -> list[Transmission]:
         """What the host sent and what it heard in the period that is over."""

@@ -1,7 +1,6 @@
 from miro_host.pilot cimport Pilot
 from miro_robot.board cimport Board
 from miro_robot.lm629.chip cimport Lm629
-from miro_robot.lm629.trajectory cimport ProfileGenerator
 from miro_sim.plant.drive cimport DifferentialDrive
 
 cdef long long CYCLE_TICKS, GRID_TICKS

@@ -35,17 +35,10 @@ class Robot:
 
     STATE = {"board": Board, "pilot": Pilot}
     NOT_STATE = (
-        "spec",
-        "network",
-        "slot",
-        "reference",
-        "counter_addresses",
+        "spec", "network", "slot", "reference", "counter_addresses", "log", "marks", "asked",
         "drive",  # the board saves it
-        "log",
-        "marks",
-        "asked",
-        *("grid_tick", "noted"),  # where it was in the piece that runs
-    )
+        "grid_tick", "noted",  # where it was in the piece that runs
+    )  # fmt: skip
 
     def __init__(
         self, spec: sc.RobotSpec, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image

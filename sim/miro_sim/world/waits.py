@@ -141,7 +141,11 @@ class Waits:
     def _again_to(self, watch: Watch, before: _Before, mark: Mark, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""
         self.world.go_back(mark)
-        self._go_back(before)
+        self.backlog = list(before.backlog)
+        for source, serial in before.read.items():
+            self.cursors[source].next = serial
+        for robot_id, state in before.states.items():
+            self.states[robot_id].load(state)
         watch.begin_again(before.next_edge)
         self.world.run_piece(tick)
         self._gather(watch)
@@ -191,15 +195,6 @@ class Waits:
                 network, slot = robot_id
                 frame = Event(tick=event.tick, what="frame", network=network, slot=slot, frame=result)
                 self.backlog.append(((event.tick, network, slot, serial), frame))
-
-    # Going back
-
-    def _go_back(self, before: _Before) -> None:
-        self.backlog = list(before.backlog)
-        for source, serial in before.read.items():
-            self.cursors[source].next = serial
-        for key, state in before.states.items():
-            self.states[key].load(state)
 
 
 class _Before:

@@ -35,6 +35,7 @@ from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.saved import Identity, opened, sealed
+from miro_sim.world.sight import PixelSight
 from miro_sim.world.waits import Waits
 
 MOST_PERIODS = 1 << 34
@@ -68,18 +69,9 @@ class World:
         "networks": [Network],
     }
     NOT_STATE = (
-        "scenario",
-        "seed",
-        "image",
-        "periods",
-        "last",
-        "bodies",
-        "waits",
-        "observers",
-        "_state",
-        "_own",
+        "scenario", "seed", "image", "periods", "last", "bodies", "waits", "observers", "_state", "_own",
         "_opened",
-    )
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -112,9 +104,10 @@ class World:
         ]
         for one, other in permutations(self.networks, 2):
             if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
-                one.share_frequency(other)
+                one.downlink.overhear(other.downlink)
         for network in self.networks:
-            network.show(self.robots)
+            if isinstance(network.sight, PixelSight):
+                network.sight.everyone = self.robots
         self.tick = 0
         self.index = 0
         self.in_period = False
@@ -314,7 +307,9 @@ class World:
             network.hear(tick)
         if self.bodies.pairs:
             for touch_tick, one, other in self.bodies.look():
-                self.networks[one.network].note_touch(touch_tick, one, other)
+                there = (other.network, other.slot)
+                touch = Event(tick=touch_tick, what="touch", network=one.network, value=one.slot, other=there)
+                self.networks[one.network].log.note(touch)
 
     def end_period(self) -> None:
         """The records of the period that is over, and its link in the digest chain."""

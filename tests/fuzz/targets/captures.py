@@ -52,7 +52,7 @@ def _pcapng():
         found, outcome = read(data, passed_over)
         if passed_over:
             assert events_line(passed_over).isprintable()
-        assert read(BytesIO(data), Counter()) == (found, outcome), "from a pipe, it reads otherwise"
+        assert read(BytesIO(data).read, Counter()) == (found, outcome), "from a pipe, it reads otherwise"
         keep = [one for one in found if one.network <= pcapng.MAX_NETWORK]
         assert list(iterate(pcapng.render(keep), "again")) == keep, (
             "written and read again, the packets differ"

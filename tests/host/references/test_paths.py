@@ -6,9 +6,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from miro_host.references.arc import Arc, ArcRef
+from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
 from miro_host.references.interface import Paced, with_polar_form
-from miro_host.references.line import LineRef, StraightLine
 from miro_host.references.ramp import Ramp
 from miro_host.references.sine import Sine, SineRef
 from tests.naive import host_control, host_paths

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_host.theory import HALF_PI, across
 from tests.host.theory import ideal, stability
 from tests.host.theory.ideal import PRINTED, ROBOT

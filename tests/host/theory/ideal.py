@@ -17,8 +17,7 @@ from miro_host.integrator import clamp
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
-from miro_host.references.arc import Arc
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import Arc, StraightLine
 from miro_host.theory import across
 from tests.host.driving import apart
 from tests.host.theory.mechanics import ROBOT, accelerated, cartesian_rates, inertia

@@ -15,7 +15,7 @@ import msgspec
 from miro_exact.dmath import wrap_pi
 from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
 from miro_host.posture import Posture
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import StraightLine
 from miro_host.theory import across, radius
 
 NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)

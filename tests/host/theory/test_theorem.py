@@ -11,8 +11,7 @@ import pytest
 from miro_host.integrator import Limits
 from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
-from miro_host.references.arc import Arc
-from miro_host.references.line import StraightLine
+from miro_host.references.arc import Arc, StraightLine
 from tests.host.theory import stability
 from tests.host.theory.ideal import (
     LITERAL,
