@@ -100,6 +100,7 @@ def check_observable(scenario: Scenario) -> None:
 
 class RobotPort:
     """The robots at `desk.port`, in a network and for a duration as in `scenario`. `name`: of what is sent, in errors.
+    `recorder`: to be set where it is recorded.
 
     `wire`: what went out, and whole answers and the characters between them, as they came; its ticks count from the
     opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
@@ -107,14 +108,12 @@ class RobotPort:
     `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: with real-time priority.
     """
 
-    def __init__(
-        self, desk: DeskOptions, scenario: Scenario, name: str = "", recorder: Recorder | None = None
-    ) -> None:
+    def __init__(self, desk: DeskOptions, scenario: Scenario, name: str = "") -> None:
         assert desk.port is not None
         self.url = desk.port
         self.guard = Guard(desk, name)
         self.scenario = scenario
-        self.recorder = recorder
+        self.recorder: Recorder | None = None
         spec = scenario.networks[0]
         self.log = HostLog(0, lambda tick: tick, spec.robots)
         self.robots = ()  # a PC sees none from inside

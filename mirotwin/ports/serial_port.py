@@ -165,11 +165,6 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             self._note_poll(len(self._inbox))
             return len(self._inbox)
 
-    @property
-    def overruns(self) -> int:
-        """Bytes that came while 65536 waited to be read, and were dropped."""
-        return self._inbox.dropped if self.world else 0
-
     def read(self, size: int = 1) -> bytes:
         """See the head of this file. Raises SerialException once the run is over and all is read."""
         there, gap_end, found = 0, NEVER_TICK, b""

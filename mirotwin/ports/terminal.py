@@ -65,25 +65,19 @@ class PtyEndpoint(Endpoint):
             if link.is_symlink() and (ours or not link.exists()):
                 link.unlink()
             link.symlink_to(self.path)
-        except BlockingIOError:
-            os.close(self._master)
-            what, remedy = "another session serves it", "end that one, or choose another link with --pty"
-            raise BadInput(link, "", what, remedy) from None
         except OSError as error:
             os.close(self._master)
             if self._lock is not None:
-                _lock_of(link).unlink(missing_ok=True)
-            _unlock(self._lock)
+                _unlock(link, self._lock)
             what = "is there already" if isinstance(error, FileExistsError) else f"{error.strerror or error}"
             remedy = "choose another link with --pty, or replace a link to a terminal with --force"
+            if isinstance(error, BlockingIOError):
+                what, remedy = "another session serves it", "end that one, or choose another link with --pty"
             raise BadInput(link, "", what, remedy) from None
         self._link = link
 
     def receive(self) -> bytes:
-        events = 0
-        for _, found in self._poll.poll(0):
-            events |= found
-        data = b""
+        events, data = dict(self._poll.poll(0)).get(self._master, 0), b""
         if events & select.POLLIN and self.port.room:
             with suppress(BlockingIOError, OSError):
                 data = os.read(self._master, min(CHUNK_BYTES, self.port.room))
@@ -123,11 +117,10 @@ class PtyEndpoint(Endpoint):
         self._watch(leave=True)
         if self.client:
             self.has_gone("is left: the session ends")
-        if self._link is not None and self._link.is_symlink() and os.readlink(self._link) == self.path:
-            self._link.unlink()
-        if self._link is not None:
-            _lock_of(self._link).unlink(missing_ok=True)
-        _unlock(self._lock)
+        if self._link is not None and self._lock is not None:
+            if self._link.is_symlink() and os.readlink(self._link) == self.path:
+                self._link.unlink()
+            _unlock(self._link, self._lock)
         os.close(self._master)
 
     def _watch(self, leave: bool = False) -> None:
@@ -159,6 +152,6 @@ def _locked(path: Path) -> int:
         os.close(descriptor)  # the session that had it removed the file meanwhile
 
 
-def _unlock(descriptor: int | None) -> None:
-    if descriptor is not None:
-        os.close(descriptor)
+def _unlock(link: Path, descriptor: int) -> None:
+    _lock_of(link).unlink(missing_ok=True)
+    os.close(descriptor)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
@@ -43,28 +42,27 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     """Sends all that the job's hosts send to the robots at the port; the recording of it. Raises BadInput."""
     sent = _sendable(job, desk)
     folder = OutputFolder(out or _default(job.file), force, (RECORDING,), ours=out is None)
-    source = twin_source(
-        job.scenario, job.seed, job.runs_on, job.firmware if job.runs_on is job.image else b""
-    )
+    firmware = job.firmware if job.runs_on is job.image else b""
+    source = twin_source(job.scenario, job.seed, job.runs_on, firmware)
     robots = job.scenario.networks[0].robots
-    with ExitStack() as files:
-        files.enter_context(folder)
-        stream = files.enter_context(folder.part(RECORDING).open("wb"))
-        recorder = files.enter_context(Recorder(stream, source))
-        with RobotPort(desk, job.scenario, job.file, recorder) as port:
-            port.greet(sent=sent)
-            folder.keep = (RECORDING,)  # of a talk that was broken off
-            shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS
-            slots = f"{', '.join(map(str, port.slots))} of {robots}"
-            complain(
-                f"{port.url}: robot {slots} answers, {shortest:.1f} to {longest:.1f} ms after a question"
-            )
-            later = CONTROL_PERIOD_TICKS - sent[0].tick
-            when = f"{seconds(port.began_tick + later):.3f} s later than in the file"
-            complain(f"all times are {when}, which begins after the greeting")
-            due = [msgspec.structs.replace(one, tick=one.tick + later) for one in sent]
-            with ProgressBar("sending", due[-1].end_tick, quiet) as bar:
-                port.play(due, bar.to)
+    with (
+        folder,
+        folder.part(RECORDING).open("wb") as stream,
+        Recorder(stream, source) as recorder,
+        RobotPort(desk, job.scenario, job.file) as port,
+    ):
+        port.recorder = recorder
+        port.greet(sent=sent)
+        folder.keep = (RECORDING,)  # of a talk that was broken off
+        shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS
+        slots = f"{', '.join(map(str, port.slots))} of {robots}"
+        complain(f"{port.url}: robot {slots} answers, {shortest:.1f} to {longest:.1f} ms after a question")
+        later = CONTROL_PERIOD_TICKS - sent[0].tick
+        when = f"{seconds(port.began_tick + later):.3f} s later than in the file"
+        complain(f"all times are {when}, which begins after the greeting")
+        due = [msgspec.structs.replace(one, tick=one.tick + later) for one in sent]
+        with ProgressBar("sending", due[-1].end_tick, quiet) as bar:
+            port.play(due, bar.to)
     late = [ticks / TICKS_PER_MS for ticks in sorted(port.late_ticks)]
     of_99, hint = late[len(late) * 99 // 100], ""
     if of_99 > LATE_MS and not port.prompt:
