@@ -14,7 +14,7 @@ from miro_protocol.robot_rules import ACTING_TICKS, SilenceRule
 from miro_protocol.table import TICKS_PER_MS
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
-from mirotwin.verify.checks.orders import Order, Orders
+from mirotwin.verify.checks.orders import Order, OrdersMonitor
 
 ACTING_MS = ACTING_TICKS / TICKS_PER_MS
 """Firmware has dealt with a frame so long after it."""
@@ -61,7 +61,7 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
         return order.what == "off"
 
 
-class SilenceMonitor(Monitor[SilenceCheck]):
+class SilenceMonitor(OrdersMonitor[SilenceCheck]):
     """`in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
 
     `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
@@ -71,7 +71,6 @@ class SilenceMonitor(Monitor[SilenceCheck]):
 
     def __init__(self, check: SilenceCheck, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.orders = Orders()
         self.rule = SilenceRule(ms_ticks(check.after_ms), ms_ticks(check.tolerance_ms))
         self.in_time = False
         self.late: tuple[int, int] | None = None
@@ -110,7 +109,7 @@ class SilenceMonitor(Monitor[SilenceCheck]):
         self.until(tick)
         self._fail_late(tick)
         self.rule.begin(-1)
-        self.orders = Orders()
+        super().restarted(tick)
 
     def end(self, tick: int) -> None:
         self._fail_late(tick)

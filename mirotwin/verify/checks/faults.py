@@ -10,6 +10,7 @@ from typing import ClassVar
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import SIDES
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 
 
@@ -74,13 +75,13 @@ class Lm629Monitor(FaultMonitor):
 
     def __init__(self, check: FaultCheck, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.refused = (False, False)
+        self.refused = (0, 0)
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        refused = (bool(record.left.status & COMMAND_ERROR), bool(record.right.status & COMMAND_ERROR))
-        if refused == self.refused:
-            return
-        for side, now, before in zip(("left", "right"), refused, self.refused, strict=True):
-            if now and not before:
-                self.fail(tick, self.check.WANTED, f"a command error in the status of the {side} LM629")
-        self.refused = refused
+        refused = (record.left.status & COMMAND_ERROR, record.right.status & COMMAND_ERROR)
+        if refused != self.refused:
+            for side, now, before in zip(SIDES, refused, self.refused, strict=True):
+                if now > before:
+                    what = f"a command error in the status of the {side} LM629"
+                    self.fail(tick, self.check.WANTED, what)
+            self.refused = refused

@@ -1,4 +1,4 @@
-"""The orders to the wheels of a robot, as records of a moment."""
+"""The orders to the wheels of a robot, as records of a moment, and the monitors that go by them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import msgspec
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.orders import WheelOrder
 from miro_sim.world.events import SIDES, Event
+from mirotwin.verify.checks.interface import C_co, Monitor, Subject
 
 
 def saturated(word: int) -> int:
@@ -60,6 +61,14 @@ class Orders:
         """The velocities of both wheels as the radio carries them, a number that no frame holds where it cannot."""
         return self.wheels["left"].word(), self.wheels["right"].word()
 
-    def moving(self) -> list[str]:
-        """The sides whose wheel is told to turn."""
-        return [side for side in SIDES if self.last[side].moves]
+
+class OrdersMonitor(Monitor[C_co]):
+    """Knows the orders to the wheels; whoever hears of commands takes them into it."""
+
+    def __init__(self, check: C_co, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.orders = Orders()

@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from miro_exact.bad_input import amount
-from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, TeamFrame
 from miro_protocol.robot_rules import NO_WORD, DrivingRule, OriginRule
@@ -15,7 +14,7 @@ from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
-from mirotwin.verify.checks.orders import Orders, saturated
+from mirotwin.verify.checks.orders import OrdersMonitor, saturated
 
 WithinMs = Annotated[float, Meta(gt=0.0, le=60_000.0)]
 Words = tuple[int, int]
@@ -32,17 +31,16 @@ class MovesOnlyWhenFresh(Check, frozen=True, kw_only=True, tag="moves_only_when_
         return MovesMonitor(self, subject)
 
 
-class MovesMonitor(Monitor[MovesOnlyWhenFresh]):
+class MovesMonitor(OrdersMonitor[MovesOnlyWhenFresh]):
     EVENTS = ("frame", "command")
 
     def __init__(self, check: MovesOnlyWhenFresh, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.orders = Orders()
         self.rule = DrivingRule(ms_ticks(check.within_ms))
 
     def restarted(self, tick: int) -> None:
+        super().restarted(tick)
         self.rule.begin()
-        self.orders = Orders()
 
     def event(self, event: Event) -> None:
         if event.what == "frame":
@@ -75,14 +73,13 @@ class AcceptsOnlySent(Check, frozen=True, kw_only=True, tag="accepts_only_sent")
         return SentMonitor(self, subject)
 
 
-class SentMonitor(Monitor[AcceptsOnlySent]):
+class SentMonitor(OrdersMonitor[AcceptsOnlySent]):
     """`ordered_tick`: of orders that are not judged yet, because one to the other wheel may come on the same tick."""
 
     EVENTS = ("sent", "command")
 
     def __init__(self, check: AcceptsOnlySent, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.orders = Orders()
         self.decoder = Decoder(subject.robots)
         self.rule = OriginRule(ms_ticks(check.within_ms))
         self.ordered_tick: int | None = None
@@ -96,15 +93,8 @@ class SentMonitor(Monitor[AcceptsOnlySent]):
         if order is not None and order.moves:
             self.ordered_tick = event.tick
 
-    def restarted(self, tick: int) -> None:
-        self.until(tick)
-        self.orders = Orders()
-
     def _note_sent(self, event: Event) -> None:
-        symbols = [
-            (value, True, event.tick + at * HOST_CHARACTER_TICKS) for at, value in enumerate(event.data)
-        ]
-        for found in self.decoder.feed_symbols(symbols):
+        for found in self.decoder.feed(event.data, event.tick):
             words = words_of(found, self.subject) if isinstance(found, Received) else None
             if words is not None:
                 self.rule.team(found.start_tick, *words)
@@ -147,14 +137,13 @@ class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_
     AFTER_DAMAGE = True
 
 
-class ActsMonitor(Monitor[ActsCheck]):
+class ActsMonitor(OrdersMonitor[ActsCheck]):
     """`damaged`: characters that are no frame came since the last frame."""
 
     EVENTS = ("frame", "damaged", "command")
 
     def __init__(self, check: ActsCheck, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.orders = Orders()
         self.damaged = False
         self.rule = DrivingRule(ms_ticks(check.within_ms))
 
@@ -168,10 +157,9 @@ class ActsMonitor(Monitor[ActsCheck]):
             self.rule.told(*self.orders.words())
 
     def restarted(self, tick: int) -> None:
-        self.until(tick)
+        super().restarted(tick)
         self.rule.begin()
         self.damaged = False
-        self.orders = Orders()
 
     def _frame(self, event: Event) -> None:
         damaged, self.damaged = self.damaged, False

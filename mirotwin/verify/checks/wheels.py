@@ -10,7 +10,7 @@ from miro_host.wheels import Wheels
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import SIDES, Event
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
-from mirotwin.verify.checks.orders import Orders
+from mirotwin.verify.checks.orders import OrdersMonitor
 
 _NOMINAL = Wheels()
 _UNITS_OF_1616 = 256.0
@@ -32,14 +32,13 @@ class WheelsWithin(Check, frozen=True, kw_only=True, tag="wheels_within_m_s"):
         return WheelsMonitor(self, subject)
 
 
-class WheelsMonitor(Monitor[WheelsWithin]):
+class WheelsMonitor(OrdersMonitor[WheelsWithin]):
     """`faster`: the sides that were too fast at the last look."""
 
     EVENTS = ("command",)
 
     def __init__(self, check: WheelsWithin, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.orders = Orders()
         self.faster: set[str] = set()
 
     def event(self, event: Event) -> None:
@@ -55,9 +54,8 @@ class WheelsMonitor(Monitor[WheelsWithin]):
     def period(self, record: RobotPeriod, tick: int) -> None:
         self.judged += 1
         limit_m_s = self.check.limit_m_s + self.check.overshoot_m_s
-        track_m = self.subject.robot.spec.drive.chassis.track_m
-        half_m_s = 0.5 * track_m * record.w_rad_s
-        for side, speed_m_s in zip(SIDES, (record.v_m_s - half_m_s, record.v_m_s + half_m_s), strict=True):
+        wheels = Wheels(track_m=self.subject.robot.spec.drive.chassis.track_m)
+        for side, speed_m_s in zip(SIDES, wheels.split(record.v_m_s, record.w_rad_s), strict=True):
             fast = abs(speed_m_s) > limit_m_s
             if fast and side not in self.faster:
                 self.faster.add(side)
