@@ -9,12 +9,10 @@ from typing import Any
 
 import pytest
 
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.port_fixtures import desk_of
-from mirotwin.testing.port_test import run_port_test
 from mirotwin.testing.pytest_plugin import number_option, path_option
-from mirotwin.testing.test_command import TestOptions
-from mirotwin.verify.steps.running import Outcome, run_test, stem_of
+from mirotwin.testing.test_command import TestOptions, run_scenario
+from mirotwin.verify.steps.running import Outcome, stem_of
 
 
 class ScenarioFailed(Exception):
@@ -39,34 +37,33 @@ class ScenarioItem(pytest.Item):
     seed = 0
 
     def runtest(self) -> None:
-        firmware = path_option(self.config, "firmware")
-        seed = self.seed
-        file, desk = relative(self.path), desk_of(self.config)
-        again = TestOptions(
-            paths=(file,), seed=seed, firmware=None if firmware is None else str(firmware), desk=desk
-        ).command_line()
+        file, firmware = relative(self.path), path_option(self.config, "firmware")
+        options = TestOptions(
+            paths=(file,),
+            seed=self.seed,
+            firmware=None if firmware is None else str(firmware),
+            artifacts=path_option(self.config, "artifacts"),
+            desk=desk_of(self.config),
+        )
         try:
-            image = load_firmware(firmware)
+            outcome = run_scenario(options, file)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
-        artifacts = path_option(self.config, "artifacts")
-        if desk.port:
-            outcome = run_port_test(file, image, desk, (), artifacts)
-        else:
-            outcome = run_test(file, image, seed, artifacts=artifacts, again=again)
-        self._note(outcome, again)
+        self._note(outcome)
         if outcome.verdict == "not observable":
             pytest.skip("; ".join(outcome.notes))
         if outcome.verdict != "passed":
             left = [f"left in {relative(Path(outcome.left))}"] if outcome.left else []
-            raise ScenarioFailed("\n".join((*outcome.lines, *outcome.notes, f"again: {again}", *left)))
+            raise ScenarioFailed(
+                "\n".join((*outcome.lines, *outcome.notes, f"again: {outcome.again}", *left))
+            )
 
-    def _note(self, outcome: Outcome, again: str) -> None:
+    def _note(self, outcome: Outcome) -> None:
         facts = {
             "mirotwin_seed": outcome.seed,
             "mirotwin_digest": outcome.digest,
             "mirotwin_firmware_sha256": outcome.firmware_sha256,
-            "mirotwin_reproduce": again,
+            "mirotwin_reproduce": outcome.again,
         }
         self.user_properties += list(facts.items())
         if outcome.notes:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.desk.guard import DeskOptions
@@ -53,9 +54,10 @@ class CaseTests:
     def run(self, path: str) -> Outcome:
         """Runs one; a case that cannot be run is an outcome, too."""
         try:
-            return self._run_bare(path) if is_bare_case(path) else self._run(path)
+            outcome = self._run_bare(path) if is_bare_case(path) else self._run(path)
         except BadInput as error:
-            return Outcome(path, "error", (f"{error}",))
+            outcome = Outcome(path, "error", (f"{error}",))
+        return replace(outcome, again=replay_line(path, self.firmware, self.check_of(path)))
 
     def check_of(self, path: str) -> str | None:
         """The one of --check that a case names."""
@@ -159,6 +161,19 @@ class TestOptions(Options, frozen=True, kw_only=True):
         return again.command_line()
 
 
+def run_scenario(options: TestOptions, file: str) -> Outcome:
+    """Runs a scenario file as a test: in the twin, or at a port."""
+    image, again = load_firmware(options.firmware), options.line_for(file)
+    settings = (*options.settings, *as_settings(options.expected))
+    if options.desk.port:
+        from mirotwin.testing.port_test import run_port_test  # loads pyserial
+
+        outcome = run_port_test(file, image, options.desk, settings, options.artifacts)
+    else:
+        outcome = run_test(file, image, options.seed, settings, options.artifacts, again)
+    return replace(outcome, again=again)
+
+
 @command_of(TestOptions)
 def test(options: TestOptions) -> int:
     """Runs each *.scenario.toml that is named or lies below DIR: its steps, what it expects, and the checks that are
@@ -195,41 +210,26 @@ def test(options: TestOptions) -> int:
         raise BadInput(case, "--port", what, "leave it out, or send it with `mirotwin replay`")
     if junit is not None:
         check_file(junit, "--junit", *chosen)
-    settings = (*options.settings, *as_settings(options.expected))
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
-    times_s: list[float] = []
+    told: list[TestCase] = []
     cases = CaseTests(options.firmware, options.checks)
-    lines = []
     for file in chosen:
         began_s = time.perf_counter()
-        if desk.port:
-            from mirotwin.testing.port_test import run_port_test  # loads pyserial
-
-            again = options.line_for(file)
-            image = load_firmware(options.firmware)
-            outcome = run_port_test(file, image, desk, settings, options.artifacts)
-        elif file.endswith(CASE_SUFFIX):
-            outcome = cases.run(file)
-            again = replay_line(file, options.firmware, cases.check_of(file))
-        else:
-            again = options.line_for(file)
-            outcome = run_test(
-                file, load_firmware(options.firmware), options.seed, settings, options.artifacts, again
-            )
-        lines.append(again)
-        times_s.append(time.perf_counter() - began_s)
+        outcome = cases.run(file) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
+        told.append(_test_case(outcome, time.perf_counter() - began_s))
         outcomes.append(outcome)
         tell_notes(note for note in outcome.left_out if note not in left_out)
         left_out |= dict.fromkeys(outcome.left_out)
-        _show(outcome, options.quiet, again)
+        _show(outcome, options.quiet)
         if options.pages and outcome.left:
             from mirotwin.report.report_command import leave_page  # loads the pages' library
 
             with told_when_full(options.artifacts, "--artifacts"):
                 leave_page(Path(outcome.left))
     if junit is not None:
-        _write_junit(junit, outcomes, times_s, lines)
+        with whole_file(junit, "--junit") as part:
+            part.write_bytes(junit_xml("mirotwin", told))
     code = _summary(outcomes)
     if cases.unused:
         what = f"no case is judged by {sorted(cases.unused)[0]}"
@@ -237,7 +237,7 @@ def test(options: TestOptions) -> int:
     return code
 
 
-def _show(outcome: Outcome, quiet: bool, again: str) -> None:
+def _show(outcome: Outcome, quiet: bool) -> None:
     passed = outcome.verdict == "passed"
     if quiet and passed:
         return
@@ -256,7 +256,7 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
                 show_line(f"    {line}")
         show_line(f"    {report_line(outcome.left)}")
     if not passed and outcome.verdict != "error":
-        show_line(f"    {again}")
+        show_line(f"    {outcome.again}")
 
 
 def _summary(outcomes: Sequence[Outcome]) -> int:
@@ -270,24 +270,17 @@ def _summary(outcomes: Sequence[Outcome]) -> int:
     return TOLD[found[0]].code
 
 
-def _write_junit(
-    path: Path, outcomes: Sequence[Outcome], times_s: Sequence[float], again: Sequence[str]
-) -> None:
-    cases = [
-        TestCase(
-            name=stem_of(one.path),
-            classname=str(Path(one.path).parent).strip("./").replace("/", ".") or "scenario",
-            time_s=time_s,
-            verdict=TOLD[one.verdict].junit,
-            lines=(*one.lines, *one.notes),
-            properties={
-                "seed": str(one.seed),
-                "digest": one.digest,
-                "firmware_sha256": one.firmware_sha256,
-                "reproduce": line,
-            },
-        )
-        for one, time_s, line in zip(outcomes, times_s, again, strict=True)
-    ]
-    with whole_file(path, "--junit") as part:
-        part.write_bytes(junit_xml("mirotwin", cases))
+def _test_case(outcome: Outcome, time_s: float) -> TestCase:
+    return TestCase(
+        name=stem_of(outcome.path),
+        classname=str(Path(outcome.path).parent).strip("./").replace("/", ".") or "scenario",
+        time_s=time_s,
+        verdict=TOLD[outcome.verdict].junit,
+        lines=(*outcome.lines, *outcome.notes),
+        properties={
+            "seed": str(outcome.seed),
+            "digest": outcome.digest,
+            "firmware_sha256": outcome.firmware_sha256,
+            "reproduce": outcome.again,
+        },
+    )

@@ -39,7 +39,7 @@ class Outcome(msgspec.Struct, frozen=True):
 
     `error`: it could not be run. `done` of `steps`; `tick`: where the run ended. `left`: the folder with its case.
     `left_out`: what settings left out of the scenario, a line each. `unseen`: steps and expectations that
-    no port shows.
+    no port shows. `again`: the command that gives the verdict again.
     """
 
     path: str
@@ -55,6 +55,7 @@ class Outcome(msgspec.Struct, frozen=True):
     left: str = ""
     left_out: tuple[str, ...] = ()
     unseen: int = 0
+    again: str = ""
 
 
 def load_test(path: str, settings: Sequence[str] = ()) -> ScenarioText:
