@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
+from miro_sim.scenario.file import load
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import SEEN, NotObservable, RobotPort, check_observable
 from mirotwin.recording.recorder import Recorder
@@ -30,8 +31,8 @@ from mirotwin.verify.steps.keys import (
     StreamStep,
 )
 from mirotwin.verify.steps.player import Player
-from mirotwin.verify.steps.reading import steps_of
-from mirotwin.verify.steps.running import SCENARIO, Outcome, folder_of, load_test
+from mirotwin.verify.steps.reading import everything, steps_of
+from mirotwin.verify.steps.running import SCENARIO, Outcome, folder_of
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -70,7 +71,7 @@ def run_port_test(
 
 
 def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], folder: Path | None) -> Outcome:
-    text = load_test(path, settings)
+    text = load(path, settings, everything)
     check_observable(text.scenario)
     steps = steps_of(text.scenario, path)
     notes = [f"{step}: {NOTED}: {why}" for step in steps if (why := unseen(step))]

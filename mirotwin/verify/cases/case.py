@@ -39,16 +39,13 @@ from mirotwin.verify.checks.monitors import Checks
 
 
 class Trace:
-    """Of a world at tick 0 from now on. Raises ValueError for one that has moved.
+    """Of a world at tick 0 from now on. Raises ValueError for one that has moved."""
 
-    A world that loads a saved one needs a trace that knows what happened before: give it as `before`.
-    """
-
-    def __init__(self, world: World, before: tuple[ScriptItem, ...] = ()) -> None:
-        if world.tick and not before:
+    def __init__(self, world: World) -> None:
+        if world.tick:
             raise ValueError(f"the world is at tick {world.tick}: what happened before is not known")
         self.world = world
-        self._happened: list[ScriptItem] = list(before)
+        self._happened: list[ScriptItem] = []
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
@@ -62,10 +59,6 @@ class Trace:
             for network in self.world.networks:
                 found += [*network.sent, *network.actions.done]
         return tuple(sorted(found, key=lambda one: one.tick))
-
-    def close(self) -> None:
-        """Lets go of the world."""
-        self.world.observers.remove(self._look)
 
     def __repr__(self) -> str:
         return f"Trace({len(self._happened)} actions and transmissions up to tick {self.world.tick})"

@@ -13,7 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
 from miro_host.plugins import PluginError
 from miro_robot.image import Image
-from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.program import show_traceback
@@ -58,11 +58,6 @@ class Outcome(msgspec.Struct, frozen=True):
     again: str = ""
 
 
-def load_test(path: str, settings: Sequence[str] = ()) -> ScenarioText:
-    """The scenario of a file, checked with its steps. Raises ScenarioError."""
-    return load(path, settings, everything)
-
-
 def run_test(
     path: str,
     image: Image,
@@ -96,7 +91,7 @@ def run_test(
 def _run(
     path: str, image: Image, seed: int, settings: Sequence[str], folder: Path | None, again: str
 ) -> Outcome:
-    text = load_test(path, settings)
+    text = load(path, settings, everything)
     steps = steps_of(text.scenario, path)
     check_symbols(steps, image, path)
     saving = [step for step in steps if step.VERB == "save"]
