@@ -52,10 +52,10 @@ from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo
+from mirotwin.ports.pacing import Every, Pace
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.url import parse_url
 from mirotwin.recording.recorder import Recorder, source_of
-from mirotwin.rerun.pacing import Every, Pace
 from mirotwin.run.run_files import FLUSH_S
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder

@@ -10,11 +10,11 @@ from typing import Annotated
 from miro_exact.clock import ticks
 from miro_sim.scenario.file import LONGEST_S, live_scenario
 from miro_sim.world.world import World
+from mirotwin.ports.pacing import FASTEST, Pace
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import Session
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.runner import report_faults
-from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware

@@ -14,8 +14,8 @@ from selectors import BaseSelector
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
+from mirotwin.ports.pacing import Pace
 from mirotwin.report.summary import LiveFigures
-from mirotwin.rerun.pacing import Pace
 
 SLICE_S = 0.002
 LONGEST_SLICE_TICKS = ticks(0.020)

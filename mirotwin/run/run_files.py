@@ -26,12 +26,12 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
+from mirotwin.ports.pacing import Every
 from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
-from mirotwin.rerun.pacing import Every
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain

@@ -16,10 +16,10 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import live_scenario, parse
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import PortContext
+from mirotwin.ports.pacing import Pace
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.recording import reader
 from mirotwin.rerun.job import script_of
-from mirotwin.rerun.pacing import Pace
 from tests import children
 from tests.mirotwin.program import COMMAND
 
