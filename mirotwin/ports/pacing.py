@@ -60,18 +60,3 @@ class Pace:
     def sleep_until(self, tick: int) -> None:
         """Sleeps until virtual time should be at `tick`."""
         time.sleep(self.wait_s(tick))
-
-
-class Every:
-    """`due()` is true once each `wall_s` of wall time, and at the first call."""
-
-    def __init__(self, wall_s: float) -> None:
-        self.wall_s = wall_s
-        self._last_s = -wall_s
-
-    def due(self) -> bool:
-        now_s = time.monotonic()
-        if now_s - self._last_s < self.wall_s:
-            return False
-        self._last_s = now_s
-        return True

@@ -52,11 +52,10 @@ from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo
-from mirotwin.ports.pacing import Every, Pace
+from mirotwin.ports.pacing import Pace
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.url import parse_url
 from mirotwin.recording.recorder import Recorder, source_of
-from mirotwin.run.run_files import FLUSH_S
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 
@@ -362,7 +361,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 @contextmanager
 def _recorded(world: World, text: ScenarioText, folder: OutputFolder) -> Iterator[None]:
     """Records `world` up to the end of a control period."""
-    source, flush = source_of(text, world), Every(FLUSH_S)
+    source = source_of(text, world)
     with folder:
         folder.keep = KEPT
         stream = folder.part(RECORDING).open("wb", buffering=0)
@@ -370,8 +369,7 @@ def _recorded(world: World, text: ScenarioText, folder: OutputFolder) -> Iterato
 
             def write(period: Period) -> None:
                 recorder.write(period)
-                if flush.due():
-                    recorder.flush()
+                recorder.flush_if_due()
 
             world.observers.append(write)
             try:

@@ -7,6 +7,7 @@ log time is the tick in nanoseconds, rounded down.
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
@@ -34,6 +35,8 @@ FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
 RESUMED_ATTACHMENT = "resumed.world"
 """Only in a recording of a run that went on from a saved world."""
+FLUSH_S = 0.2
+"""Wall time between two flushes, which comes to half a second on a busy machine too."""
 TOGETHER = 40
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
@@ -96,6 +99,7 @@ class Recorder:
         self._schemas: dict[bytes, int] = {}
         self._named: dict[str, int] = {}
         self._waiting: list[Period | Message] = []
+        self._flushed_s = -FLUSH_S  # never
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._rows = Rows(self._writer.chunk, self._add_channel)
         self._writer.add_metadata(
@@ -143,6 +147,12 @@ class Recorder:
         with self._undisturbed:
             self._write_waiting()
             self._writer.flush()
+        self._flushed_s = time.monotonic()
+
+    def flush_if_due(self) -> None:
+        """The same, if the last time was a while ago."""
+        if time.monotonic() - self._flushed_s >= FLUSH_S:
+            self.flush()
 
     def write(self, one: Period | Message) -> None:
         """Adds everything in a control period, or a message."""

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +25,6 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.ports.pacing import Every
 from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
@@ -45,8 +43,6 @@ if TYPE_CHECKING:
 
 SUMMARY = "summary.json"
 FIGURE = "figure.svg"
-FLUSH_S = 0.2
-"""Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
 WORLD_SUFFIX = ".world"
 
 
@@ -144,7 +140,6 @@ class RunFiles:
     stops: Stops | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
     _wall_s: float = field(default=0.0, init=False)
-    _flush: Every = field(default_factory=partial(Every, FLUSH_S), init=False)
 
     def fill(self, bar: ProgressBar, title: str | None) -> Summary:
         """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
@@ -182,8 +177,7 @@ class RunFiles:
         def keep(period: Period) -> None:
             self.tracks.add(period)
             recorder.write_theories(self.tracks.theories())
-            if self._flush.due():
-                recorder.flush()
+            recorder.flush_if_due()
             bar.to(self.tracks.count)
 
         def keep_frame(view: View) -> None:
