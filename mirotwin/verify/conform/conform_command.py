@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +32,7 @@ from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.rules import ALL as EVERY_RULE
-from mirotwin.verify.conform.rules import LONG, RULES, chapter_of, find
+from mirotwin.verify.conform.rules import LONG, RULES, chapter_of, find, spans
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 
 LINES = 5
@@ -106,7 +105,7 @@ def begin_with(outcomes: Sequence[Outcome]) -> str:
 def folded(outcomes: Sequence[Outcome]) -> list[str]:
     """A line for each cause, with the rules that it hides."""
     return [
-        f"{_rules(hidden)} not judged because {id} failed: {_spans(hidden)}"
+        f"{_rules(hidden)} not judged because {id} failed: {spans(hidden)}"
         for id, hidden in hidden_by(outcomes).items()
     ]
 
@@ -122,16 +121,6 @@ def _where(cause: Outcome) -> str:
     if len(failed) == 1 and len({topology.robots for topology in topologies}) > 1:
         return f" where N = {failed.pop()}"
     return ""
-
-
-def _spans(ids: Sequence[str]) -> str:
-    """`P01 to P03, P05`, in the order of the table."""
-    places = [place for place, rule in enumerate(EVERY_RULE) if rule.id in ids]
-    spans = []
-    for _, numbered in groupby(enumerate(places), key=lambda one: one[1] - one[0]):
-        span = [EVERY_RULE[place].id for _, place in numbered]
-        spans.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
-    return ", ".join(spans)
 
 
 @command_of(ConformOptions)

@@ -33,7 +33,7 @@ from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.probe import why_lost
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.rule_monitor import ConformsTo
-from mirotwin.verify.conform.rules import presupposed
+from mirotwin.verify.conform.rules import presupposed, presupposed_first
 from mirotwin.verify.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 
 FAULTS_KEPT = 20
@@ -153,27 +153,19 @@ def try_all(
         hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
         return msgspec.structs.replace(outcome, hint=hint)
 
-    with tried_ahead(_presupposed_first(rules) if ahead else (), tried) as found:
+    with tried_ahead(presupposed_first(rules) if ahead else (), tried) as found:
         yield from in_order(rules, found)
 
 
 def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
     """Those that others presuppose first. Where one of `rules` failed that a rule presupposes, it is not `tried`."""
     causes: dict[str, str] = {}
-    for rule in _presupposed_first(rules):
+    for rule in presupposed_first(rules):
         cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")
         outcome = Outcome(rule.id, (), cause=cause) if cause else tried(rule)
         if outcome.failures or outcome.cause:
             causes[rule.id] = outcome.cause or rule.id
         yield outcome
-
-
-def _presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
-    tried = {rule.id: rule for rule in rules}
-    ordered: dict[str, Rule] = {}
-    for rule in rules:
-        ordered |= {one.id: tried[one.id] for one in (*presupposed(rule), rule) if one.id in tried}
-    return list(ordered.values())
 
 
 def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:

@@ -1,8 +1,10 @@
-"""All rules, in the order of their numbers, finding one, and what one presupposes."""
+"""All rules, in the order of their numbers, finding one, and what presupposes what."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
+from itertools import groupby
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from mirotwin.verify.conform.rule import Chapter, Rule
@@ -41,6 +43,25 @@ def presupposed(rule: Rule) -> tuple[Rule, ...]:
     for one in map(find, rule.presupposes):
         found |= {other.id: other for other in (*presupposed(one), one)}
     return tuple(found.values())
+
+
+def presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
+    """The same rules, each after those of them that it presupposes."""
+    tried = {rule.id: rule for rule in rules}
+    ordered: dict[str, Rule] = {}
+    for rule in rules:
+        ordered |= {one.id: tried[one.id] for one in (*presupposed(rule), rule) if one.id in tried}
+    return list(ordered.values())
+
+
+def spans(ids: Sequence[str]) -> str:
+    """`P01 to P03, P05`, in the order of the rules."""
+    places = [place for place, rule in enumerate(ALL) if rule.id in ids]
+    found = []
+    for _, numbered in groupby(enumerate(places), key=lambda one: one[1] - one[0]):
+        span = [ALL[place].id for _, place in numbered]
+        found.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
+    return ", ".join(found)
 
 
 def find(id: str) -> Rule:
