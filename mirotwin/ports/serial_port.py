@@ -52,8 +52,8 @@ from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import ByteFifo
-from mirotwin.ports.pacing import Pace
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
+from mirotwin.ports.session import Pace
 from mirotwin.ports.url import parse_url
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.shell.firmware_image import load_firmware

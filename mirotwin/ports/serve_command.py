@@ -10,9 +10,8 @@ from typing import Annotated
 from miro_exact.clock import ticks
 from miro_sim.scenario.file import LONGEST_S, live_scenario
 from miro_sim.world.world import World
-from mirotwin.ports.pacing import FASTEST, Pace
 from mirotwin.ports.serve_ports import PortOptions, open_ports
-from mirotwin.ports.session import Session
+from mirotwin.ports.session import FASTEST, Pace, Session
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.runner import report_faults
 from mirotwin.run.run_files import RunFiles

@@ -18,7 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
 from miro_sim.scenario.file import LONGEST_S
 from miro_sim.scenario.keys import MAX_NETWORKS
-from mirotwin.ports.pacing import FASTEST
+from mirotwin.ports.session import FASTEST
 
 SCHEME = "miro://"
 

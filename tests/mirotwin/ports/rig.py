@@ -16,8 +16,8 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import live_scenario, parse
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import PortContext
-from mirotwin.ports.pacing import Pace
 from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.session import Pace
 from mirotwin.recording import reader
 from mirotwin.rerun.job import script_of
 from tests import children
