@@ -22,7 +22,8 @@ from benchmarks.figures import Figure, figure_of, range_of_seeds
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
-from mirotwin.campaign.workers import Processes, cores
+from mirotwin.campaign.workers import Processes
+from mirotwin.shell.program import cores
 
 FIGURES = ("fig6", "fig8")
 FRAME_S = 1001 / 30000

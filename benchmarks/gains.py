@@ -42,8 +42,9 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.campaign.reproduce.claims import number as shown
 from mirotwin.campaign.reproduce.plan import STARTS, Start
-from mirotwin.campaign.workers import cores, processes
+from mirotwin.campaign.workers import processes
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
+from mirotwin.shell.program import cores
 
 SEED = 1999
 SEARCH = range(2000, 2005)

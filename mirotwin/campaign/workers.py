@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 
 from miro_exact import engine
-from mirotwin.shell.program import safe_path
+from mirotwin.shell.program import cores, safe_path
 
 
 def now_s() -> float:
@@ -51,13 +51,6 @@ def processes(count: int) -> ProcessPoolExecutor:
         for _ in range(count):  # each of which starts a process, as long as none is idle
             found.submit(_nothing)
     return found
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _begin(chosen: str) -> None:

@@ -63,9 +63,7 @@ def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list
         raise BadInput(folder, OPTION, f"{held}{more}", remedy)
     if foreign:
         names = ", ".join(foreign[:_NAMED]) + (", .." if len(foreign) > _NAMED else "")
-        files_text = (
-            "1 file that is no input" if len(foreign) == 1 else f"{len(foreign)} files that are no inputs"
-        )
+        files_text = amount(len(foreign), "file that is no input", "files that are no inputs")
         notes.append(f"{OPTION} {folder}: passed over {files_text}: {names}")
     if len(found) > MOST:
         notes.append(f"{OPTION} {folder}: {len(found)} inputs, of which the first {MOST} are taken")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -11,13 +10,14 @@ from typing import Annotated, Any, Literal, cast
 import click
 
 from miro_exact import engine as engines
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
+from mirotwin.firmware.code_place import address_of
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, Explorer, engine_for
@@ -44,7 +44,7 @@ from mirotwin.shell.options import (
     Whole,
 )
 from mirotwin.shell.options import Engine as EngineOption
-from mirotwin.shell.program import Terminated, complain
+from mirotwin.shell.program import Terminated, complain, cores
 from mirotwin.shell.times import wall_time
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
@@ -89,7 +89,9 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = ()
     covering: Annotated[
         str | None,
-        Option(metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."),
+        Option(
+            metavar="SYMBOL|ADDRESS", help="Look for an input that reaches this function, and end with it."
+        ),
     ] = None
     robots: Annotated[str, ROBOTS.saying("Slots of the network.", apart="bare")] = "3"
     slot: Annotated[int, SLOT.saying("Slot of the robot.", apart="bare")] = 0
@@ -153,21 +155,6 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = False
 
 
-def bare_spec(options: FuzzOptions, engine: Literal["compiled", "python"]) -> TargetSpec:
-    """What the processes of the engine run."""
-    parameters = {"crystal_hz": options.crystal, "boot_ms": options.boot_ms}
-    return TargetSpec(
-        board="bare",
-        image=options.image or "",
-        input=options.kind,
-        protocol=options.protocol or "",
-        check=(options.check or "") if options.check_all else "",
-        baud=options.baud or 0,
-        parameters={name: value for name, value in parameters.items() if value is not None},
-        engine=engine,
-    )
-
-
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at after a Ctrl-C."""
@@ -187,21 +174,29 @@ def fuzz(options: FuzzOptions) -> int:
 
     Exit code 1: something was found and confirmed, or --covering was not reached.
     """
-    active = cast(Literal["compiled", "python"], engines.active())
     if options.bare and options.image is None:
         raise click.UsageError("--bare needs an IMAGE.ihx.")
     firmware = load_firmware(options.image, SPACE_BYTES if options.bare else FLASH_BYTES)
-    robots, slot = int(options.robots), options.slot
-    if slot >= robots:
-        raise click.UsageError(f"--slot {slot} does not exist among {robots} robots; give 0 to {robots - 1}.")
-    if not options.bare:
-        spec = TargetSpec(
-            image=options.image or "", input=options.kind, robots=robots, slot=slot, engine=active
-        )
-        return _campaign(spec, firmware, options, None, _expected(options.expected))
+    robots = int(options.robots)
+    if options.slot >= robots:
+        what = f"--slot {options.slot} does not exist among {robots} robots"
+        raise click.UsageError(f"{what}; give 0 to {robots - 1}.")
+    parameters = {"crystal_hz": options.crystal, "boot_ms": options.boot_ms}
+    spec = TargetSpec(
+        board="bare" if options.bare else "miro",
+        image=options.image or "",
+        input=options.kind,
+        robots=robots,
+        slot=options.slot,
+        protocol=options.protocol or "",
+        check=(options.check or "") if options.check_all else "",
+        baud=options.baud or 0,
+        parameters={name: value for name, value in parameters.items() if value is not None},
+        engine=cast(Literal["compiled", "python"], engines.active()),
+    )
     check = None if options.check is None else check_named(options.check)
-    expected = {} if check is None else {check.name: True}
-    return _campaign(bare_spec(options, active), firmware, options, check, expected)
+    expected = _expected(options.expected) if check is None else {check.name: True}
+    return _campaign(spec, firmware, options, check, expected)
 
 
 def _campaign(
@@ -233,7 +228,8 @@ def _campaign(
     with folder.filled():
         failing, passing, silent = _sorted_out(target, inputs)
         engine = _engine(spec, passing, folder, options)
-        campaign = Campaign(engine, triage, expected, covering, _teller(options.quiet))
+        tell = (lambda crash: None) if options.quiet else _tell
+        campaign = Campaign(engine, triage, expected, covering, tell)
         campaign.begin_with(failing, (*passing, *silent))
         check_in_file = check.text if check is not None and check.from_file else None
         return _run(campaign, options.time_s if passing else 0.0, options.quiet, check_in_file)
@@ -244,7 +240,8 @@ def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, opti
     if not passing:
         complain("every input fails or executes no branch: there is nothing to go on from")
         return Engine()
-    engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(options.jobs), options.seed)
+    jobs = max(1, cores() - 1) if options.jobs is None else options.jobs
+    engine, notes = engine_for(spec, passing, folder, spec.make(), jobs, options.seed)
     for note in notes:
         complain(note)
     return engine
@@ -290,12 +287,9 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | No
     return code
 
 
-def _teller(quiet: bool) -> Any:
-    def tell(crash: Crash) -> None:
-        kind = "found" if crash.confirmed else "found, but not confirmed in a World"
-        complain(f"{kind}: {crash.name}: {crash.verdict}")
-
-    return (lambda crash: None) if quiet else tell
+def _tell(crash: Crash) -> None:
+    kind = "found" if crash.confirmed else "found, but not confirmed in a World"
+    complain(f"{kind}: {crash.name}: {crash.verdict}")
 
 
 def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
@@ -309,31 +303,17 @@ def _covering(symbol: str | None, image: Image) -> Covering | None:
     """Where the function begins. Raises BadInput for one that is not there."""
     if symbol is None:
         return None
-    found = image.symbols.find(symbol)
-    if found is None or found.space != "code":
-        if not image.symbols.names:
-            remedy = "put the .map or .cdb that the linker wrote beside the image"
-            raise BadInput(image.path, f"--covering {symbol}", "the image has no symbols", remedy)
-        functions = [name for name, one in image.symbols.names.items() if one.space == "code"]
-        remedy = did_you_mean(symbol, functions) or "`mirotwin fw disasm` lists the functions"
-        raise BadInput(image.path, f"--covering {symbol}", "there is no such function", remedy)
-    return Covering(symbol, found.address)
+    return Covering(symbol, address_of(symbol, image, str(image.path), f"--covering {symbol}"))
 
 
 def _check_at_rest(target: Target, image: Image) -> None:
     """Raises BadInput for firmware in which something is wrong before it has heard anything."""
     target.run(b"")
     failure = target.failure
-    harness = getattr(target, "harness", None)
-    if harness is not None and not harness.sleeps:
+    if not target.harness.sleeps:
         complain(
             f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms after its last character"
         )
     if failure is not None:
         what = f"fails before it has heard anything: {failure.check}: {failure.what}"
         raise BadInput(image.path, "", what, "mend that first: each input would find it")
-
-
-def _jobs(jobs: int | None) -> int:
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, cores - 1) if jobs is None else jobs

@@ -59,10 +59,6 @@ class Target(ABC):
     def cpu(self) -> Cpu:
         return self.harness.cpu
 
-    @property
-    def highest_sp(self) -> int:
-        return self.cpu.highest_sp
-
     def use_map(self, edges: Any) -> None:
         self.edges = edges
         self.cpu.watch_edges(memoryview(edges))
@@ -96,16 +92,20 @@ class Target(ABC):
         program = self.program
         program.read(data)
         found: list[ScriptItem] = []
-        tick = self.harness.begin_tick + LEAD_TICKS
-        first = tick
+        tick = first = self.harness.begin_tick + LEAD_TICKS
         values = bytearray()
         bad: list[int] = []
+
+        def send() -> None:
+            if values:
+                found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
+                values.clear()
+                bad.clear()
+
         for place in range(program.count):
             value, bad_stop, reset, pause = program.character(place)
             if reset or pause:
-                if values:
-                    found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
-                    values, bad = bytearray(), []
+                send()
                 if reset:
                     found += self._reset(tick)
                 tick += pause
@@ -114,8 +114,7 @@ class Target(ABC):
                 bad.append(len(values))
             values.append(value)
             tick += program.character_ticks
-        if values:
-            found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
+        send()
         if program.ends_with_reset():
             found += self._reset(tick)
         return found
@@ -143,8 +142,7 @@ class RobotTarget(Target):
     """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence. Raises BadInput
     where the firmware does not come up.
 
-    A kind of failure is the place of its name in `fast_oracle.NAMES`. `accepted`: fresh frames of the last run;
-    `highest_sp`: how high its stack grew.
+    A kind of failure is the place of its name in `fast_oracle.NAMES`. `accepted`: fresh frames of the last run.
     """
 
     def __init__(self, image: Image, input: str = "session", robots: int = 3, slot: int = 0) -> None:

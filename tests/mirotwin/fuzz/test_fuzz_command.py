@@ -115,7 +115,7 @@ def test_plain_lines_tell_how_far_it_is_until_ctrl_c_ends_it_with_what_was_found
         (["--time", "0s"], "'0s' is no time at all; give more than zero"),
         (["--jobs", "0"], "--jobs"),
         (["--slot", "3"], "--slot 3 does not exist among 3 robots; give 0 to 2."),
-        (["--covering", "motion_of"], "there is no such function; did you mean "),
+        (["--covering", "motion_of"], "no symbol motion_of in the code; did you mean "),
         (["--expect", "no_fualt"], "there is no such check; did you mean no_fault?"),
         (["--expect", "settles_within_s"], "within_s is missing"),
         (["--input", "words"], "--input"),
@@ -178,7 +178,7 @@ def test_an_image_without_symbols_can_be_fuzzed_and_has_no_functions_to_cover(mi
     bare.write_bytes(own_image().path.read_bytes())
     command = ("fuzz", bare, "--time", "0.3s", "--out", tmp_path / "out")
     err = mirotwin.ends(2, *command, "--covering", "main")
-    assert "the image has no symbols; put the .map or .cdb that the linker wrote beside the image" in err
+    assert "no symbol main in the code; put its .map or .cdb beside it, or give an address as 0x.." in err
     code, out, _ = mirotwin(*command)
     assert code == 0
     assert (tmp_path / "out" / "coverage.info.lst").exists()

@@ -77,7 +77,7 @@ for kind in ("bytes", "frames", "session"):
         target.use_map(edges)
         said = (b"", b"ab!", b"a?" if kind == "bytes" else b"b", draw.randbytes(12), draw.randbytes(30))
         for data in said:
-            run = target.run(data), target.failure, target.end_tick(), target.describe(data), target.highest_sp
+            run = target.run(data), target.failure, target.end_tick(), target.describe(data), target.cpu.highest_sp
             ram = bytes(map(target.cpu.peek_iram, range(256))).hex()
             counts = target.cpu.cycles, target.cpu.instructions
             print(kind, *run, *counts, ram, sum(place * count for place, count in enumerate(edges)))
