@@ -12,13 +12,14 @@ import bisect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from operator import attrgetter
 from pathlib import PureWindowsPath as AnyPath
 from typing import Any
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
-from miro_robot.mcs51.opcodes import BITS, LENGTH, SFRS, disassemble
+from miro_robot.mcs51.opcodes import BITS, SFRS
 from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import STEPPED, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
@@ -320,27 +321,27 @@ class Adapter:
         return Moment(self.symbols, self.timeline.cores[thread], frame)
 
     def on_scopes(self, given: Message) -> Message:
-        moment = self._moment(given["frameId"])
-        line = self.symbols.line(moment.pc)
-        scopes: list[tuple[str, str | None, Iterable[tuple[str, Shown]]]] = [
-            ("Locals", "locals", moment.locals().items())
-        ]
-        if line is not None:
-            file = AnyPath(line.file).stem
-            scopes.append((f"Statics of {file}.c", None, moment.variables(file).items()))
-        scopes.append(("Globals", "globals", moment.variables("").items()))
-        for title, names in (("Registers", _REGISTERS), ("Special function registers", SFRS)):
-            scopes.append((title, "registers", [(name, partial(moment.find, name, "")) for name in names]))
-        if moment.core.board is not None:
-            for side, chip in children(moment.find("lm629", "")):
-                scopes.append((f"LM629 {side}", None, children(chip())))
-            scopes.append(("Radio", None, self._radio()))
-        scopes.append(("Pins", None, children(moment.find("pins", ""))))
         found = []
-        for title, hint, values in scopes:
+        for title, hint, values in self._scopes(self._moment(given["frameId"])):
             kept = {"variablesReference": self._kept(values), "expensive": False}
             found.append({"name": title, "presentationHint": hint, **kept})
         return {"scopes": found}
+
+    def _scopes(self, moment: Moment) -> Iterator[tuple[str, str | None, Iterable[tuple[str, Shown]]]]:
+        """Title, hint of the protocol, and values."""
+        line = self.symbols.line(moment.pc)
+        yield "Locals", "locals", moment.locals().items()
+        if line is not None:
+            file = AnyPath(line.file).stem
+            yield f"Statics of {file}.c", None, moment.variables(file).items()
+        yield "Globals", "globals", moment.variables("").items()
+        for title, names in (("Registers", _REGISTERS), ("Special function registers", SFRS)):
+            yield title, "registers", [(name, partial(moment.find, name, "")) for name in names]
+        if moment.core.board is not None:
+            for side, chip in children(moment.find("lm629", "")):
+                yield f"LM629 {side}", None, children(chip())
+            yield "Radio", None, self._radio()
+        yield "Pins", None, children(moment.find("pins", ""))
 
     def _kept(self, values: Iterable[tuple[str, Shown]]) -> int:
         """The reference by which these are asked for until the next stop."""
@@ -408,21 +409,20 @@ class Adapter:
         return {"address": f"{begin:#x}", "data": text, "unreadableBytes": missing or None}
 
     def on_disassemble(self, given: Message) -> Message:
-        known = sorted(self.symbols.instructions)
         address = int(given["memoryReference"], 16) + (given.get("offset") or 0)
-        at = bisect.bisect_left(known, address) + (given.get("instructionOffset") or 0)
+        at = bisect.bisect_left(self.symbols.listing, address, key=attrgetter("address"))
+        at += given.get("instructionOffset") or 0
         wanted = range(at, at + min(given["instructionCount"], SIZES["code"]))
-        return {"instructions": [self._instruction(known, index) for index in wanted]}
+        return {"instructions": [self._instruction(index) for index in wanted]}
 
-    def _instruction(self, known: list[int], index: int) -> Message:
-        if not 0 <= index < len(known):
+    def _instruction(self, index: int) -> Message:
+        if not 0 <= index < len(self.symbols.listing):
             address = "0x0000" if index < 0 else "0xffff"
             return {"address": address, "instruction": "no code", "presentationHint": "invalid"}
-        symbols, at = self.symbols, known[index]
-        code = symbols.image.code
-        place = self._place(at, "location") if at in symbols.line_begins else {}
-        data, text = code[at : at + LENGTH[code[at]]].hex(" "), disassemble(code, at, symbols.names)
-        return {"address": f"{at:#06x}", "instructionBytes": data, "instruction": text, **place}
+        row = self.symbols.listing[index]
+        place = {} if row.line is None else self._place(row.address, "location")
+        data = {"instructionBytes": row.data.hex(" "), "instruction": row.text}
+        return {"address": f"{row.address:#06x}", **data, **place}
 
 
 def _inner(value: Value) -> list[tuple[str, Shown]]:

@@ -15,7 +15,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
 from miro_protocol.toml_text import TomlError, struct_of
 from miro_robot.inspect.frames import StackFrame
-from miro_robot.mcs51.opcodes import LENGTH, disassemble
+from miro_robot.mcs51.opcodes import disassemble
 from miro_sim.world.conditions import CONDITIONS
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.expression import Value, children, content, expression
@@ -231,17 +231,14 @@ class Console(Cmd):
         address = self.symbols.at(rest)[0][0] if rest else self.debugger.frames()[self.frame].pc
         line = self.symbols.line(address)
         path = None if line is None else self.symbols.sources.path(line.file)
-        rows: dict[int, str] = {}
         if line is not None and path is not None:
-            here = line.line
-            rows = dict(enumerate(path.read_text(errors="replace").splitlines(), 1))
-            rows = {at: f"{at:4}  {text}" for at, text in rows.items() if abs(at - here) <= LINES_AROUND}
+            here, rows = line.line, enumerate(path.read_text(errors="replace").splitlines(), 1)
+            shown = [(at, f"{at:4}  {text}") for at, text in rows if abs(at - here) <= LINES_AROUND]
         else:
-            here, code = self.debugger.cpu.pc, self.symbols.image.code
-            for _ in range(2 * LINES_AROUND):
-                rows[address] = f"{address:#06x}  {disassemble(code, address, self.symbols.names)}"
-                address = (address + LENGTH[code[address]]) & 0xFFFF
-        for at, text in rows.items():
+            here = self.debugger.cpu.pc
+            shown = [(row.address, f"{row.address:#06x}  {row.text}") for row in self.symbols.listing]
+            shown = [row for row in shown if row[0] >= address][: 2 * LINES_AROUND]
+        for at, text in shown:
             self.tell(f"{'=>' if at == here else '  '} {text}")
 
     def _help(self, rest: str) -> None:

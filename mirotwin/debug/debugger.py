@@ -310,7 +310,7 @@ class Debugger:
     # By line
 
     def _line_of(self, cpu: Cpu) -> _Line:
-        entry = self.symbols.entry(cpu.pc)
+        entry, _ = self.symbols.names.function(cpu.pc)
         level = cpu.peripherals.interrupts.in_service
         return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, cpu.pc == entry)
 

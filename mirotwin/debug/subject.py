@@ -85,12 +85,12 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
     symbols = Symbols(*debugged_image(run.image, images, options.sources))
-    image = symbols.image
+    image, files = symbols.image, {line.file for line in symbols.line_begins.values()}
     timeline = Timeline(run)
     debugger, said, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
     if not image.symbols.names:
         said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
-    elif not symbols.has_sources():
+    elif files and not any(map(symbols.sources.path, files)):
         said.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
         if isinstance(run, RobotRun) and run.job is not None and run.job.case.verdict:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from operator import attrgetter
 from pathlib import PureWindowsPath as AnyPath
 
@@ -16,18 +16,20 @@ from miro_robot.image.registers import RegisterVariable, parse_blocks
 from miro_robot.image.symbol_files import SourceLine, map_overlays, read_text
 from miro_robot.image.variables import Variable, variables_of
 from miro_robot.inspect.frames import StackFrame, Unwinder
+from miro_robot.inspect.listing import ListingRow, rows
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.tap import CpuTap, port_pins
 from miro_robot.inspect.values import bytes_at
 from miro_robot.inspect.writes import instructions_of
 from miro_robot.lm629.chip import Lm629
 from miro_robot.mcs51.opcodes import BITS, SFRS
-from mirotwin.debug.expression import NoValue, Value
+from mirotwin.debug.expression import NoValue, Value, content
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
 _BYTE, _BIT = CType("int", 1), CType("bit", 1)
 SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
+_MEMORIES = ("iram", "xram", "code")
 SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle", *(f"R{number}" for number in range(8)))
 _CHIP = {
     "": "desired_position desired_velocity real_position real_velocity status pwm_magnitude sign hi"
@@ -71,10 +73,6 @@ class Symbols:
             return f"{address:#06x} in {self.names.place(address)}"
         return f"{AnyPath(line.file).name}:{line.line} in {self.function(address)}"
 
-    def entry(self, address: int) -> int:
-        """Where the function of the instruction begins."""
-        return self.names.function(address)[0]
-
     def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
         """Where the code of a line begins, in each function that has some, or that of the next line that has any.
 
@@ -92,7 +90,8 @@ class Symbols:
             last = max(place.line for place, _ in own)
             raise BadInput("", what, "no line has code from there on", f"the last one is {last}")
         addresses = sorted((address for one, address in own if one.line == place.line), reverse=True)
-        return sorted({self.entry(address): address for address in addresses}.values()), place
+        firsts = {self.names.function(address)[0]: address for address in addresses}
+        return sorted(firsts.values()), place
 
     def at(self, text: str) -> tuple[list[int], SourceLine | None]:
         """What `FILE:LINE`, a symbol or an address means, and its line. Raises BadInput."""
@@ -102,19 +101,10 @@ class Symbols:
         address = address_of(text, self.image, str(self.image.path), "")
         return [address], self.line(address)
 
-    def has_sources(self) -> bool:
-        """Whether the C files of its lines, if there are any, are there."""
-        files = {line.file for line in self.line_begins.values()}
-        return not files or any(self.sources.path(file) for file in files)
-
-    # Names
-
-    def variables_in(self, scope: str) -> list[Variable]:
-        """What has a place in memory and belongs to a function or a file; "": to all. By name."""
-        every = [
-            one for _, each in sorted(self.variables.by_name.items()) for one in each if one.scope == scope
-        ]
-        return [one for one in every if scope or one.space in ("iram", "xram", "code")]
+    @cached_property
+    def listing(self) -> list[ListingRow]:
+        """The image's instructions and tables in the order of addresses."""
+        return list(rows(self.image, self.debug, self.names, self.unwinder.heights))
 
 
 class Moment:
@@ -191,8 +181,10 @@ class Moment:
         return self.variables(name) | {one.name: partial(self._in_registers, one) for one in inner_last}
 
     def variables(self, scope: str) -> dict[str, Callable[[], Value]]:
-        """Those of a function or a file that have a place in memory, or "" of all."""
-        return {one.name: partial(self.placed, one) for one in self.symbols.variables_in(scope)}
+        """Those of a function or a file that have a place in memory, or "" of all; by name."""
+        every = (one for _, each in sorted(self.symbols.variables.by_name.items()) for one in each)
+        own = (one for one in every if one.scope == scope)
+        return {one.name: partial(self.placed, one) for one in own if scope or one.space in _MEMORIES}
 
     def _in_registers(self, one: RegisterVariable) -> Value:
         why = ""
@@ -204,16 +196,11 @@ class Moment:
             why = "its registers belong to the function that is called"
         if why:
             raise NoValue(f"{one.name} is not live: {why}")
-        data = bytes(self._register(name) for name in one.registers)
+        registers = [self._special(name.upper()) for name in one.registers]
+        data = bytes(content(register) for register in registers if register is not None)
         number = int.from_bytes(data, "little", signed=one.type.signed and one.type.kind == "int")
         where = " ".join(one.registers[::-1]).upper()
         return Value(one.type, number=number, note=f"in {where}: theirs only while the compiler needs it")
-
-    def _register(self, name: str) -> int:
-        cpu = self.core.cpu
-        if name[1:].isdecimal():
-            return cpu.peek_iram(cpu.bank + int(name[1]))
-        return cpu.sfr(SFRS["ACC" if name == "a" else name.upper()])
 
     def _special(self, name: str) -> Value | None:
         """A register, a bit, a memory, the chips."""

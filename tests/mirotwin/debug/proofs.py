@@ -66,23 +66,26 @@ def wrong_writers(begin_tick, end_tick, count, seed=0):
     debugger = debugger_of(robot_run())
     stack = debugger.symbols.image.symbols.stack[0]
     writes = written_bytes(robot_run(), begin_tick, end_tick, 0x20, stack)
-    known = debugger.symbols.variables_in("")
-    variables = [one for one in known if one.space == "iram" and one.address >= 0x20]
+    known = [(name, get()) for name, get in debugger.moment().variables("").items()]
+    variables = [
+        (name, range(one.address, one.address + one.kind.size))
+        for name, one in known
+        if one.space == "iram" and one.address >= 0x20
+    ]
     ever = set().union(*(written for _, written in writes))
-    often = [one for one in variables if not ever.isdisjoint(range(one.address, one.address + one.type.size))]
+    often = [one for one in variables if not ever.isdisjoint(one[1])]
     chance, wrong, asked = random.Random(seed), [], 0
     for _ in range(count):
-        variable = chance.choice(chance.choice((often, often, variables)))
+        name, places = chance.choice(chance.choice((often, often, variables)))
         at = chance.randrange(1, len(writes))
-        places = range(variable.address, variable.address + variable.type.size)
         before = [cycle for cycle, written in writes[:at] if not written.isdisjoint(places)]
         debugger.timeline.go_to(writes[at][0] * CYCLE_TICKS)
-        found = debugger.last_writer(debugger.bytes_of(variable.name))
+        found = debugger.last_writer(debugger.bytes_of(name))
         assert debugger.cpu.cycles == writes[at][0]
         cycle = None if found is None else found[0] // CYCLE_TICKS
         asked += bool(before)
         if (before and cycle != before[-1]) or (not before and cycle is not None and cycle >= writes[0][0]):
-            wrong.append((variable.name, writes[at][0], cycle))
+            wrong.append((name, writes[at][0], cycle))
     return wrong, asked
 
 
