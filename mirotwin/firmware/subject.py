@@ -12,13 +12,7 @@ from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.errors import use_one_of
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
-from mirotwin.firmware.bare_options import (
-    BareOptions,
-    load_bare_image,
-    make_machine,
-    report,
-    target_of,
-)
+from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_machine, report, target_of
 from mirotwin.recording.runner import report_faults
 from mirotwin.rerun.inspected_run import BareRun, RobotRun, Run, watch
 from mirotwin.rerun.job import load_job

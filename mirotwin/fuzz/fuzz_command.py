@@ -32,17 +32,7 @@ from mirotwin.recording.decode_command import ROBOTS
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import (
-    FORCE,
-    JOBS,
-    NAME,
-    OUT,
-    PATH,
-    QUIET,
-    SEED,
-    SLOT,
-    Whole,
-)
+from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
 from mirotwin.shell.program import Terminated, complain, cores
 from mirotwin.shell.times import wall_time

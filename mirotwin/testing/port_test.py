@@ -21,15 +21,7 @@ from mirotwin.recording.recorder import Recorder
 from mirotwin.replay.replay_port import twin_source
 from mirotwin.shell.outputs import RECORDING, whole_file
 from mirotwin.verify.cases.artifacts import clear
-from mirotwin.verify.steps.keys import (
-    CheckStep,
-    ConditionStep,
-    PauseStep,
-    SaveStep,
-    Send,
-    Step,
-    StreamStep,
-)
+from mirotwin.verify.steps.keys import CheckStep, ConditionStep, PauseStep, SaveStep, Send, Step, StreamStep
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import everything, steps_of
 from mirotwin.verify.steps.running import SCENARIO, Outcome, folder_of

@@ -21,15 +21,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording import channels, reader
-from mirotwin.recording.channels import (
-    IMAGE,
-    PERIOD,
-    FaultMessage,
-    ImageMessage,
-    Topic,
-    topic_name,
-    topic_of,
-)
+from mirotwin.recording.channels import IMAGE, PERIOD, FaultMessage, ImageMessage, Topic, topic_name, topic_of
 from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA

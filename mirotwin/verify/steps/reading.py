@@ -19,16 +19,7 @@ from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table, expectations_of
 from mirotwin.verify.checks.interface import in_ms, ms_ticks
-from mirotwin.verify.steps.keys import (
-    LOOKING,
-    PLAIN,
-    SENDS,
-    VERBS,
-    CheckStep,
-    SaveStep,
-    SilenceStep,
-    Step,
-)
+from mirotwin.verify.steps.keys import LOOKING, PLAIN, SENDS, VERBS, CheckStep, SaveStep, SilenceStep, Step
 
 S = TypeVar("S", bound=msgspec.Struct)
 _NO_KEYS = ("number", "checks", "verb", "condition")
