@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from miro_exact.bad_input import BadInput
+from miro_exact.state import restore, snapshot
 from miro_protocol.actions import Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.bare.machine import BareMachine
@@ -131,6 +132,17 @@ def test_a_reset_starts_the_firmware_anew(tmp_path):
     run = BarePlayback(image(SLEEPS), line, said, 200_000).play()
     assert run.processor.exchange().sent_bytes == b"ab"
     assert run.idle
+
+
+def test_a_processor_that_is_put_back_to_before_its_fault_has_none():
+    line = BareTarget(image(SLEEPS), "bytes").line
+    run = BarePlayback(image(SLEEPS), line, [Transmission(50_000, DOWN, b"!")], 200_000)
+    run.to(40_000)
+    before = snapshot(run.processor)
+    assert run.play().processor.fault()
+    restore(run.processor, before)
+    run.put_back()
+    assert run.processor.fault() is None
 
 
 def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pin():
