@@ -17,6 +17,21 @@ import sys
 from miro_exact.domain import DomainError
 from miro_exact.fields import ITEMS, MEMORY, NUMBER, OCTETS, ROW
 
+
+cdef struct Place:
+    char *at  # of the field inside its part
+    Py_ssize_t size  # bytes of one item
+    Py_ssize_t count  # items; of a queue: for how many it has room
+    char code  # as in Python's `struct`
+    bint bounded  # whether an item may be out of range
+    long long low
+    long long high
+    double least
+    double most
+    char *end  # of a queue: the field with its length, else NULL
+    Py_ssize_t end_size
+
+
 cdef bint LITTLE = sys.byteorder == "little"
 
 
@@ -61,6 +76,10 @@ cdef class Layout:
     `low` and `high` are None where every value of the type will do; `end` is None, or (address, size).
     """
 
+    cdef Place *places  # their addresses count from the start of a part
+    cdef Py_ssize_t number
+    cdef tuple names
+
     def __cinit__(self, part, list fields):
         cdef Place *place
         cdef size_t begin = <size_t><void *>part
@@ -92,6 +111,17 @@ cdef class Layout:
 
 cdef class Memory:
     """Fields in their order, of groups: each is (part, what stands before the names of its fields, layout)."""
+
+    cdef Place *places
+    cdef Py_ssize_t number
+    cdef Place *spans  # what is copied in one go: fields that are neighbours
+    cdef Py_ssize_t span_count
+    cdef Py_ssize_t *looked_at  # before packing: the places that are queues or may hold NaN
+    cdef Py_ssize_t looked_at_count
+    cdef Py_ssize_t fixed  # bytes of all that are no queues
+    cdef list groups  # they hold the parts
+    cdef bytes data
+    cdef Py_ssize_t begin
 
     def __cinit__(self, list groups):
         cdef Layout layout
@@ -284,6 +314,11 @@ cdef class Attributes:
     are those of the cells, a number that is no array has 0 items. A Memory is the part of a field of shape MEMORY,
     which has no name. `slow` packs the same fields, and says what is wrong with one: where a value is odd, it is asked.
     """
+
+    cdef list fields
+    cdef object slow
+    cdef char *buffer
+    cdef Py_ssize_t used, capacity
 
     def __cinit__(self, list fields, slow):
         self.fields = fields

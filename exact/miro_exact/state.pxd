@@ -1,4 +1,4 @@
 # C layout of miro_exact.state.
 
 cdef class One:
-    cdef readonly object field, part, name, kind, fields, value, sibling
+    cdef readonly object field, part, name, kind, value, sibling
