@@ -44,7 +44,6 @@ cdef class FastOracle(LiveOracle):
     cdef bint _stops_already(self) except -1
     cdef bint _read_pair(self) noexcept
     cdef int _word(self, int place) noexcept
+    @cython.locals(moved=bint, driven=bint)
     cdef int _command(self, long long tick, int code, bytes data) except -1
-    cdef int _order(self, long long tick, WheelOrder order, bint moved, bint driven) except -1
     cdef int _sent(self, long long tick, int value) except -1
-    cdef int _answer(self, long long tick) except -1

@@ -91,26 +91,19 @@ class FastOracle(LiveOracle):
         self.answers = AnswerRule()
         self.stop = SilenceRule(FAILSAFE_STOP_TICKS)
         self.off = SilenceRule(FAILSAFE_OFF_TICKS)
-        self.read = 0  # serial number of the next event
-        self.decided = 1  # 0: it cannot be said any more what the robot must do
-        self.up_tick = -1  # until when firmware that was reset may take to come up
-        self.fresh_tick = -1  # of the last fresh frame
         self.fresh_seq = 0
-        self.pc = 0
-        self.accepted = 0
-        self.told_tick = -1  # of an order to move whose pair is not judged yet
         self.left = 0  # the velocities of the last valid team frame
         self.right = 0
+        self.begin(0)
 
     def begin(self, tick: int) -> None:
-        self.code = 0
-        self.tick = 0
+        LiveOracle.begin(self, tick)
         self.pc = 0
         self.accepted = 0
-        self.read = self.log.end
+        self.read = self.log.end  # serial number of the next event
         self.freshness.accepted = 0
-        self.decided = 1
-        self.up_tick = -1
+        self.decided = 1  # 0: it cannot be said any more what the robot must do
+        self.up_tick = -1  # until when firmware that was reset may take to come up
         self._forget()
         self.origin.begin()
 
@@ -119,8 +112,8 @@ class FastOracle(LiveOracle):
         self.window.begin()
         self.telemetry.begin()
         self.freshness.last_seq = None
-        self.fresh_tick = -1
-        self.told_tick = -1
+        self.fresh_tick = -1  # of the last fresh frame
+        self.told_tick = -1  # of an order to move whose pair is not judged yet
         self.left_order.begin()
         self.right_order.begin()
         self.driving.begin()
@@ -263,30 +256,24 @@ class FastOracle(LiveOracle):
         order = self.right_order if code >> 8 & 1 else self.left_order
         moved, driven = order.moves(), order.what != "off"
         if order.take(code & 0xFF, data):
-            self._order(tick, order, moved, driven)
-
-    def _order(self, tick: int, order: WheelOrder, moved: bool, driven: bool) -> None:
-        """A wheel is told something. `moved`, `driven`: whether it was told to turn, or to keep its loop closed."""
-        if order.moves():
-            self.told_tick = tick
-            if not self.driving.may_move(tick):
-                self._found(_MOVES, tick)
-        elif moved and self.stop.is_early(tick):
-            self._found(_STOPS, tick)
-        if driven and order.what == "off" and self.off.is_early(tick):
-            self._found(_OFF, tick)
-        self.driving.told(self.left_order.word(), self.right_order.word())
+            if order.moves():
+                self.told_tick = tick
+                if not self.driving.may_move(tick):
+                    self._found(_MOVES, tick)
+            elif moved and self.stop.is_early(tick):
+                self._found(_STOPS, tick)
+            if driven and order.what == "off" and self.off.is_early(tick):
+                self._found(_OFF, tick)
+            self.driving.told(self.left_order.word(), self.right_order.word())
 
     def _sent(self, tick: int, value: int) -> None:
         if not self.answers.character():
             self._found(_IN_TURN, tick)
         elif self.telemetry.take(value, False, tick - TO_TI_TICKS):
-            self._answer(tick - TO_TI_TICKS)
-
-    def _answer(self, tick: int) -> None:
-        seq = self.telemetry.body_at(0) % SEQ_MODULUS
-        slot = self.telemetry.body_at(1) & SLOT_MASK
-        if not self.answers.in_turn(seq) or slot != self.slot:
-            self._found(_IN_TURN, tick)
-        if self.answers.late(tick, seq):
-            self._found(_ANSWERS, tick)
+            tick -= TO_TI_TICKS
+            seq = self.telemetry.body_at(0) % SEQ_MODULUS
+            slot = self.telemetry.body_at(1) & SLOT_MASK
+            if not self.answers.in_turn(seq) or slot != self.slot:
+                self._found(_IN_TURN, tick)
+            if self.answers.late(tick, seq):
+                self._found(_ANSWERS, tick)

@@ -97,9 +97,6 @@ class Program:
         self.characters = bytearray(2048)
         self.flaws = bytearray(2048)  # bad stop bit; reset before it
         self.pauses = [0] * 2048
-        self.count = 0
-        self.frames = 0  # how many frames were sealed
-        self.length = 0  # ticks from the begin to the end of the last character, without waiting at the end
         self._frame = bytearray(64)  # the next one of our own
         self._head = len(form.lead + form.sync)  # where HDR stands in it
         for place, value in enumerate(form.lead + form.sync):
@@ -107,25 +104,15 @@ class Program:
         self._payload = form.payload_size
         self._layout = crc.register(bytes([form.layout]))
         self._table = crc.byte_table()
-        self._data: bytes | bytearray | memoryview = b""
-        self._place = 0
-        self._end = 0
-        self._seq = 0
         self._first = 0  # where the last frame begins
-        self._size = 0
-        self._damage_at = -1
         self._damage = 0
-        self._cut = -1
-        self._stop_at = -1
-        self.trailing_ticks = 0
-        self._flags = 0
-        self._resets = 0
+        self.read(b"")
 
     def read(self, data: bytes | bytearray | memoryview) -> int:
         """Any bytes at all; what is too much is left out. Returns how many characters there are."""
         self.count = 0
-        self.frames = 0
-        self.length = 0
+        self.frames = 0  # how many frames were sealed
+        self.length = 0  # ticks from the begin to the end of the last character, without waiting at the end
         self._data = data
         self._place = 0
         self._end = len(data)
