@@ -53,10 +53,8 @@ cdef class CpuTap(Watcher):
     cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
     cpdef slept(self, Cpu cpu, long long start, long long end)
     cpdef ran(self, Cpu cpu, long long start)
-    cdef int _begin(self, Cpu cpu) except -1
     cdef int _look(self, Cpu cpu) except -1
     cdef int _leave(self, long long tick, int high, int level) except -1
-    cdef int _leave_unseen(self, long long tick) except -1
     cdef int _take_outputs(self, Cpu cpu) except -1
     cdef int _take_line(self, int place, Line line, long long until_tick) except -1
     cdef inline int _see(self, long long tick, int place, int level) except -1

@@ -104,19 +104,15 @@ class BoardTap(Probe):
         board = self.board
         self._see(tick, _DATA, board.bank[board.data_bank] & board.bus_levels)
         pins = board._pins()
-        pin = 0
-        while pin < _CHIP_PINS:
+        for pin in range(_CHIP_PINS):
             self._see(tick, _SIDE + _CS + pin, pins >> pin & 1)
             self._see(tick, _SIDE + _PER_SIDE + _CS + pin, pins >> (_CHIP_PINS + pin) & 1)
-            pin += 1
 
     def _look(self, tick: int) -> None:
         """What chips put out by themselves, and the CPU's pins that follow."""
         board = self.board
-        port = 0
-        while port < 4:
+        for port in range(4):
             self._see(tick, _OUTSIDE + port, board.external[port])
-            port += 1
         self._look_at_chip(tick, 0)
         self._look_at_chip(tick, 1)
 
@@ -177,9 +173,6 @@ class CpuTap(Watcher):
         if self.board_tap is not None:
             self.board_tap.detach()
 
-    def attached(self, cpu: Cpu) -> None:
-        self._begin(cpu)
-
     def starting(self, cpu: Cpu) -> None:
         self._take_line(_RXD, cpu.rxd, cpu.rxd.settled_tick)
         self._look(cpu)
@@ -205,7 +198,7 @@ class CpuTap(Watcher):
         self.cycles = cpu.cycles
         self.told()
 
-    def _begin(self, cpu: Cpu) -> None:
+    def attached(self, cpu: Cpu) -> None:
         """Takes the levels of now."""
         self.begin_tick = _TICKS * cpu.cycles
         self.cycles = cpu.cycles
@@ -234,30 +227,22 @@ class CpuTap(Watcher):
     def _look(self, cpu: Cpu) -> None:
         """What an instruction may have changed: with effect from the next cycle."""
         tick = _TICKS * cpu.cycles
-        port = 0
-        while port < 4:
+        for port in range(4):
             self._see(tick, _LATCH + port, cpu.peripherals.ports.latches[port])
-            port += 1
         self._see(tick, _ASLEEP, 1 if cpu.idle or cpu.powered_down else 0)
         in_service = cpu.peripherals.interrupts.in_service
         if in_service & 1 != self.levels[_IN_SERVICE] or in_service >> 1 != self.levels[_IN_SERVICE + 1]:
             self._leave(tick, 0, in_service & 1)
             self._leave(tick, 1, in_service >> 1)
             if not in_service:
-                self._leave_unseen(tick)
+                for source in range(6):  # none is, seen to begin or not
+                    self._see(tick, _ROUTINE + source, 0)
 
     def _leave(self, tick: int, high: int, level: int) -> None:
         self._see(tick, _IN_SERVICE + high, level)
         if not level and self.routine[high] >= 0:
             self._see(tick, _ROUTINE + self.routine[high], 0)
             self.routine[high] = -1
-
-    def _leave_unseen(self, tick: int) -> None:
-        """None is in service any more, seen to begin or not."""
-        source = 0
-        while source < 6:
-            self._see(tick, _ROUTINE + source, 0)
-            source += 1
 
     def _take_outputs(self, cpu: Cpu) -> None:
         """Those that are known: a line without a listener keeps some thousand edges. The end of a run settles it."""

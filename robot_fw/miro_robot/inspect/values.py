@@ -8,9 +8,10 @@ from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_robot.image.c_types import bytes_of, value_of
 from miro_robot.image.variables import Variable, find_variable
+from miro_robot.inspect.writes import cpu_bit
 from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.opcodes import byte_of_bit
 
-_BITS_OF_IRAM = 0x20  # where the bit addresses below 80h begin
 _FIRST_SFR = 0x80
 
 
@@ -36,7 +37,7 @@ def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = ""
     except ValueError as error:
         raise BadInput(image.path, name, str(error)) from None
     if variable.space == "bit" and variable.address < _FIRST_SFR:
-        at, mask = _bit(variable.address)
+        at, mask = byte_of_bit(variable.address), 1 << (variable.address & 7)
         cpu.poke_iram(at, cpu.peek_iram(at) & ~mask | (mask if data[0] & 1 else 0))
     elif variable.space == "iram":
         for offset, byte in enumerate(data):
@@ -51,9 +52,7 @@ def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
     """As many bytes as the type has, from the place where the variable lies."""
     space, address = variable.space, variable.address
     if space == "bit":
-        at, mask = _bit(address)
-        byte = cpu.peek_iram(at) if address < _FIRST_SFR else cpu.sfr(at)
-        return bytes([1 if byte & mask else 0])
+        return bytes([cpu_bit(cpu, address)])
     places = range(address, address + variable.type.size)
     if space == "code":
         return bytes(cpu.code_at(place) for place in places)
@@ -62,10 +61,3 @@ def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
     if space == "sfr" and address >= _FIRST_SFR and places.stop <= 0x100:
         return bytes(cpu.sfr(place) for place in places)
     raise BadInput(image.path, variable.name, f"is in {space}: the board has no such memory")
-
-
-def _bit(address: int) -> tuple[int, int]:
-    """(byte, mask) of a bit address: below 80h in internal RAM from 20h on, above in a register."""
-    if address < _FIRST_SFR:
-        return _BITS_OF_IRAM + (address >> 3), 1 << (address & 7)
-    return address & 0xF8, 1 << (address & 7)

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
+from miro_robot.mcs51.opcodes import LENGTH, ROW, byte_of_bit, is_call
 
 _DIRECT = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x86, 0x88, 0xC5, 0xD0, 0xD5, 0xF5}  # rows
 _BIT = {0x10, 0x92, 0xB2, 0xC2, 0xD2}
 _REGISTER = {0x08, 0x18, 0x78, 0xA8, 0xC8, 0xD8, 0xF8}
 _INDIRECT = {0x06, 0x16, 0x76, 0xA6, 0xC6, 0xD6, 0xF6}
 _MOV_DIRECT, _PUSH, _MOVX_DPTR, _MOVX_PAGE, _JBC = 0x85, 0xC0, 0xF0, 0xF2, 0x10
-_BANKS, _FIRST_SFR, _BITS_OF_IRAM, _P2 = 0x20, 0x80, 0x20, 0xA0
+_BANKS, _FIRST_SFR, _P2 = 0x20, 0x80, 0xA0
 
 
 class Bytes:
@@ -74,14 +74,14 @@ def _direct(row: int, first: int, second: int) -> int:
     if row == _MOV_DIRECT:
         return second
     if row in _BIT:
-        return first & 0xF8 if first >= _FIRST_SFR else _BITS_OF_IRAM + (first >> 3)
+        return byte_of_bit(first)
     return first if row in _DIRECT else -1
 
 
 def cpu_bit(cpu: Cpu, bit: int) -> int:
     """The bit at a bit address, of a port its latch."""
-    byte = cpu.sfr(bit & 0xF8) if bit >= _FIRST_SFR else cpu.peek_iram(_BITS_OF_IRAM + (bit >> 3))
-    return byte >> (bit & 7) & 1
+    address = byte_of_bit(bit)
+    return (cpu.sfr(address) if bit >= _FIRST_SFR else cpu.peek_iram(address)) >> (bit & 7) & 1
 
 
 def instructions_of(code: bytes, used: Iterable[tuple[int, int]], known: Iterable[int]) -> set[int]:

@@ -28,6 +28,11 @@ INTERRUPTS = ("INT0", "timer 0", "INT1", "timer 1", "serial", "timer 2")
 """The six sources in polling order; the vector of number n is at 8 n + 3."""
 
 
+def byte_of_bit(bit: int) -> int:
+    """The direct address of the byte that a bit address lies in."""
+    return bit & 0xF8 if bit & 0x80 else 0x20 + (bit >> 3)
+
+
 class Names:
     """Operands as the data sheet writes numbers."""
 
@@ -41,8 +46,7 @@ class Names:
 
     def bit(self, bit: int) -> str:
         """A bit address (0..FFh)."""
-        byte = bit & 0xF8 if bit & 0x80 else 0x20 + (bit >> 3)
-        return f"{self.direct(byte)}.{bit & 7}"
+        return f"{self.direct(byte_of_bit(bit))}.{bit & 7}"
 
 
 NUMBERS = Names()
