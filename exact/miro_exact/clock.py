@@ -2,7 +2,6 @@
 
 Every other module counts in ticks (`int`) and takes its periods from here or from its own data sheet; seconds
 and nanoseconds appear only where people read or write them (scenario files, recordings, figures).
-What does not belong here: the scheduler, real-time pacing, and any wall clock.
 """
 
 from __future__ import annotations

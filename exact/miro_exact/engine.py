@@ -3,7 +3,6 @@
 A hot module is an `x.py` with an `x.pxd` beside it (`hot_modules`). Both twins give the same bits; this file decides
 which of them an import gets, keeps the two from being mixed, and refuses a compiled module whose source has changed. An
 `x.pyx` has no twin: the compiled engine alone uses it.
-Nothing about frames, chips or physics belongs here; it lives in the lowest package because all the others need it.
 
 Every process that imports a package of ours loads this file, `mirotwin --help` too: it imports little, and looks at a
 module when it is imported instead of listing all of them before.

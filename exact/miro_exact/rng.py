@@ -2,8 +2,7 @@
 
 A draw depends on (master seed, stream name, kind of draw, index) and on nothing else. So drawing one stream
 never shifts another, a switched-off noise source leaves the others alone, any part of a run can be
-evaluated by itself, and there is no generator state to save. What does not belong here: what the numbers
-are used for.
+evaluated by itself, and there is no generator state to save.
 
 Layout of a Philox block (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
 

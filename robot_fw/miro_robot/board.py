@@ -353,12 +353,10 @@ class Board(Bus):
             self._set_pins(3, self.bank[3] & (0xFF ^ _WR), start + _STROBE)
             self.bank[3] |= _WR
             changed = True
-        index = 0
-        while index < self.latches:
+        for index in range(self.latches):
             if address & self.latch_mask[index] == self.latch_address[index]:
                 changed = changed or self.bank[PORTS + index] != value
                 self.bank[PORTS + index] = value
-            index += 1
         if changed:
             self.sync(tick)
             self._drive_chips(tick)
@@ -376,10 +374,8 @@ class Board(Bus):
             self._put_address(address, start)
             self._set_pins(3, self.bank[3] & (0xFF ^ _RD), start + _STROBE)
         heard = self.data_bank == 0
-        index = 0
-        while index < self.buffers:
+        for index in range(self.buffers):
             heard = heard or address & self.buffer_mask[index] == self.buffer_address[index]
-            index += 1
         value = self.bank[self.data_bank] & self.bus_levels if heard else 0xFF
         if self.on_movx_bus:
             if heard:
@@ -397,11 +393,9 @@ class Board(Bus):
     def _pins(self) -> int:
         """Levels at the inputs of both LM629, bit per pin."""
         pins = 0
-        index = 0
-        while index < self.pin_banks:
+        for index in range(self.pin_banks):
             bank = self.pin_bank[index]
             pins |= self.pin_levels[256 * bank + self.bank[bank]]
-            index += 1
         return pins
 
     def _strobes(self, pins: int) -> int:

@@ -9,10 +9,6 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 
-LEFT = 0
-RIGHT = 1
-_MORE: tuple[str, ...] = ()  # what a subclass adds
-
 
 class Plant:
     """Two motors with encoders, driven by two halves of an L298 and read by two LM629.
@@ -24,7 +20,7 @@ class Plant:
     """
 
     STATE: dict[str, object] = {"next_tick": TICK}
-    NOT_STATE = ("left", "right", *_MORE)
+    NOT_STATE: tuple[str, ...] = ("left", "right")
 
     def __init__(self) -> None:
         self.left: Lm629 | None = None

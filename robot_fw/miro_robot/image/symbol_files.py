@@ -69,9 +69,7 @@ class CdbFile(msgspec.Struct, frozen=True, eq=False):
 
 
 class ListedCode(msgspec.Struct, frozen=True):
-    """Bytes in a listing. `line`: the C line named above them; `timed`: an instruction,
-    which has a number of clocks.
-    """
+    """Bytes in a listing. `line`: the C line named above them; `timed`: an instruction, with a number of clocks."""
 
     number: int
     address: int

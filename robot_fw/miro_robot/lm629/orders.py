@@ -60,9 +60,7 @@ class WheelOrder:
         return self.velocity != 0
 
     def word(self) -> int:
-        """The velocity as the radio carries it, in 1/256 count per sample; 2^30, which no frame holds, where it is no
-        such number.
-        """
+        """The velocity as the radio carries it, in 1/256 count per sample, or 2^30, which no frame holds."""
         return _NO_WORD if self.velocity & 0xFF else self.velocity >> 8
 
     def _start(self) -> None:

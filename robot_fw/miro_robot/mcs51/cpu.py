@@ -91,24 +91,19 @@ class Cpu(Executor):
         self.peripherals = Peripherals(self.bus)
         self.rxd = self.peripherals.uart.rxd
         self.txd = self.peripherals.uart.txd
-        self.pcon = 0
-        self.idle = 0
-        self.powered_down = 0
         self.next_event = 0
-        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
         self.next_mark = NEVER_TICK
         self.marks = 0  # marks passed since interrupts took over
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
         self.inspector: CpuInspector | None = None
         self._erase()
+        self.reset()
 
     # Image
 
     def load(self, image: bytes, used: tuple[tuple[int, int], ...] | None = None) -> None:
-        """Puts `image` at address 0; executing outside `used` ((first, end) ranges; default: all of it) is
-        a fault.
-        """
+        """Puts `image` at address 0; executing outside `used` ((first, end) ranges; default: all of it) is a fault."""
         self._erase()
         for address in range(min(len(image), 0x10000)):
             self.rom[address] = image[address]
@@ -168,7 +163,7 @@ class Cpu(Executor):
         self.pcon = 0
         self.idle = 0
         self.powered_down = 0
-        self.blocked = -1
+        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
         for port in range(4):
             self.write_port(port, 0xFF)
         self.peripherals.clock_serial()

@@ -96,10 +96,8 @@ class Line:
         old, old_mask = self._ticks, self._mask
         self._ticks = array("q", bytes(8 * size))
         self._mask = size - 1
-        serial = self._first
-        while serial < self._end:
+        for serial in range(self._first, self._end):
             self._ticks[serial & self._mask] = old[serial & old_mask]
-            serial += 1
 
     def level_at(self, tick: int) -> int:
         """Level after all edges with edge tick <= `tick`."""

@@ -98,7 +98,7 @@ class Peripherals:
         self.timers.clear(cycle)
         self.timer2.clear(cycle)
         self.uart.clear(cycle)
-        self.shift.abort()
+        self.shift.flag = 0
         self.timers.set_gates(self.external.levels)
         self.timer2.up = (self.p1 >> 1) & 1
         self.look_again()
@@ -334,7 +334,7 @@ class Peripherals:
 
     def pin_levels(self, port: int, cycle: int) -> int:
         """The pins of a port at S5P2 of `cycle`, alternate outputs included."""
-        levels = self.ports.level(port)
+        levels = self.ports.latches[port] & self.ports.outside[port]
         if port == 3:
             tick = 12 * cycle + _S5P2
             self.p3_reads += 1
@@ -447,7 +447,7 @@ class Peripherals:
         """A register of the serial port or of timer 2, with both settled."""
         if address == _SCON:
             if (value ^ self.uart.scon) & 0xC0:
-                self.shift.abort()
+                self.shift.flag = 0
             self.uart.write_scon(value, cycle)
             if self.uart.mode() == 0:
                 self.shift.begin_reception(cycle)
@@ -460,14 +460,12 @@ class Peripherals:
             self.timer2.write_control(value, cycle)
         elif address == _T2MOD:
             self.timer2.write_mode(value, cycle)
-        elif address == _RCAP2L:
-            self.timer2.capture = (self.timer2.capture & 0xFF00) | value
-        elif address == _RCAP2H:
-            self.timer2.capture = (self.timer2.capture & 0x00FF) | (value << 8)
-        elif address == _TL2:
-            self.timer2.count = (self.timer2.count & 0xFF00) | value
-        elif address == _TH2:
-            self.timer2.count = (self.timer2.count & 0x00FF) | (value << 8)
+        elif address in (_RCAP2L, _RCAP2H):
+            shift = 8 * (address - _RCAP2L)
+            self.timer2.capture = self.timer2.capture & 0xFF00 >> shift | value << shift
+        elif address in (_TL2, _TH2):
+            shift = 8 * (address - _TL2)
+            self.timer2.count = self.timer2.count & 0xFF00 >> shift | value << shift
 
     def bit_ticks(self) -> int:
         """Length of a bit that the receiver expects, 0 while it is off or its clock does not run regularly yet."""

@@ -9,6 +9,5 @@ cdef class Ports:
     cdef readonly list pending
     cdef readonly long long next_cycle
 
-    cpdef int level(self, int port) noexcept
     cpdef int push(self, int port, int levels, long long tick) except -1
     cpdef int apply(self, long long cycle) except -1

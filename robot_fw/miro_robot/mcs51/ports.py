@@ -29,9 +29,6 @@ class Ports:
         self.pending: list[tuple[int, int, int]] = []  # (cycle, port, levels), by cycle
         self.next_cycle = NEVER_TICK  # of the first of them
 
-    def level(self, port: int) -> int:
-        return self.latches[port] & self.outside[port]
-
     def push(self, port: int, levels: int, tick: int) -> None:
         """The outside puts `levels` on the pins of `port` at `tick`."""
         cycle = (tick + 2) // 12  # the first with 12 * cycle + 9 >= tick

@@ -17,7 +17,6 @@ cdef class Shift:
     cdef long long cycle
 
     cpdef int check_times(self, long long cycle) except -1
-    cdef void abort(self) noexcept
     cdef void send(self, int value, long long cycle) noexcept
     cdef void begin_reception(self, long long cycle) noexcept
     cdef void _begin(self, int flag, int value, long long cycle) noexcept

@@ -38,9 +38,6 @@ class Shift:
         self.data.unread = True  # only ever asked for its level of now
         self._begin(0, 0, 0)
 
-    def abort(self) -> None:
-        self.flag = 0
-
     def send(self, value: int, cycle: int) -> None:
         """SBUF was written at the end of the cycle before `cycle`."""
         self._begin(_TI, value, cycle + 1)

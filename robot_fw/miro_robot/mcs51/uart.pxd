@@ -33,7 +33,6 @@ cdef class Uart:
     cpdef int clear(self, long long cycle) except -1
     cdef int abort(self, long long tick) except -1
     cdef inline int mode(self) noexcept
-    cdef inline int nine_bits(self) noexcept
     cpdef void set_clock(self, long long rx_next, long long rx_period, long long tx_next, long long tx_period) noexcept
     cpdef int sync(self, long long tick) except -1
     cpdef int check_times(self, long long tick) except -1

@@ -112,9 +112,6 @@ class Uart:
     def mode(self) -> int:
         return self.scon >> 6
 
-    def nine_bits(self) -> int:
-        return self.scon >> 7
-
     def set_clock(self, rx_next: int, rx_period: int, tx_next: int, tx_period: int) -> None:
         """16x ticks from now on: the next one and their distance, for both directions. NEVER_TICK stops one."""
         self.rx_next = rx_next if rx_next < _STOPPED else _STOPPED
@@ -156,11 +153,9 @@ class Uart:
             self.interrupts.withdraw(_SERIAL, cycle)
 
     def write_sbuf(self, value: int) -> None:
-        """Loads the transmitter; a character on its way is cut off and the new one begins at the next
-        rollover (U4).
-        """
+        """Loads the transmitter; a character on its way is cut off, the new one begins at the next rollover (U4)."""
         self.tx_value = value
-        if self.nine_bits():
+        if self.scon & _SM0:  # nine bits
             ninth = 1 if self.scon & _TB8 else 0
             self.tx_bits = (value << 1) | (ninth << 9) | (1 << 10)
             self.tx_left = 11
@@ -237,9 +232,7 @@ class Uart:
             self._deliver()
 
     def _search(self, tick: int) -> None:
-        """From 16x tick to 16x tick below `tick`, jumping over constant level, until a 1 is followed by a
-        0.
-        """
+        """From 16x tick to 16x tick below `tick`, jumping over constant level, until a 1 is followed by a 0."""
         now = self.rx_next
         enabled = self.scon & _REN
         while now < tick:
@@ -318,7 +311,7 @@ class Uart:
         elif number == _LAST_BIT:
             self.rx_frame = self.rx_bits | (bit << 8)
             self.rx_done = _flag_tick(now)
-            if not self.nine_bits():
+            if not self.scon & _SM0:
                 self.rx_count = 0
         else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now (U7)
             self.rx_count = 0
