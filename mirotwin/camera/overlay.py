@@ -109,7 +109,7 @@ def _classes(
     picture: Picture, table: bytes, windows: Sequence[Window]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     """The class of each pixel in the windows, 0 outside."""
-    data = np.frombuffer(picture.data, np.uint8).reshape(picture.height, picture.width, 3).astype(np.int32)
+    data = picture.pixels.astype(np.int32)
     cells = (data[..., 0] >> 4) << 12 | (data[..., 1] >> 2) << 6 | data[..., 2] >> 2
     seen = np.zeros(cells.shape, bool)
     for window in windows:

@@ -12,6 +12,7 @@ import warnings
 import zlib
 from pathlib import Path
 
+import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from miro_exact.bad_input import BadInput
@@ -36,7 +37,10 @@ _ROWS = 12
 
 
 class Picture:
-    """A picture that stays as it is. It is `Pixels`, so a tracker can look at it. `data`: three bytes a pixel."""
+    """A picture that stays as it is. It is `Pixels`, so a tracker can look at it.
+
+    `data`: three bytes a pixel; `pixels`: the same as rows of pixels.
+    """
 
     def __init__(self, data: bytes) -> None:
         if len(data) != 3 * WIDTH * HEIGHT:
@@ -44,6 +48,7 @@ class Picture:
         self.width = WIDTH
         self.height = HEIGHT
         self.data = data
+        self.pixels = np.frombuffer(data, np.uint8).reshape(HEIGHT, WIDTH, 3)
 
     def __repr__(self) -> str:
         return f"Picture({self.width} x {self.height})"
@@ -52,11 +57,7 @@ class Picture:
         """See `Pixels`. Raises ValueError for a window that is not inside the picture."""
         if min(left, top, width - 1, height - 1) < 0 or left + width > WIDTH or top + height > HEIGHT:
             raise ValueError(f"window {width} x {height} at ({left}, {top}) is not inside {WIDTH} x {HEIGHT}")
-        found = bytearray()
-        for row in range(top, top + height):
-            at = 3 * (row * WIDTH + left)
-            found += self.data[at : at + 3 * width]
-        return found
+        return bytearray(self.pixels[top : top + height, left : left + width].tobytes())
 
     def image(self) -> Image.Image:
         """In red, green and blue."""

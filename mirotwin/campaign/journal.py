@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from time import perf_counter
 from typing import Any, BinaryIO
 
 import msgspec
@@ -20,7 +21,6 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.plan import Head
 from mirotwin.campaign.worker import RunOutcome
-from mirotwin.campaign.workers import now_s
 
 SYNC_S = 1.0
 _LINE_BYTES = 1 << 20
@@ -43,7 +43,7 @@ class Journal:
         self.head = head
         self.count = 0
         self.done = bytearray(head.runs)
-        self._synced_s = now_s()
+        self._synced_s = perf_counter()
         check_regular(path)
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
@@ -67,9 +67,9 @@ class Journal:
             return
         self._stream.write(msgspec.json.encode(outcome) + b"\n")
         self._count(outcome.run)
-        if now_s() - self._synced_s >= SYNC_S:
+        if perf_counter() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
-            self._synced_s = now_s()
+            self._synced_s = perf_counter()
 
     def missing(self) -> Iterator[int]:
         """Runs without an outcome, from the first one on; what is added meanwhile is not missing."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
+from time import perf_counter
 
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period, RobotId
@@ -16,7 +17,6 @@ from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.worker import RunOutcome, Work
-from mirotwin.campaign.workers import now_s
 from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
@@ -63,14 +63,14 @@ def _run(job: Work) -> RunOutcome:
     checks = Checks(world, expected)
     player = player_of(world, steps, job.origin)
     tracks = Tracks(delay_frames=scenario.camera.delay_frames)
-    began_s = now_s()
+    began_s = perf_counter()
     with ExitStack() as files:
         recorder = None
         if job.recording:
             stream = files.enter_context(Path(job.recording).open("wb"))
             recorder = files.enter_context(Recorder(stream, source_of(text, world)))
         _move(world, player, tracks, recorder)
-    wall_s = now_s() - began_s
+    wall_s = perf_counter() - began_s
     checks.finish()
     summary = summarise(world, tracks, wall_s)
     judges = (checks, *(player.checks if player else ()))

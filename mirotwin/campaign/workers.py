@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -16,23 +15,6 @@ from multiprocessing import get_context, parent_process
 
 from miro_exact import engine
 from mirotwin.shell.program import cores, safe_path
-
-
-def now_s() -> float:
-    """Seconds since some moment; only differences mean anything."""
-    return time.perf_counter()
-
-
-def end_with_parent() -> None:
-    """Ends this process when its parent does: it would wait for jobs for ever if that was killed."""
-    threading.Thread(target=_wait_for_parent, daemon=True).start()
-
-
-def _wait_for_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def processes(count: int) -> ProcessPoolExecutor:
@@ -49,19 +31,23 @@ def processes(count: int) -> ProcessPoolExecutor:
             initargs=(engine.active(),),
         )
         for _ in range(count):  # each of which starts a process, as long as none is idle
-            found.submit(_nothing)
+            found.submit(int)
     return found
 
 
 def _begin(chosen: str) -> None:
     """In a new process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     engine.select(chosen)
 
 
-def _nothing() -> None:
-    """A job that only needs a process."""
+def _end_with_parent() -> None:
+    """Ends this process when its parent does: it would wait for jobs for ever if that was killed."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 @contextmanager
