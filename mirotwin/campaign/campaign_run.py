@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import amount
 from mirotwin.campaign import running
-from mirotwin.campaign.file import MOST_RUNS
+from mirotwin.campaign.file import MOST_RUNS, load
 from mirotwin.campaign.journal import journal_path
-from mirotwin.campaign.plan import Plan, load_plan
+from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.ranges import SEEDS, seed_range
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
@@ -70,12 +70,12 @@ def run(options: CampaignOptions) -> int:
     a check. The rows say which.
     """
     require_arrow()
-    plan = load_plan(options.file, (*options.settings, *as_settings(options.expected)))
+    plan = load(options.file, (*options.settings, *as_settings(options.expected)))
     tell_notes(plan.notes)
     if options.seeds is not None:
         first, count = options.seeds[0], len(options.seeds)
         design = replace(plan.design, first_seed=first, seed_count=count)
-        plan = replace(plan, file=replace(plan.file, design=design))
+        plan = replace(plan, design=design)
     results = options.out or Path("runs") / f"{options.file.stem}.parquet"
     began_s = time.monotonic()
     tally = _run(plan, results, options)
@@ -101,7 +101,7 @@ def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:
     try:
         with (
             told_when_full(journal, "--out", "file"),
-            ProgressBar(plan.file.path, plan.runs, options.quiet, "runs") as bar,
+            ProgressBar(plan.path, plan.runs, options.quiet, "runs") as bar,
         ):
             return running.run(plan, results, workers, force=options.force, many=options.yes, on_outcome=show)
     except BaseException:
@@ -125,8 +125,8 @@ def _judge(plan: Plan, results: Path) -> int:
     if faults:
         complain(f"{faults} of {plan.runs} runs had firmware faults")
         return FIRMWARE_FAULT
-    if failed > plan.file.allowed_failed_share * plan.runs:
-        allowed = plan.file.allowed_failed_share
+    if failed > plan.allowed_failed_share * plan.runs:
+        allowed = plan.allowed_failed_share
         complain(f"expectation failed: {failed} of {plan.runs} runs failed a check; {100 * allowed:g} % may")
         return EXPECTATION_FAILED
     return DONE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +17,7 @@ from miro_sim.scenario.base import beside
 from miro_sim.scenario.file import decode
 from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
+from mirotwin.campaign.plan import OWN_IMAGE, Plan, checked
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
 
 BUILTIN = Path(__file__).parent / "builtin"
@@ -49,40 +50,36 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     random: Random | None = None
 
 
-class CampaignFile(msgspec.Struct, frozen=True):
-    """What a file says. `path` names it in errors. Paths in it were made relative to where it stands.
-
-    `settings`: what all runs set, each with the place that says it.
-    """
-
-    path: str
-    scenario: str
-    firmware: str
-    settings: tuple[tuple[str, str], ...]
-    allowed_failed_share: float
-    design: Design
-
-
 def builtin_names() -> list[str]:
     """Campaigns that are part of the program: `mirotwin campaign bench1`."""
     return sorted(path.stem for path in BUILTIN.glob("*.toml"))
 
 
-def read(path: Path) -> CampaignFile:
-    """The campaign of a file, or the built-in one of that name. Raises BadInput with the place of what is wrong."""
+def load(path: str | Path, settings: Sequence[str] = ()) -> Plan:
+    """The campaign of a file, or the built-in one of that name, with more `settings` (KEY=VALUE) for all runs.
+
+    Raises BadInput with the place of what is wrong.
+    """
+    path = Path(path)
     if not path.exists() and str(path) in builtin_names():
         own = BUILTIN / f"{path}.toml"
-        return msgspec.structs.replace(parse(own.read_text(encoding="utf-8"), own), path=str(path))
+        plan = _parsed(own.read_text(encoding="utf-8"), own)
+        return checked(msgspec.structs.replace(plan, path=str(path)), settings)
     try:
         text = decode(read_input(path, TEXT_KIB << 10), str(path))
     except FileNotFoundError:
         remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin_names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
-    return parse(text, path)
+    return parse(text, path, settings)
 
 
-def parse(text: str, path: Path) -> CampaignFile:
-    """The campaign of a text that stands at `path`. Raises BadInput with the place of what is wrong."""
+def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
+    """The same of a text, as if it stood at `path`."""
+    return checked(_parsed(text, Path(path)), settings)
+
+
+def _parsed(text: str, path: Path) -> Plan:
+    """What the text says, with paths relative to where it stands."""
     try:
         raw = tables(text)
         check_numbers(raw)
@@ -92,7 +89,7 @@ def parse(text: str, path: Path) -> CampaignFile:
         raise BadInput(path, error.place, error.what, error.remedy) from None
     settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
     settings += [(f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()]
-    return CampaignFile(
+    return Plan(
         path=str(path),
         scenario=beside(str(path), found.scenario),
         firmware=_image(found.firmware, path),
@@ -150,7 +147,7 @@ def _level(key: str, value: Any, place: str, path: Path) -> Level:
         raise TomlError(f"expected a name or a path, got {value!r}", place=place)
     if key == SCENARIO:
         return Level(value, scenario=beside(str(path), value), place=place)
-    return Level(value, firmware=_image(value, path) or "own", place=place)
+    return Level(value, firmware=_image(value, path) or OWN_IMAGE, place=place)
 
 
 def _factors(table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:

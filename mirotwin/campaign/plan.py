@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -20,7 +19,6 @@ from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value
-from mirotwin.campaign.file import CampaignFile, parse, read
 from mirotwin.campaign.single import prepared
 from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageFile, Work
@@ -50,21 +48,24 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class Plan(msgspec.Struct, frozen=True):
-    """A campaign that can be run. `scenarios` (whole texts), `images`: by the names and paths that the file uses.
+    """A campaign. What its file says: `path` names the file in errors; `settings`: what all runs set, each with the
+    place that says it.
 
-    `checks`: names of all checks, in the order in which they are met. `notes`: what settings left out, a line each.
+    What `checked` adds: `scenarios` (whole texts), `images`: by the names and paths that the file uses; `checks`: names
+    of all checks, in the order in which they are met; `notes`: what settings left out, a line each.
     """
 
-    file: CampaignFile
-    scenarios: Mapping[str, str]
-    images: Mapping[str, ImageFile]
-    checks: tuple[str, ...]
-    versions: Versions
+    path: str
+    scenario: str
+    design: Design
+    firmware: str = ""
+    settings: tuple[tuple[str, str], ...] = ()
+    allowed_failed_share: float = 0.0
+    scenarios: Mapping[str, str] = {}
+    images: Mapping[str, ImageFile] = {}
+    checks: tuple[str, ...] = ()
+    versions: Versions = msgspec.field(default_factory=versions)
     notes: tuple[str, ...] = ()
-
-    @property
-    def design(self) -> Design:
-        return self.file.design
 
     @property
     def runs(self) -> int:
@@ -75,10 +76,10 @@ class Plan(msgspec.Struct, frozen=True):
         """What two campaigns with the same rows have in common, but for the versions."""
         design = self.design
         content = (
-            self.scenarios[self.file.scenario],
+            self.scenarios[self.scenario],
             [text for _, text in sorted(self.scenarios.items())],
             [image.sha256 for _, image in sorted(self.images.items())],
-            self.file.settings,
+            self.settings,
             msgspec.structs.replace(design, factors=()),
             [(one.name, [(level.value, level.settings) for level in one.levels]) for one in design.factors],
             self.checks,
@@ -94,11 +95,11 @@ class Plan(msgspec.Struct, frozen=True):
         return self.work_at(run, self.design.point(run))
 
     def work_at(self, run: int, point: DesignPoint) -> Work:
-        scenario, image = self.file.scenario, self.file.firmware
+        scenario, image = self.scenario, self.firmware
         for level in point.levels:
             scenario = level.scenario or scenario
             image = level.firmware or image
-        settings = [setting for setting, _ in self.file.settings]
+        settings = [setting for setting, _ in self.settings]
         return Work(
             run=run,
             origin=scenario,
@@ -122,40 +123,29 @@ class Plan(msgspec.Struct, frozen=True):
         return {**found, "seed": point.seed}
 
 
-def load_plan(path: str | Path, settings: Sequence[str] = ()) -> Plan:
-    """The campaign of a file, with more `settings` (KEY=VALUE) for all runs. Raises BadInput with file and place."""
-    return plan_of(read(Path(path)), settings)
-
-
-def parse_plan(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
-    """The campaign of a text, as if it stood at `path`. Raises BadInput with the place."""
-    return plan_of(parse(text, Path(path)), settings)
-
-
 def plan_of_levels(name: str, levels: Sequence[Level], seeds: range, settings: Sequence[str] = ()) -> Plan:
     """Each level with each seed, outside of any file: `name` stands for it in errors. Each has its scenario."""
     design = Design(seeds[0], len(seeds), (Factor("case", tuple(levels)),))
-    return plan_of(CampaignFile(name, levels[0].scenario, "", (), 0.0, design), settings)
+    return checked(Plan(name, levels[0].scenario, design), settings)
 
 
-def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
-    """Looks at everything that the runs need. Raises BadInput with the place in the file."""
+def checked(plan: Plan, settings: Sequence[str] = ()) -> Plan:
+    """The plan with more `settings` for all runs, and with all that they need. Raises BadInput with the place."""
     made = tuple((text, " ".join(option_words(text))) for text in settings)
-    file = msgspec.structs.replace(file, settings=(*file.settings, *made))
-    for name in file.design.names:
+    plan = msgspec.structs.replace(plan, settings=(*plan.settings, *made))
+    for name in plan.design.names:
         if name in OWN or name in FIGURES or name.startswith(CHECK):
-            raise BadInput(file.path, name, "is the name of a column of the results", "choose another name")
-    for setting, place in file.settings:
+            raise BadInput(plan.path, name, "is the name of a column of the results", "choose another name")
+    for setting, place in plan.settings:
         key = setting.partition("=")[0].strip()
-        if key in file.design.names:
+        if key in plan.design.names:
             what = f"the campaign varies {key}, this would have no effect"
-            raise BadInput(file.path, place, what, "leave it out, or the key in the campaign's file")
-    return _tried(Plan(file, _scenarios(file), _images(file), (), versions()))
+            raise BadInput(plan.path, place, what, "leave it out, or the key in the campaign's file")
+    return _tried(msgspec.structs.replace(plan, scenarios=_scenarios(plan), images=_images(plan)))
 
 
 def _tried(plan: Plan) -> Plan:
     """The plan with the names of all checks, and what settings left out. Raises BadInput with the place in the file."""
-    file = plan.file
     checks: dict[str, None] = {}
     notes: dict[str, None] = {}
     for point in _tried_points(plan.design):
@@ -165,10 +155,10 @@ def _tried(plan: Plan) -> Plan:
             text, expected, steps = prepared(job.origin, job.text, job.settings)
             check_symbols(steps, load_firmware(job.firmware.path), job.origin)
         except BadInput as error:
-            raise _placed(file, places, error) from error.__cause__
+            raise _placed(plan, places, error) from error.__cause__
         of_steps = [step.checks for step in steps if isinstance(step, CheckStep)]
         checks |= {check.name: None for group in (*expected.values(), *of_steps) for check in group}
-        notes |= {_placed_note(file, places, note): None for note in text.notes}
+        notes |= {_placed_note(plan, places, note): None for note in text.notes}
     return msgspec.structs.replace(plan, checks=tuple(checks), notes=tuple(notes))
 
 
@@ -184,32 +174,32 @@ def _tried_points(design: Design) -> Iterator[DesignPoint]:
         yield DesignPoint(tuple(levels), tuple(drawn), 0, design.first_seed)
 
 
-def _scenarios(file: CampaignFile) -> dict[str, str]:
+def _scenarios(plan: Plan) -> dict[str, str]:
     found = {}
-    for name, place in _named(file, file.scenario, "scenario"):
+    for name, place in _named(plan, plan.scenario, "scenario"):
         try:
             own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
             found[name] = load(name, own).text
         except ScenarioError as error:
-            raise BadInput(file.path, place, f"{error}") from None
+            raise BadInput(plan.path, place, f"{error}") from None
     return found
 
 
-def _images(file: CampaignFile) -> dict[str, ImageFile]:
+def _images(plan: Plan) -> dict[str, ImageFile]:
     found = {}
-    for name, place in _named(file, file.firmware, "firmware"):
+    for name, place in _named(plan, plan.firmware, "firmware"):
         path = "" if name == OWN_IMAGE else name
         try:
             found[name] = ImageFile(path, load_firmware(path).sha256 or "")
         except BadInput as error:
-            raise BadInput(file.path, place, f"{error}") from None
+            raise BadInput(plan.path, place, f"{error}") from None
     return found
 
 
-def _named(file: CampaignFile, default: str, kind: str) -> Iterator[tuple[str, str]]:
+def _named(plan: Plan, default: str, kind: str) -> Iterator[tuple[str, str]]:
     """Names or paths of scenarios or images, and the place that says each."""
     yield default, kind
-    for factor in file.design.factors:
+    for factor in plan.design.factors:
         for level in factor.levels:
             name = level.scenario if kind == "scenario" else level.firmware
             if name:
@@ -218,26 +208,26 @@ def _named(file: CampaignFile, default: str, kind: str) -> Iterator[tuple[str, s
 
 def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
     """What says each setting of a run: a place in the campaign's file, or an option."""
-    places = dict(plan.file.settings)
+    places = dict(plan.settings)
     places |= {setting: level.place for level in point.levels for setting in level.settings}
     for draw, value in zip(plan.design.draws, point.drawn, strict=True):
         places[draw.setting(value)] = f"random.range.{draw.name}"
     return places
 
 
-def _placed_note(file: CampaignFile, places: dict[str, str], note: str) -> str:
+def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
     """The same note at the place of the campaign's file that made the setting."""
     for setting, place in places.items():
         head = f"{OPTION} {setting} "
         if note.startswith(head) and not place.startswith(OPTION):
-            return f"{file.path}: {place}: {setting} {note.removeprefix(head)}"
+            return f"{plan.path}: {place}: {setting} {note.removeprefix(head)}"
     return note
 
 
-def _placed(file: CampaignFile, places: dict[str, str], error: BadInput) -> BadInput:
+def _placed(plan: Plan, places: dict[str, str], error: BadInput) -> BadInput:
     """The same error at the place of the campaign file that made it; the whole line where no single place did."""
     found = f"{error.place}"
     for setting, place in places.items():
         if found in (" ".join(option_words(setting)), setting.partition("=")[0]):
-            return BadInput(file.path, place, f"{setting} in {error.path}: {error.what}", error.remedy)
-    return BadInput(file.path, "", f"{error}")
+            return BadInput(plan.path, place, f"{setting} in {error.path}: {error.what}", error.remedy)
+    return BadInput(plan.path, "", f"{error}")

@@ -73,13 +73,13 @@ def about(plan: Plan) -> ResultsInfo:
     design = plan.design
     return ResultsInfo(
         plan.head,
-        Path(plan.file.path).stem,
+        Path(plan.path).stem,
         tuple(factor.name for factor in design.factors),
         tuple(draw.name for draw in design.draws),
         plan.checks,
-        _name(plan.file.scenario),
-        _name(plan.file.firmware),
-        tuple(setting for setting, _ in plan.file.settings),
+        _name(plan.scenario),
+        _name(plan.firmware),
+        tuple(setting for setting, _ in plan.settings),
         tuple(tuple(map(_elsewhere, factor.levels)) for factor in design.factors),
     )
 

@@ -34,7 +34,7 @@ def refuse_many(plan: Plan, agreed: bool) -> None:
     """Raises BadInput for more than `MANY_RUNS` runs, unless the user `agreed`."""
     if plan.runs > MANY_RUNS and not agreed:
         what = f"has {plan.runs} runs, more than {MANY_RUNS}"
-        raise BadInput(plan.file.path, "", what, "take fewer seeds or levels, or say --yes")
+        raise BadInput(plan.path, "", what, "take fewer seeds or levels, or say --yes")
 
 
 def run(
