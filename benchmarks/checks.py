@@ -55,7 +55,7 @@ def main() -> None:
     if engine.active() != "compiled":
         sys.exit("the compiled modules are missing: " + engine.REMEDY)
     image = load_hex(image_path())
-    always = shares(asked.scenario, (), asked.pairs, image)
+    always = shares(asked.scenario, ("expect={}",), asked.pairs, image)
     everything = shares(asked.scenario, tuple(f"expect.{one}" for one in ALL), asked.pairs, image)
     for name, found in (("those that are always on", always), ("all of ours", everything)):
         low, _, high = quantiles(found, n=4)

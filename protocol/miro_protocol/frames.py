@@ -225,8 +225,11 @@ def decode_fields(body: bytes, n: int) -> Message:
     elif kind == FrameType.SERVICE:
         message = _service_message(seq, payload)
     else:
-        values = unpack(VELOCITY * n, payload)
+        known = n in ROBOT_COUNTS and len(payload) == _VELOCITIES[n].size
+        values = _VELOCITIES[n].unpack(payload) if known else unpack(VELOCITY * n, payload)
         message = TeamFrame(kind, seq, tuple(zip(values[::2], values[1::2], strict=True)))
+        if known and min(values) >= _LOW:
+            return message
     _require_sendable(message, body, n)
     return message
 

@@ -36,7 +36,7 @@ FURTHEST_PPM = 10_000
 UNLIKELY = 1e-12
 MOST_FRAMES = 10_000
 _STT = BY_NAME["STT"].opcode
-Waiting = tuple[int, tuple[int, ...], tuple[int, int]]
+Waiting = tuple[int, int, tuple[int, int]]
 
 
 class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
@@ -120,7 +120,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
         self.air = self.before = self._air()
-        self.seen: list[tuple[tuple[int, ...], int]] = []
+        self.seen: list[tuple[int, int]] = []
         """Air, and tick of the last reset, at the end of each control period that is not judged, oldest first."""
         self.counted = self.shown = 0
         self.begun_tick = -1
@@ -135,12 +135,12 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.turned = False  # a wheel was told to turn since the processor began
         self.words: tuple[int | None, int | None] = (0, 0)
 
-    def _air(self) -> tuple[int, ...]:
-        """What changes when something comes between the transmitter and the robot."""
+    def _air(self) -> int:
+        """A number that changes when something comes between the transmitter and the robot; -1 while nothing passes."""
         board, listener = self.board, self.listener
         if listener is None or not board.powered or board.held or listener.link_state != UP:
-            return ()
-        return (listener.bit_errors,)
+            return -1
+        return listener.bit_errors
 
     def period_over(self) -> None:
         self.seen.append((self._air(), self.chip.reset_tick))
@@ -177,7 +177,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.left.look(record.left, left)
         self.right.look(record.right, right)
         for _, air, words in due:
-            if air and air == self.air:
+            if 0 <= air == self.air:
                 self.counted += any(abs(word) >= SLOWEST for word in words)
                 self.judged = max(self.judged, int(self.counted >= self.needed))
                 self.left.ask(words[0])
