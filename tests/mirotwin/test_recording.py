@@ -189,6 +189,19 @@ def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed():
     assert {with_frames(flushed) for flushed in range(12)} == {with_frames(-1)}
 
 
+def test_a_recording_is_flushed_with_its_first_period_and_then_each_fifth_of_a_second(monkeypatch):
+    stream, found = io.BytesIO(), []
+    times_s = iter((7.0, 7.1, 7.19, 7.25, 7.3))
+    monkeypatch.setattr(time, "monotonic", lambda: next(times_s))
+    with Recorder(stream, SOURCE) as recorder:
+        recorder.flush()
+        for period in periods(5):
+            recorder.write(period)
+            recorder.flush_if_due()
+            found.append(len(parse(stream.getvalue(), "run.part.mcap").periods))
+    assert found == [1, 1, 1, 4, 4]
+
+
 def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments():
     reader = make_reader(io.BytesIO(RECORDED))
     summary = reader.get_summary()
