@@ -57,7 +57,7 @@ def _of_recording(path: Path, network: int, tell: Callable[[str], None]) -> Iter
     check_regular(path)
     found = False
     with path.open("rb") as file:
-        messages = Messages(file, f"{path}", (ImageMessage,))
+        messages = Messages(file.read, f"{path}", (ImageMessage,))
         try:
             for place, message in messages:
                 if place.network == network:

@@ -12,7 +12,6 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import msgspec
 
@@ -25,7 +24,7 @@ from miro_sim.periods import Period
 from miro_sim.world.conditions import answer_of
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
-from mirotwin.recording.sequences import on_air, pairs
+from mirotwin.recording.sequences import LogEntry, Pair, on_air, pairs
 
 WITHIN_TICKS = 20 * TICKS_PER_MS
 """A little more than the 16 ms for which a USB adapter may keep a character."""
@@ -45,24 +44,12 @@ NEAR = 2
 """Answers before and after one that tell how late frames without an answer were."""
 
 
-class TimedAnswer(NamedTuple):
-    """An answer, and when the PC had heard all of it. `text`: whose, and to which question."""
-
-    tick: int
-    text: str
-    said: TelemetryFrame
-
-
-AnswerPair = tuple[TimedAnswer | None, TimedAnswer | None]
-"""Of the robot and of its twin, to the same question; None: there is none."""
-
-
 class PortComparison(msgspec.Struct, frozen=True):
     """`robots`: the answers by slot; `unsure_ms`: how well their times are known. `silent`: slots of the twin's robots
     that do not answer at the port; `not_judged`: values that time left open.
     """
 
-    robots: dict[int, list[AnswerPair]]
+    robots: dict[int, list[Pair]]
     unsure_ms: float
     differences: list[Difference]
     silent: tuple[int, ...]
@@ -86,21 +73,19 @@ def compare(
     return PortComparison(beside, unsure / TICKS_PER_MS, found, tuple(sorted(there)), judged.count(None))
 
 
-def _by_slot(periods: Sequence[Period]) -> dict[int, list[TimedAnswer]]:
-    """The valid answers that the PC heard."""
+def _by_slot(periods: Sequence[Period]) -> dict[int, list[LogEntry]]:
+    """The valid answers that the PC heard, with the ticks at which it had heard all of them."""
     decoder, found = TelemetryDecoder(), defaultdict(list)
     for one in on_air(periods, 0, sent=False):
         for event in decoder.feed(one.data):
             said = answer_of(event) if isinstance(event, Received) else None
             if said is not None:
                 text = f"answer of {said.slot} to {said.seq}"
-                found[said.slot].append(TimedAnswer(one.end_tick, text, said))
+                found[said.slot].append(LogEntry(one.end_tick, text, said))
     return found
 
 
-def _side_by_side(
-    port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer], until_tick: int
-) -> list[AnswerPair]:
+def _side_by_side(port: Sequence[LogEntry], twin: Sequence[LogEntry], until_tick: int) -> list[Pair]:
     """With the ticks of the port less the shortest delay. After `until_tick` none of its answers is missing."""
     heard = defaultdict(list)
     for answer in port:
@@ -150,7 +135,7 @@ class _Sent:
 
 
 def _judged(
-    both: Sequence[AnswerPair], late: Sequence[int], slot: int, sent: _Sent, rule: CompareRule
+    both: Sequence[Pair], late: Sequence[int], slot: int, sent: _Sent, rule: CompareRule
 ) -> Iterator[Difference | None]:
     """The differences of one robot and its twin; None for a value that time leaves open. `late`: of each full pair."""
 
@@ -158,7 +143,7 @@ def _judged(
         return Difference(tick, tick // CONTROL_PERIOD_TICKS, 0, slot, name, mine, twins)
 
     near = [max(late[max(0, at - NEAR) : at + NEAR + 1]) for at in range(len(late))]
-    before: tuple[TimedAnswer, TimedAnswer] | None = None
+    before: tuple[LogEntry, LogEntry] | None = None
     full = 0
     for here, there in both:
         if here is None or there is None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator
 from io import BytesIO
-from typing import NoReturn, Protocol
+from typing import NoReturn
 from zlib import crc32
 
 from mcap.data_stream import ReadDataStream
@@ -61,32 +61,22 @@ class _Compressed(Exception):
     """A chunk that is compressed, and by what."""
 
 
-class ByteSource(Protocol):
-    """An open file or pipe."""
+class Records:
+    """Iterates over (offset, record) of schemas, channels, messages, attachments and metadata of a file. Raises
+    RecordingError where it cannot go on.
 
-    def read(self, size: int, /) -> bytes:
-        """`size` bytes, fewer only at the end."""
-        ...
-
-
-def records(source: ByteSource, path: str) -> Iterator[tuple[int, McapRecord]]:
-    """(offset, record) of schemas, channels, messages, attachments and metadata; RecordingError where it cannot go on.
-
-    `path` names the file in errors.
+    `read`: gives the next so many bytes, fewer only at the end. `path` names the file in errors.
     """
-    return _Container(source, path).records()
 
-
-class _Container:
-    def __init__(self, source: ByteSource, path: str) -> None:
-        self.source = source
+    def __init__(self, read: Callable[[int], bytes], path: str) -> None:
+        self.read = read
         self.path = path
         self.offset = 0  # of the record under way
         self.checksum = 0  # of what the next section's CRC covers, so far
         self.data_ended = False
         self.last = b""  # bytes that were read, after the first magic
 
-    def records(self) -> Iterator[tuple[int, McapRecord]]:
+    def __iter__(self) -> Iterator[tuple[int, McapRecord]]:
         self._begin()
         opcode = 0
         while opcode != Opcode.FOOTER:
@@ -113,7 +103,7 @@ class _Container:
         self._end()
 
     def _begin(self) -> None:
-        magic = self.source.read(len(MAGIC))
+        magic = self.read(len(MAGIC))
         if magic != MAGIC:
             if magic and MAGIC.startswith(magic):
                 self._cut()
@@ -144,11 +134,11 @@ class _Container:
                 self._cut()
             self._damaged("the closing bytes of an MCAP file are missing here")
         self.offset += len(magic)
-        if self.source.read(1):
+        if self.read(1):
             self._fail("there are bytes after the end of the recording", "remove it")
 
     def _read(self, size: int) -> bytes:
-        data = self.source.read(size)
+        data = self.read(size)
         self.last = (self.last + data[-len(MAGIC) :])[-len(MAGIC) :]
         return data
 

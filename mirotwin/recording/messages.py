@@ -1,6 +1,6 @@
 """The messages of a recording one after the other, and what it was made from: the one reader of our MCAP files."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import msgspec
@@ -9,7 +9,7 @@ from mcap.records import Attachment, Channel, Message, Metadata
 from miro_exact.bad_input import one_line, shortened
 from mirotwin.recording import channels
 from mirotwin.recording.channels import Topic, topic_of
-from mirotwin.recording.container import ByteSource, RecordingError, records
+from mirotwin.recording.container import RecordingError, Records
 from mirotwin.recording.recorder import (
     BROKEN_OFF,
     FIRMWARE_ATTACHMENT,
@@ -27,12 +27,12 @@ AGAIN = "record the run again"
 class Messages:
     """Iterates over (topic, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
 
-    `path` names the file in errors. `metadata` (None: not a recording of this program) and `attachments` stand at the
+    `read` and `path` as in `Records`. `metadata` (None: not a recording of this program) and `attachments` stand at the
     beginning of a file and are there with the first message. `broken_off`: what to say of a run that was.
     """
 
     def __init__(
-        self, source: ByteSource, path: str, kinds: Collection[type[msgspec.Struct]] | None = None
+        self, read: Callable[[int], bytes], path: str, kinds: Collection[type[msgspec.Struct]] | None = None
     ) -> None:
         self.path = path
         self.kinds = kinds
@@ -41,7 +41,7 @@ class Messages:
         self.attachments: dict[str, bytes] = {}
         self.broken_off = ""
         self._topic = ""
-        self._records = records(source, path)
+        self._records = iter(Records(read, path))
         self._channels: dict[int, tuple[str, Topic, msgspec.json.Decoder[Any]]] = {}
 
     def __iter__(self) -> Iterator[tuple[Topic, Any]]:

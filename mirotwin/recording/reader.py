@@ -53,7 +53,7 @@ def read(path: str | Path) -> Recording:
 
 def parse(data: bytes, path: str) -> Recording:
     """A recording from its bytes; `path` names it in errors."""
-    messages = Messages(BytesIO(data), path, KINDS)
+    messages = Messages(BytesIO(data).read, path, KINDS)
     collector = _Collector(lambda: RESUMED_ATTACHMENT in messages.attachments)
     cut: Cut | None = None
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Action, RadioState, Reset
@@ -16,25 +16,16 @@ SAME_TICKS = CONTROL_PERIOD_TICKS // 2
 
 
 class LogEntry(NamedTuple):
-    """Something with a tick; `text` says all of it but when."""
+    """Something with a tick; `text` says all of it but when. `said`: what it was, for who reads more than the text."""
 
     tick: int
     text: str
+    said: Any = None
 
     def __str__(self) -> str:
         return f"{self.text} at tick {self.tick}"
 
 
-class TimedText(Protocol):
-    """What can be put side by side."""
-
-    @property
-    def tick(self) -> int: ...
-    @property
-    def text(self) -> str: ...
-
-
-E = TypeVar("E", bound=TimedText)
 Pair = tuple[LogEntry | None, LogEntry | None]
 
 
@@ -108,8 +99,8 @@ def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int
 
 
 def pairs(
-    one: Sequence[E], other: Sequence[E], within_ticks: int, same_ticks: int = SAME_TICKS
-) -> Iterator[tuple[E | None, E | None]]:
+    one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int, same_ticks: int = SAME_TICKS
+) -> Iterator[Pair]:
     """All of both, in the order of time; None stands where one side has nothing.
 
     Two that say the same are one if they are at most `same_ticks` apart. After a pair that is not alike the
@@ -136,7 +127,7 @@ def pairs(
     yield from ((None, there) for there in other[second:])
 
 
-def _follows(found: Sequence[TimedText], index: int, wanted: TimedText, within_ticks: int) -> bool:
+def _follows(found: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
     """Whether one behind `index` says what `wanted` says, at its time."""
     for place in range(index + 1, len(found)):
         if found[place].tick > wanted.tick + within_ticks:

@@ -24,7 +24,7 @@ from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import channels, writer
 from mirotwin.recording import recorder as recorder_module
-from mirotwin.recording.container import BrokenOff, RecordingError, records
+from mirotwin.recording.container import BrokenOff, RecordingError, Records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import TOGETHER, Recorder, RunSource
 from mirotwin.recording.rows import Chunk
@@ -470,7 +470,7 @@ def test_checksums_of_zero_say_nothing_as_other_programs_write_them():
     writer = Writer(stream, enable_crcs=False, enable_data_crcs=False)
     writer.start()
     writer.finish()
-    assert list(records(io.BytesIO(stream.getvalue()), "x.mcap")) == []
+    assert list(Records(io.BytesIO(stream.getvalue()).read, "x.mcap")) == []
 
 
 # The writer: the bytes of the library's, and a file that can be read at any moment of its making
@@ -575,7 +575,7 @@ def readable(data):
     times = []
 
     def read():
-        for _, record in records(io.BytesIO(data), "x"):
+        for _, record in Records(io.BytesIO(data).read, "x"):
             if isinstance(record, Message):
                 times.append(record.log_time)
 

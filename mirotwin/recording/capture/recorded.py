@@ -28,7 +28,7 @@ def transmissions(
     RecordingError, after all that could be read, for what is no recording of this program, and for a part of a copy.
     `tell` is called with a message for a recording whose run was broken off, after all its transmissions.
     """
-    messages = Messages(source, source.label, (channels.WireMessage, channels.PeriodMessage))
+    messages = Messages(source.read, source.label, (channels.WireMessage, channels.PeriodMessage))
     order = _Order()
     failure: RecordingError | None = None
     try:

@@ -22,7 +22,7 @@ from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording import channels, reader
 from mirotwin.recording.channels import IMAGE, PERIOD, FaultMessage, ImageMessage, Topic, topic_name, topic_of
-from mirotwin.recording.container import Cut, RecordingError, records
+from mirotwin.recording.container import Cut, RecordingError, Records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.writer import McapWriter
@@ -95,7 +95,7 @@ class _Conversion:
     def run(self, data: bytes) -> Converted:
         broken = False
         try:
-            for _, record in records(BytesIO(data), self.path):
+            for _, record in Records(BytesIO(data).read, self.path):
                 self._take(record)
                 broken = broken or (isinstance(record, Metadata) and record.name == BROKEN_OFF)
         except Cut as error:

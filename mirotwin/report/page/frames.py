@@ -44,7 +44,7 @@ def extras_of(path: str | Path, from_tick: int, to_tick: int, frames: bool) -> E
     found: list[CameraFrame] = []
     samples: list[tuple[RobotId, SampleMessage]] = []
     with open(path, "rb") as stream:
-        messages = Messages(stream, str(path), kinds)
+        messages = Messages(stream.read, str(path), kinds)
         cut = False
         try:
             for place, message in messages:

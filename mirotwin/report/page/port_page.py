@@ -10,9 +10,10 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from mirotwin.desk.compare import ANSWERS, FIELDS, AnswerPair, PortComparison, TimedAnswer, compare
+from mirotwin.desk.compare import ANSWERS, FIELDS, PortComparison, compare
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
+from mirotwin.recording.sequences import LogEntry, Pair
 from mirotwin.report.page.document import render
 from mirotwin.rerun.job import Job, rerun_job
 from mirotwin.shell.progress import ProgressBar
@@ -60,7 +61,7 @@ def _marks(differences: Sequence[Difference], slot: int, channel: str) -> list[f
     return list(dict.fromkeys(seconds(one.tick) for one in parted))[:FIRST]
 
 
-def _figure(pairs: Sequence[AnswerPair], channel: str, end_s: float, marks: list[float]) -> Any:
+def _figure(pairs: Sequence[Pair], channel: str, end_s: float, marks: list[float]) -> Any:
     from bokeh.models import Range1d
 
     from mirotwin.report.page.axes import add_failures, panel, tagged
@@ -75,7 +76,7 @@ def _figure(pairs: Sequence[AnswerPair], channel: str, end_s: float, marks: list
     return made
 
 
-def _course(answers: Sequence[TimedAnswer], channel: str) -> list[int]:
+def _course(answers: Sequence[LogEntry], channel: str) -> list[int]:
     """The channel from answer to answer: what went on is added up."""
     take, _ = FIELDS[channel]
     if channel == "flags":
