@@ -16,7 +16,7 @@ from miro_protocol.scan import Scanner
 from miro_protocol.table import BITS_PER_CHARACTER, HOST_BIT_TICKS, Format
 
 WHITE = np.frombuffer(whitening.STRING, np.uint8)
-CRC_TABLE = np.array(crc.byte_table(), np.uint16)
+CRC_TABLE = np.array(crc.table_of(8), np.uint16)
 
 
 class Frames(NamedTuple):

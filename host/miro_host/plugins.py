@@ -10,7 +10,7 @@ Entry points are looked up only for a name that is not in our own table, because
 distributions takes tens of milliseconds. For the same reason a name in our table cannot be replaced from outside.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
@@ -86,9 +86,7 @@ class Registry(Generic[Plugin]):
 
     def _choices(self, name: str) -> str:
         names = self.names()
-        *others, last = names
-        choices = f"use {', '.join(others)} or {last}" if others else f"use {last}"
-        return did_you_mean(name, names, choices)
+        return did_you_mean(name, names, use_one_of(names))
 
     def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
         """`found` if it is a struct of parameters as this kind of plug-in needs it."""
@@ -102,6 +100,12 @@ class Registry(Generic[Plugin]):
         if not (config.frozen and config.forbid_unknown_fields):
             raise PluginError(f"{found_as} can change, or takes unknown keys", "give the class frozen=True")
         return found
+
+
+def use_one_of(choices: Iterable[str]) -> str:
+    """The remedy for what is not one of them."""
+    *others, last = choices
+    return f"use {', '.join(others)} or {last}" if others else f"use {last}"
 
 
 def _loaded(entry_point: str) -> Any:

@@ -63,7 +63,7 @@ class Station:
         self._size = form.wire_size
         for place, byte in enumerate(form.lead + form.sync):
             self._frame[place] = byte
-        self._table = crc.byte_table()
+        self._table = crc.table_of(8)
         self._start = crc.register(bytes([form.layout]))
         self._white = STRING
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
+from miro_host.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.scenario.errors import use_one_of
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_machine, report, target_of

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput, amount
-from miro_protocol.decoder import Decoder, Received, TelemetryDecoder, WindowDecoder
+from miro_protocol.decoder import Decoder, Received, Scanner, TelemetryDecoder
 from miro_protocol.frames import ContentError, TeamFrame, describe
 from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired
@@ -107,9 +107,7 @@ def _with_frames(events: Sequence[Event]) -> list[Event]:
             wires.setdefault(_place(event), []).append(index)
     replaced: dict[int, Event | None] = {}
     for (what, _, _), wire in wires.items():
-        decoders: list[WindowDecoder] = (
-            [Decoder(3), Decoder(5)] if what == "received" else [TelemetryDecoder()]
-        )
+        decoders: list[Scanner] = [Decoder(3), Decoder(5)] if what == "received" else [TelemetryDecoder()]
         for decoder in decoders:
             at = 0
             symbols = [(one.value, one.good_stop, one.tick) for one in map(events.__getitem__, wire)]

@@ -156,7 +156,7 @@ def _values() -> Iterator[str]:
 
 
 def _tables() -> Iterator[str]:
-    words = crc.nibble_table()
+    words = crc.table_of(4)
     yield "#ifdef PROTOCOL_TABLES"
     yield from _array("whitening", whitening.STRING)
     yield from _array("crc_nibble_low", [word & 0xFF for word in words])

@@ -34,18 +34,12 @@ def register(data: bytes) -> int:
     return crc16(data) ^ XOR_OUT
 
 
-def nibble_table() -> tuple[int, ...]:
-    """16 words t: `register = register >> 4 ^ t[(register ^ nibble) & 15]`, low nibble of a byte first."""
-    return _table(4)
-
-
-def byte_table() -> tuple[int, ...]:
-    """256 words t: `register = register >> 8 ^ t[(register ^ byte) & 255]`."""
-    return _table(8)
-
-
 @cache
-def _table(bits: int) -> tuple[int, ...]:
+def table_of(bits: int) -> tuple[int, ...]:
+    """Words t for so many bits at once, 4 or 8: `register = register >> 8 ^ t[(register ^ byte) & 255]`.
+
+    Of the nibbles of a byte the low one comes first: `register = register >> 4 ^ t[(register ^ nibble) & 15]`.
+    """
     table = []
     for value in range(1 << bits):
         for _ in range(bits):

@@ -12,36 +12,20 @@ from __future__ import annotations
 from miro_protocol.events import Damaged, Event, Reason, Received
 from miro_protocol.scan import RUN_LIMIT, Scanner, Symbol
 from miro_protocol.table import TELEMETRY, downlink
-from miro_protocol.transmission import Transmission
 
 __all__ = [
-    "RUN_LIMIT", "Damaged", "Decoder", "Event", "Reason", "Received", "Symbol", "TelemetryDecoder",
-    "WindowDecoder",
+    "RUN_LIMIT", "Damaged", "Decoder", "Event", "Reason", "Received", "Scanner", "Symbol", "TelemetryDecoder",
 ]  # fmt: skip
 
 
-class WindowDecoder(Scanner):
-    """Decoder of one wire format; see `Scanner` for what it can be fed."""
-
-    def hear(self, sent: Transmission) -> list[Event]:
-        """The events that the characters of a transmission complete."""
-        if sent.bad_stop:
-            return self.feed_symbols(sent.symbols())
-        return self.feed(sent.data, sent.tick)
-
-    def __repr__(self) -> str:
-        counts = f"{self.valid} valid, {self.rejected} rejected, {self.pending} characters pending"
-        return f"<decoder {self.format.name}: {counts}>"
-
-
-class Decoder(WindowDecoder):
+class Decoder(Scanner):
     """What a robot hears, in a network of `n` robots (3 or 5)."""
 
     def __init__(self, n: int) -> None:
         super().__init__(downlink(n))
 
 
-class TelemetryDecoder(WindowDecoder):
+class TelemetryDecoder(Scanner):
     """What the host hears from its robots."""
 
     def __init__(self) -> None:

@@ -52,7 +52,7 @@ def _tables() -> Iterable[tuple[str, Any]]:
         "SLOT_MASK": table.SLOT_MASK,
         "ROBOT_COUNTS": table.ROBOT_COUNTS,
         "WHITE": tuple(whitening.STRING),
-        "CRC_TABLE": crc.byte_table(),
+        "CRC_TABLE": crc.table_of(8),
         "NIBBLE_XOR": tuple(a ^ b for a in range(16) for b in range(16)),
         "DIRECTIONS": {
             number: way for way, event in EVENTS.items() for number in (event, event + 2)

@@ -45,10 +45,8 @@ class Received(msgspec.Struct, frozen=True, gc=False):
         return _message(self.body, n)
 
 
-@lru_cache(maxsize=16)
-def _message(body: bytes, n: int) -> Message:
-    """The message in a body; cached, because several listeners decode the same body."""
-    return decode_fields(body, n)
+_message = lru_cache(maxsize=16)(decode_fields)
+"""Cached, because several listeners decode the same body."""
 
 
 class Damaged(msgspec.Struct, frozen=True, gc=False):

@@ -17,6 +17,7 @@ from miro_exact.state import FLAG, TICK, Queue
 from miro_protocol import crc
 from miro_protocol.events import Damaged, Event, Reason, Received
 from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, Format
+from miro_protocol.transmission import Transmission
 from miro_protocol.whitening import STRING
 
 Symbol = tuple[int, bool, int]
@@ -69,7 +70,7 @@ class Scanner:
         self._sync = form.sync
         self._lead = form.lead
         self._white = STRING
-        self._table = crc.byte_table()
+        self._table = crc.table_of(8)
         self._start = crc.register(bytes([form.layout]))
         self._intact = crc.residue()
         self._size = form.size
@@ -90,6 +91,10 @@ class Scanner:
         self._next_tick = 0  # where a character would start that follows at once
         self._paused = True
         self.body = bytearray(64)
+
+    def __repr__(self) -> str:
+        counts = f"{self.valid} valid, {self.rejected} rejected, {self._count} characters pending"
+        return f"<decoder {self.format.name}: {counts}>"
 
     def begin(self) -> None:
         """As new: nothing was heard yet."""
@@ -148,6 +153,10 @@ class Scanner:
         self._paused = False
         self._next_tick = tick
         return events
+
+    def hear(self, sent: Transmission) -> list[Event]:
+        """The events that the characters of a transmission complete."""
+        return self.feed_symbols(sent.symbols()) if sent.bad_stop else self.feed(sent.data, sent.tick)
 
     def feed_symbols(self, symbols: Iterable[Symbol]) -> list[Event]:
         """Characters with stop bit and time, as a UART and a timer deliver them."""

@@ -14,7 +14,7 @@ from miro_exact import engine
 from miro_exact.state import restore, snapshot, values
 from miro_protocol import decoder as module
 from miro_protocol import scan, table
-from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDecoder
+from miro_protocol.decoder import Damaged, Decoder, Reason, Received
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.hypothesis_frames import damaged_streams, team_frames, valid_streams
 from miro_protocol.scan import TICK_LIMIT, Scanner
@@ -33,7 +33,7 @@ def form_for(heard, telemetry):
 
 
 def decoder_for(heard, telemetry, run_limit=module.RUN_LIMIT):
-    return WindowDecoder(form_for(heard, telemetry), run_limit)
+    return Scanner(form_for(heard, telemetry), run_limit)
 
 
 def naive_for(heard, telemetry, run_limit=module.RUN_LIMIT):

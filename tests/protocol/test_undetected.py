@@ -16,7 +16,7 @@ from benchmarks.interval import clopper_pearson
 from benchmarks.line import decode_lines, line_bits, random_frames, receive
 from benchmarks.undetected import crc_only, noise, on_the_line
 from benchmarks.weights import code_words, covered_bits, syndromes, undetected_probability
-from miro_protocol.decoder import Received, WindowDecoder
+from miro_protocol.decoder import Received, Scanner
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.hypothesis_frames import host_frames, telemetry_frames
 from miro_protocol.table import DOWNLINK, TELEMETRY, Format, downlink
@@ -57,7 +57,7 @@ def with_wrong_bits(wire, first, bits):
     ("form", "wire"), [(form, encode(message, n)) for n in (3, 5) for form, message in every_type(n)]
 )
 def test_one_or_two_wrong_bits_are_refused_in_every_type_but_where_the_lead_alone_has_them(form, wire):
-    decoder = WindowDecoder(form)
+    decoder = Scanner(form)
     (sent,) = decoder.feed(wire)
     ways = [bits for wrong in (1, 2) for bits in combinations(range(8 * len(wire)), wrong)]
     events = decoder.feed(b"".join(with_wrong_bits(wire, 0, bits) for bits in ways))
@@ -75,7 +75,7 @@ def test_one_to_four_wrong_bits_in_any_frame_are_refused(data, n, wrong, up):
     covered = covered_bits(form)
     place = st.integers(0, covered - 1)
     bits = data.draw(st.lists(place, min_size=wrong, max_size=wrong, unique=True))
-    decoder = WindowDecoder(form)
+    decoder = Scanner(form)
     decoder.feed(with_wrong_bits(wire, 8 * len(wire) - covered, bits))
     assert (decoder.valid, decoder.rejected >= 1) == (0, True)
 

@@ -26,10 +26,8 @@ deviations are divided by the confidence, but by no less than `LEAST_CONFIDENCE`
 """
 
 from collections.abc import Mapping
-from functools import cache
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar
 
-import msgspec
 from msgspec import Meta
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -50,18 +48,6 @@ frame to frame: to a filter that knows white noise only, a heading that is wrong
 sqrt(50) times as much in each."""
 TOLD_NOISE = (0.0081, 0.028)
 """Of any other posture: a third of the bounds in section V-A of the paper, and whole pixels."""
-
-
-@cache
-def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
-    """The least and the most of each parameter whose annotation says both."""
-    found = {}
-    for field in msgspec.structs.fields(parameters):
-        for kind in (field.type, *get_args(field.type)):
-            for meta in getattr(kind, "__metadata__", ()):
-                if isinstance(meta, Meta) and meta.ge is not None and meta.le is not None:
-                    found[field.name] = meta.ge, meta.le
-    return found
 
 
 class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
@@ -93,12 +79,6 @@ class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
     doubt: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.14
     rim_noise_m_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
     gate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 5.0
-
-    def __post_init__(self) -> None:
-        for name, (least, most) in _ranges(type(self)).items():
-            value = getattr(self, name)
-            if value is not None and not least <= value <= most:
-                raise ValueError(f"{name}: {value!r} is out of range; must be {least} to {most}")
 
     def estimator(self) -> "Ekf":
         return Ekf(self)

@@ -6,9 +6,11 @@ can count periods. It sees what the PC could have seen: no true posture.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Generic, TypeVar
+from functools import cache
+from typing import Any, ClassVar, Generic, TypeVar, get_args
 
 import msgspec
+from msgspec import Meta
 
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
@@ -54,10 +56,31 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     inner: Mapping[str, float] = NOTHING
 
 
+@cache
+def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
+    """The least and the most of each parameter whose annotation says both."""
+    found = {}
+    for field in msgspec.structs.fields(parameters):
+        for kind in (field.type, *get_args(field.type)):
+            for meta in getattr(kind, "__metadata__", ()):
+                if isinstance(meta, Meta) and meta.ge is not None and meta.le is not None:
+                    found[field.name] = meta.ge, meta.le
+    return found
+
+
 class EstimatorParameters(
     msgspec.Struct, AnyEstimator, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
 ):
-    """Base of every estimator's parameters. Derive with `frozen=True, kw_only=True, tag="its_name"`."""
+    """Base of every estimator's parameters. Derive with `frozen=True, kw_only=True, tag="its_name"`.
+
+    Raises ValueError for a number that is not between the two bounds of its annotation, if it has both.
+    """
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in _ranges(type(self)).items():
+            value = getattr(self, name)
+            if value is not None and not least <= value <= most:
+                raise ValueError(f"{name}: {value!r} is out of range; must be {least} to {most}")
 
     def estimator(self) -> "Estimator[Any]":
         """A new estimator with these parameters, as it is before its first period."""

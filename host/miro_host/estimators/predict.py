@@ -31,11 +31,6 @@ class PredictParameters(EstimatorParameters, frozen=True, kw_only=True, tag="pre
     age_s: DelayS = 1001.0 / 30000.0
     ahead_s: DelayS = 0.033
 
-    def __post_init__(self) -> None:
-        for name in ("age_s", "ahead_s"):
-            if not 0.0 <= getattr(self, name) <= 0.25:
-                raise ValueError(f"{name}: {getattr(self, name)!r} is out of range; must be 0 to 0.25")
-
     def estimator(self) -> "Predictor":
         return Predictor(self)
 

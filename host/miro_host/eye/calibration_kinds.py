@@ -51,6 +51,9 @@ class CalibrationErrors(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
     ignore_distortion: bool = False
 
 
+ADDED = ("centre_u_px", "centre_v_px", "focal_share", "tilt_x_rad", "tilt_y_rad")
+
+
 def exact(true: CameraParameters) -> Calibration:
     """The calibration that knows the camera as it is."""
     return Calibration(camera=true)
@@ -90,12 +93,18 @@ def drawn_1997(
 ) -> Calibration:
     """A calibration that is wrong by `worst_m` at the worst place; by what the sizes give, if that is 0.
 
-    Takes three draws of the stream: two directions and a sign.
+    Takes three draws of the stream: two directions and a sign, uniform.
     """
-    errors = drawn_errors(stream, centre_px, focal_share, tilt_rad)
-    if worst_m > 0.0:
-        errors = scaled(errors, _factor(true, errors, worst_m))
-    return wrong(true, errors)
+    centre_sin, centre_cos = sincos(_TWO_PI * stream.uniform(0))
+    tilt_sin, tilt_cos = sincos(_TWO_PI * stream.uniform(1))
+    errors = CalibrationErrors(
+        centre_u_px=centre_px * centre_cos,
+        centre_v_px=centre_px * centre_sin,
+        focal_share=focal_share if stream.uniform(2) < 0.5 else 0.0 - focal_share,
+        tilt_x_rad=tilt_rad * tilt_cos,
+        tilt_y_rad=tilt_rad * tilt_sin,
+    )
+    return wrong(true, _scaled(errors, _factor(true, errors, worst_m)) if worst_m > 0.0 else errors)
 
 
 def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -> float:
@@ -103,7 +112,7 @@ def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -
     grid = _grid(true)
     factor = 1.0
     for _ in range(_STEPS):
-        found_m = _worst_m(grid, wrong(true, scaled(errors, factor)))
+        found_m = _worst_m(grid, wrong(true, _scaled(errors, factor)))
         if found_m == 0.0:
             return 1.0
         if found_m == math.inf:
@@ -113,34 +122,9 @@ def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -
     return factor
 
 
-def drawn_errors(
-    stream: Stream,
-    centre_px: float = CENTRE_PX,
-    focal_share: float = FOCAL_SHARE,
-    tilt_rad: float = TILT_RAD,
-) -> CalibrationErrors:
-    """Errors of these sizes: two directions and a sign, uniform."""
-    centre_sin, centre_cos = sincos(_TWO_PI * stream.uniform(0))
-    tilt_sin, tilt_cos = sincos(_TWO_PI * stream.uniform(1))
-    return CalibrationErrors(
-        centre_u_px=centre_px * centre_cos,
-        centre_v_px=centre_px * centre_sin,
-        focal_share=focal_share if stream.uniform(2) < 0.5 else 0.0 - focal_share,
-        tilt_x_rad=tilt_rad * tilt_cos,
-        tilt_y_rad=tilt_rad * tilt_sin,
-    )
-
-
-def scaled(errors: CalibrationErrors, factor: float) -> CalibrationErrors:
+def _scaled(errors: CalibrationErrors, factor: float) -> CalibrationErrors:
     """The same errors, larger by a factor; switches stay."""
-    return msgspec.structs.replace(
-        errors,
-        centre_u_px=factor * errors.centre_u_px,
-        centre_v_px=factor * errors.centre_v_px,
-        focal_share=factor * errors.focal_share,
-        tilt_x_rad=factor * errors.tilt_x_rad,
-        tilt_y_rad=factor * errors.tilt_y_rad,
-    )
+    return msgspec.structs.replace(errors, **{name: factor * getattr(errors, name) for name in ADDED})
 
 
 def worst_error_m(true: CameraParameters, calibration: Calibration) -> float:

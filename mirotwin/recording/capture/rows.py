@@ -13,7 +13,7 @@ from miro_protocol.transmission import DOWN, Transmission, character_ticks
 from mirotwin.recording.capture.source import READ_ERRORS
 
 if TYPE_CHECKING:
-    from miro_protocol.decoder import WindowDecoder
+    from miro_protocol.decoder import Scanner
 
 
 class DecodedRow(msgspec.Struct, frozen=True):
@@ -44,7 +44,7 @@ class _Decoding:
         self.layout = layout
         self.step = character_ticks(direction)
         self.robot = RobotReceiver(layout) if direction == DOWN else None
-        self.decoder: WindowDecoder = TelemetryDecoder() if self.robot is None else self.robot.decoder
+        self.decoder: Scanner = TelemetryDecoder() if self.robot is None else self.robot.decoder
         self.offset = 0
         self.end_tick = 0
 

@@ -103,7 +103,7 @@ class Program:
             self._frame[place] = value
         self._payload = form.payload_size
         self._layout = crc.register(bytes([form.layout]))
-        self._table = crc.byte_table()
+        self._table = crc.table_of(8)
         self._first = 0  # where the last frame begins
         self._damage = 0
         self.read(b"")

@@ -1,14 +1,13 @@
 """What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
 
 import re
-from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_host.plugins import PluginError
+from miro_host.plugins import PluginError, use_one_of
 from miro_protocol import toml_text
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.plugins import REGISTRIES, struct_of
@@ -272,9 +271,3 @@ def choices_of(struct: type[msgspec.Struct], key: str) -> str:
     fields = msgspec.structs.fields(struct)
     found = [_literals(_type_of(field.type)) for field in fields if field.encode_name == key]
     return use_one_of(found[0]) if found and found[0] else ""
-
-
-def use_one_of(choices: Iterable[str]) -> str:
-    """The remedy for what is not one of them."""
-    *others, last = choices
-    return f"use {', '.join(others)} or {last}" if others else f"use {last}"

@@ -3,7 +3,6 @@
 from miro_exact.state import snapshot
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol import scan
-from miro_protocol.decoder import WindowDecoder
 from miro_protocol.frames import ContentError, describe, encode, format_of, seal
 from miro_protocol.scan import Scanner
 from miro_protocol.table import TELEMETRY, downlink
@@ -136,7 +135,7 @@ def _frames(data):
     form = (downlink(n), TELEMETRY)[draw.below(2)]
     body = draw.take(form.size - 4).ljust(form.size - 4, b"\0")
     wire = seal(form, body)
-    (event,) = WindowDecoder(form).feed(wire)
+    (event,) = Scanner(form).feed(wire)
     assert event.body == body
     assert event.data == wire
     try:
