@@ -8,15 +8,9 @@ import click
 from mirotwin.shell.program import Lazy, LazyGroup, MainGroup
 
 CAMERA = {
-    "look": Lazy(
-        "mirotwin.camera.look_command", "Draws what the camera sees and what the tracker makes of it."
-    ),
-    "calibrate": Lazy(
-        "mirotwin.camera.calibrate_command", "Finds a camera's parameters from control points."
-    ),
-    "track": Lazy(
-        "mirotwin.camera.track_command", "Finds robots in pictures of your own, or in recorded ones."
-    ),
+    "look": Lazy("camera.look_command", "Draws what the camera sees and what the tracker makes of it."),
+    "calibrate": Lazy("camera.calibrate_command", "Finds a camera's parameters from control points."),
+    "track": Lazy("camera.track_command", "Finds robots in pictures of your own, or in recorded ones."),
 }
 
 
@@ -30,14 +24,14 @@ def camera() -> None:
 
 
 FIRMWARE = {
-    "run": Lazy("mirotwin.firmware.fw_run", "Runs IMAGE.ihx on a bare AT89C52."),
-    "disasm": Lazy("mirotwin.firmware.fw_image", "Lists an image's instructions."),
-    "trace": Lazy("mirotwin.firmware.fw_trace", "Writes each instruction with the registers it changed."),
-    "profile": Lazy("mirotwin.firmware.fw_profile", "Shows where the processor spends its time."),
-    "coverage": Lazy("mirotwin.firmware.fw_profile", "Shows which lines of the firmware ran."),
-    "vcd": Lazy("mirotwin.firmware.fw_trace", "Writes the wires as a VCD file."),
-    "header": Lazy("mirotwin.firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
-    "vectors": Lazy("mirotwin.firmware.fw_image", "Writes single-step test vectors of the processor."),
+    "run": Lazy("firmware.fw_run", "Runs IMAGE.ihx on a bare AT89C52."),
+    "disasm": Lazy("firmware.fw_image", "Lists an image's instructions."),
+    "trace": Lazy("firmware.fw_trace", "Writes each instruction with the registers it changed."),
+    "profile": Lazy("firmware.fw_profile", "Shows where the processor spends its time."),
+    "coverage": Lazy("firmware.fw_profile", "Shows which lines of the firmware ran."),
+    "vcd": Lazy("firmware.fw_trace", "Writes the wires as a VCD file."),
+    "header": Lazy("firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
+    "vectors": Lazy("firmware.fw_image", "Writes single-step test vectors of the processor."),
 }
 
 
@@ -56,12 +50,10 @@ def fw() -> None:
 
 CAMPAIGN = {
     "run": Lazy(
-        "mirotwin.campaign.campaign_run", "Makes the runs of FILE.toml; `campaign FILE.toml` is short for it."
+        "campaign.campaign_run", "Makes the runs of FILE.toml; `campaign FILE.toml` is short for it."
     ),
-    "show": Lazy(
-        "mirotwin.campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."
-    ),
-    "page": Lazy("mirotwin.campaign.page", "Makes one page of RESULTS.parquet."),
+    "show": Lazy("campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."),
+    "page": Lazy("campaign.page", "Makes one page of RESULTS.parquet."),
 }
 
 
@@ -88,47 +80,36 @@ def campaign() -> None:
 
 SECTIONS = {
     "Simulate": {
-        "run": Lazy("mirotwin.run.run_command", "Runs a scenario and writes its files."),
-        "serve": Lazy(
-            "mirotwin.ports.serve_command", "Offers the robot's radio as PTY, TCP and RFC 2217 ports."
-        ),
+        "run": Lazy("run.run_command", "Runs a scenario and writes its files."),
+        "serve": Lazy("ports.serve_command", "Offers the robot's radio as PTY, TCP and RFC 2217 ports."),
         "campaign": campaign,
-        "scenarios": Lazy("mirotwin.run.scenarios_command", "Lists the built-in scenarios, or shows one."),
+        "scenarios": Lazy("run.scenarios_command", "Lists the built-in scenarios, or shows one."),
     },
     "Test firmware": {
-        "init": Lazy(
-            "mirotwin.testing.starter",
-            "Begins a project: firmware, tests, scenarios, a workflow for CI.",
-        ),
-        "examples": Lazy("mirotwin.testing.starter", "Lists the examples, or writes one into a folder."),
-        "test": Lazy(
-            "mirotwin.testing.test_command", "Runs scenario files and cases as tests, a verdict each."
-        ),
-        "conform": Lazy(
-            "mirotwin.verify.conform.conform_command", "Tries the protocol's rules on a firmware image."
-        ),
-        "debug": Lazy("mirotwin.debug.debug_command", "Steps through the firmware, forwards and backwards."),
-        "fuzz": Lazy("mirotwin.fuzz.fuzz_command", "Looks for inputs that make a firmware image fail."),
+        "init": Lazy("testing.starter", "Begins a project: firmware, tests, scenarios, a workflow for CI."),
+        "examples": Lazy("testing.starter", "Lists the examples, or writes one into a folder."),
+        "test": Lazy("testing.test_command", "Runs scenario files and cases as tests, a verdict each."),
+        "conform": Lazy("verify.conform.conform_command", "Tries the protocol's rules on a firmware image."),
+        "debug": Lazy("debug.debug_command", "Steps through the firmware, forwards and backwards."),
+        "fuzz": Lazy("fuzz.fuzz_command", "Looks for inputs that make a firmware image fail."),
     },
     "Recorded data": {
-        "replay": Lazy("mirotwin.replay.replay_command", "Sends recorded bytes again and compares."),
-        "diff": Lazy("mirotwin.replay.diff_command", "Compares two recordings."),
-        "report": Lazy("mirotwin.report.report_command", "Makes one page of a run, a case or a failed test."),
-        "decode": Lazy("mirotwin.recording.decode_command", "Decodes captured bytes to frames and damage."),
-        "export": Lazy(
-            "mirotwin.report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."
-        ),
+        "replay": Lazy("replay.replay_command", "Sends recorded bytes again and compares."),
+        "diff": Lazy("replay.diff_command", "Compares two recordings."),
+        "report": Lazy("report.report_command", "Makes one page of a run, a case or a failed test."),
+        "decode": Lazy("recording.decode_command", "Decodes captured bytes to frames and damage."),
+        "export": Lazy("report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."),
     },
     "Paper": {
         "reproduce": Lazy(
-            "mirotwin.campaign.reproduce.reproduce_command",
+            "campaign.reproduce.reproduce_command",
             "Runs the paper's figures again and writes one page about them.",
         ),
     },
     "Camera, firmware, installation": {
         "camera": camera,
         "fw": fw,
-        "info": Lazy("mirotwin.shell.info_command", "Shows versions, engine and firmware."),
+        "info": Lazy("shell.info_command", "Shows versions, engine and firmware."),
     },
 }
 

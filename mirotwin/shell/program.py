@@ -136,7 +136,7 @@ def _ended(code: int, message: str) -> int:
 
 
 class Lazy(NamedTuple):
-    """A command that is loaded when it is used."""
+    """A command that is loaded when it is used, from this module of ours."""
 
     module: str
     about: str
@@ -164,7 +164,7 @@ class LazyGroup(click.Group):
         found = self.listed.get(cmd_name)
         if not isinstance(found, Lazy):
             return found or super().get_command(ctx, cmd_name)
-        command = getattr(import_module(found.module), cmd_name)
+        command = getattr(import_module(f"mirotwin.{found.module}"), cmd_name)
         assert isinstance(command, click.Command)
         command.short_help = found.about
         return command

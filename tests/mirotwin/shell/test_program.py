@@ -22,7 +22,7 @@ LAZY = [
 
 @pytest.mark.parametrize(("name", "lazy"), LAZY)
 def test_a_command_is_called_as_the_list_calls_it(name, lazy):
-    assert getattr(import_module(lazy.module), name).name == name
+    assert getattr(import_module(f"mirotwin.{lazy.module}"), name).name == name
 
 
 def test_help_lists_every_command(mirotwin):
