@@ -31,19 +31,16 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
     if format != "recording":
         what = f"{NAMES[format]}, which holds no postures"
         raise BadInput(given.label, "", what, "give a run.mcap that `mirotwin run` wrote")
-    from mirotwin.report.foxglove.convert import convert  # loads most of the package
+    from mirotwin.report.foxglove.convert import Conversion  # loads most of the package
 
-    pieces = []
-    while piece := given.read_some():
-        pieces.append(piece)
     made = BytesIO()
-    result = convert(b"".join(pieces), given.label, made)
+    conversion = Conversion(b"".join(iter(given.read_some, b"")), given.label, made)
     _write(out, [made.getvalue()])
-    for note in result.notes:
+    for note in conversion.notes:
         complain(note)
     if not quiet and out != STDIN:
-        frames = f" and {result.images} camera frames" if result.images else ""
-        show(f"{out}: {amount(result.periods, 'control period')}{frames} for Foxglove")
+        frames = f" and {conversion.images} camera frames" if conversion.images else ""
+        show(f"{out}: {amount(len(conversion.periods), 'control period')}{frames} for Foxglove")
     return DONE
 
 

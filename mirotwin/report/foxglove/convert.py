@@ -16,7 +16,6 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.clock import nanoseconds
-from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
@@ -28,6 +27,7 @@ from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.writer import McapWriter
 from mirotwin.report.foxglove import derived, messages, notes
 from mirotwin.report.foxglove.derived import Derived, Said
+from mirotwin.report.foxglove.frames import camera_frame
 
 PREFIX = "foxglove."
 
@@ -48,51 +48,36 @@ def _published(name: str) -> bytes:
 FAULT = "fault"
 
 
-class Converted(msgspec.Struct):
-    """The result. `notes`: what is missing, and why, a line each."""
+class Conversion:
+    """Writes a recording with Foxglove's topics. `path` names it in errors. Raises BadInput.
 
-    periods: int
-    images: int
-    notes: list[str]
+    `images` that were written; `notes`: what is missing, and why, a line each.
+    """
 
-
-def convert(data: bytes, path: str, stream: BinaryIO) -> Converted:
-    """Writes the recording `data` with Foxglove's topics. `path` names it in errors. Raises BadInput."""
-    recording = reader.parse(data, path)
-    told = [recording.broken_off] if recording.broken_off else []
-    scenario: Scenario | None = None
-    try:
-        scenario = parse(recording.source.scenario_text, path)
-    except ScenarioError as error:
-        told.append(f"{error}; so there are no camera, no ball, no patches and no references in the scene")
-    return _Conversion(path, recording.periods, Derived(scenario), stream, told).run(data)
-
-
-class _Conversion:
-    """The state of a conversion: which schemas and channels the new file has."""
-
-    def __init__(
-        self,
-        path: str,
-        periods: tuple[Period, ...],
-        derive: Derived,
-        stream: BinaryIO,
-        told: list[str],
-    ) -> None:
+    def __init__(self, data: bytes, path: str, stream: BinaryIO) -> None:
+        recording = reader.parse(data, path)
         self.path = path
-        self.periods = periods
-        self.derive = derive
+        self.periods = recording.periods
+        self.images = 0
+        self.notes = [recording.broken_off] if recording.broken_off else []
+        scenario: Scenario | None = None
+        try:
+            scenario = parse(recording.source.scenario_text, path)
+        except ScenarioError as error:
+            without = "so there are no camera, no ball, no patches and no references in the scene"
+            self.notes.append(f"{error}; {without}")
+        self.derive = Derived(scenario)
         self.writer = McapWriter(stream, profile=METADATA, library=METADATA)
-        self.result = Converted(len(periods), 0, told)
         self._images = msgspec.json.Decoder(ImageMessage)
         self._faults = msgspec.json.Decoder(FaultMessage)
         self._schemas: dict[int, int] = {}  # theirs by number -> ours
         self._channels: dict[int, tuple[int, Topic | None]] = {}
         self._named: dict[str, int] = {}
         self._topics: dict[str, int] = {}
-        self._next = 0
+        self._coming = iter(recording.periods)
+        self._convert(data)
 
-    def run(self, data: bytes) -> Converted:
+    def _convert(self, data: bytes) -> None:
         broken = False
         try:
             for _, record in Records(BytesIO(data).read, self.path):
@@ -103,7 +88,6 @@ class _Conversion:
                 reason = {"by": type(error).__name__, "reason": shortened(error.what)}
                 self.writer.add_metadata(BROKEN_OFF, reason)
         self.writer.finish()
-        return self.result
 
     def _take(self, record: object) -> None:
         if isinstance(record, Message):
@@ -143,9 +127,7 @@ class _Conversion:
             fault = self._faults.decode(record.data)
             line = notes.of_fault(topic.network, topic.slot, fault.tick, fault.text)
             self._add(Said(derived.LOG, fault.tick, line))
-        elif topic.channel == PERIOD and self._next < len(self.periods):
-            period = self.periods[self._next]
-            self._next += 1
+        elif topic.channel == PERIOD and (period := next(self._coming, None)):
             for said in self.derive.period(period):
                 self._add(said)
 
@@ -155,8 +137,10 @@ class _Conversion:
         except (msgspec.DecodeError, ValueError) as error:
             where = f"{topic_name(IMAGE, topic.network)} at {record.log_time} ns"
             raise RecordingError(self.path, where, brief(error), AGAIN) from None
-        self.result.images += 1
-        self._add(derived.image(topic.network, found.tick, found.data))
+        self.images += 1
+        frame = camera_frame(topic.network)
+        message = messages.CompressedImage(messages.time_of(found.tick), frame, found.data, "png")
+        self._add(Said(f"{derived.PREFIX}net{topic.network}/image", found.tick, message))
 
     def _add(self, said: Said) -> None:
         topic, tick, message = said

@@ -16,7 +16,6 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
 from mirotwin.report.foxglove import frames, notes, pitch, robots
 from mirotwin.report.foxglove.messages import (
-    CompressedImage,
     FrameTransforms,
     SceneEntity,
     SceneUpdate,
@@ -113,12 +112,6 @@ class Derived:
             yield from robots.drawn(*place, pattern, at)
             if self._paths.get(place):
                 yield robots.reference_line(*place, self._paths[place], at)
-
-
-def image(network: int, tick: int, png: bytes) -> Said:
-    """The frame of a network's camera that was exposed at `tick`."""
-    message = CompressedImage(time_of(tick), frames.camera_frame(network), png, "png")
-    return Said(f"{PREFIX}net{network}/image", tick, message)
 
 
 def _networks(period: Period) -> list[int]:

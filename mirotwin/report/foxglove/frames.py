@@ -13,7 +13,6 @@ from collections.abc import Iterator
 
 from miro_exact.dmath import sincos
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
-from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
 from mirotwin.report.foxglove.messages import (
     CameraCalibration,
@@ -31,30 +30,21 @@ def robot_frame(network: int, slot: int) -> str:
     return f"net{network}/robot{slot}"
 
 
-def measured_frame(network: int, slot: int) -> str:
-    return f"{robot_frame(network, slot)}/measured"
-
-
-def reference_frame(network: int, slot: int) -> str:
-    return f"{robot_frame(network, slot)}/reference"
-
-
 def camera_frame(network: int) -> str:
     return f"net{network}/camera"
 
 
 def of_robot(robot: RobotPeriod, at: Timestamp) -> Iterator[FrameTransform]:
     """Truth, reference, and the measurement if there is one."""
-    place = robot.network, robot.slot
-    yield _on_floor(robot_frame(*place), robot.truth, at)
-    yield _on_floor(reference_frame(*place), robot.reference, at)
-    if robot.measurement is not None:
-        yield _on_floor(measured_frame(*place), robot.measurement, at)
-
-
-def _on_floor(frame: str, posture: Posture, at: Timestamp) -> FrameTransform:
-    place = Vector3(posture.x_m, posture.y_m, 0.0)
-    return FrameTransform(at, PITCH, frame, place, heading(posture.theta_rad))
+    frame = robot_frame(robot.network, robot.slot)
+    for name, posture in (
+        (frame, robot.truth),
+        (f"{frame}/reference", robot.reference),
+        (f"{frame}/measured", robot.measurement),
+    ):
+        if posture is not None:
+            place = Vector3(posture.x_m, posture.y_m, 0.0)
+            yield FrameTransform(at, PITCH, name, place, heading(posture.theta_rad))
 
 
 UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)

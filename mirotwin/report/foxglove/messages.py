@@ -54,13 +54,9 @@ class FrameTransforms(msgspec.Struct, frozen=True):
     transforms: tuple[FrameTransform, ...]
 
 
-class CubePrimitive(msgspec.Struct, frozen=True):
-    pose: Pose
-    size: Vector3
-    color: Color
+class SolidPrimitive(msgspec.Struct, frozen=True):
+    """A cube or a sphere."""
 
-
-class SpherePrimitive(msgspec.Struct, frozen=True):
     pose: Pose
     size: Vector3
     color: Color
@@ -109,8 +105,8 @@ class SceneEntity(msgspec.Struct, frozen=True, kw_only=True):
     frame_locked: bool = True
     metadata: tuple[()] = ()
     arrows: tuple[()] = ()
-    cubes: tuple[CubePrimitive, ...] = ()
-    spheres: tuple[SpherePrimitive, ...] = ()
+    cubes: tuple[SolidPrimitive, ...] = ()
+    spheres: tuple[SolidPrimitive, ...] = ()
     cylinders: tuple[()] = ()
     lines: tuple[LinePrimitive, ...] = ()
     triangles: tuple[TriangleListPrimitive, ...] = ()

@@ -26,9 +26,10 @@ from mirotwin.report.foxglove.frames import PITCH
 from mirotwin.report.foxglove.messages import (
     LINE_LIST,
     LINE_LOOP,
-    CubePrimitive,
     LinePrimitive,
+    Pose,
     SceneEntity,
+    SolidPrimitive,
     Timestamp,
     TriangleListPrimitive,
     Vector3,
@@ -61,12 +62,13 @@ def pitch(at: Timestamp) -> SceneEntity:
 
 def ball(found: Ball, at: Timestamp) -> SceneEntity:
     """The golf ball, which lies still."""
-    place = (found.x_cm / 100.0, found.y_cm / 100.0, BALL_RADIUS_M)
-    sphere = shapes.ball(place, BALL_RADIUS_M, shapes.paint("ball middle"))
+    across, place = 2.0 * BALL_RADIUS_M, Vector3(found.x_cm / 100.0, found.y_cm / 100.0, BALL_RADIUS_M)
+    size = Vector3(across, across, across)
+    sphere = SolidPrimitive(Pose(place, shapes.STRAIGHT), size, shapes.paint("ball middle"))
     return SceneEntity(timestamp=at, frame_id=PITCH, id="ball", spheres=(sphere,))
 
 
-def _floor() -> Iterator[CubePrimitive]:
+def _floor() -> Iterator[SolidPrimitive]:
     paint = shapes.paint("floor")
     yield shapes.box((LEFT_M, BOTTOM_M, -FLOOR_DEEP_M), (RIGHT_M, TOP_M, 0.0), paint)
     low, high = MIDDLE_Y_M - GOAL_HALF_M, MIDDLE_Y_M + GOAL_HALF_M
@@ -74,7 +76,7 @@ def _floor() -> Iterator[CubePrimitive]:
         yield shapes.box((left, low, -FLOOR_DEEP_M), (right, high, 0.0), paint)
 
 
-def _walls() -> Iterator[CubePrimitive]:
+def _walls() -> Iterator[SolidPrimitive]:
     """White boxes with thin black ones on top of them."""
     for left, bottom, right, top in _wall_places():
         yield shapes.box((left, bottom, 0.0), (right, top, WALL_M), shapes.paint("wall face"))

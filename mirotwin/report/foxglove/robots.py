@@ -23,13 +23,13 @@ from miro_sim.periods import RobotPeriod
 from miro_sim.scenario.build import reference_for
 from miro_sim.scenario.keys import RobotSpec
 from mirotwin.report.foxglove import shapes
-from mirotwin.report.foxglove.frames import PITCH, measured_frame, reference_frame, robot_frame
+from mirotwin.report.foxglove.frames import PITCH, robot_frame
 from mirotwin.report.foxglove.messages import (
     LINE_LOOP,
     Color,
-    CubePrimitive,
     Pose,
     SceneEntity,
+    SolidPrimitive,
     TextPrimitive,
     Timestamp,
     Vector3,
@@ -54,20 +54,17 @@ def drawn(network: int, slot: int, pattern: PatternName | None, at: Timestamp) -
     )
     cubes = (*_body(), *(() if pattern is None else _patches(network, slot, pattern)))
     yield SceneEntity(timestamp=at, frame_id=frame, id=frame, cubes=cubes, texts=(label,))
-    for ghost, color in (
-        (measured_frame(network, slot), MEASURED),
-        (reference_frame(network, slot), REFERENCE),
-    ):
-        yield _outline(ghost, color, at)
+    yield _outline(f"{frame}/measured", MEASURED, at)
+    yield _outline(f"{frame}/reference", REFERENCE, at)
 
 
-def _body() -> Iterator[CubePrimitive]:
+def _body() -> Iterator[SolidPrimitive]:
     low = ROBOT_HEIGHT_M - TOP_M
     yield shapes.box((-HALF_M, -HALF_M, 0.0), (HALF_M, HALF_M, low), shapes.paint("side"))
     yield shapes.box((-HALF_M, -HALF_M, low), (HALF_M, HALF_M, ROBOT_HEIGHT_M), shapes.paint("top"))
 
 
-def _patches(network: int, slot: int, pattern: PatternName) -> Iterator[CubePrimitive]:
+def _patches(network: int, slot: int, pattern: PatternName) -> Iterator[SolidPrimitive]:
     """Team and identity, as far as there are colours for them."""
     half = PATCH_MM / 2000.0
     for names, number, place in zip((TEAMS, IDENTITIES), (network, slot), PATTERNS[pattern], strict=True):

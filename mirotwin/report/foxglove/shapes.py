@@ -10,11 +10,10 @@ from miro_sim.pitch.paints import PAINTS
 from mirotwin.report.foxglove.messages import (
     LINE_STRIP,
     Color,
-    CubePrimitive,
     LinePrimitive,
     Pose,
     Quaternion,
-    SpherePrimitive,
+    SolidPrimitive,
     Vector3,
 )
 
@@ -39,17 +38,11 @@ def paint(name: str, alpha: float = 1.0) -> Color:
     return Color(red, green, blue, alpha)
 
 
-def box(low: tuple[float, float, float], high: tuple[float, float, float], color: Color) -> CubePrimitive:
+def box(low: tuple[float, float, float], high: tuple[float, float, float], color: Color) -> SolidPrimitive:
     """Between two corners."""
     middle = Vector3(*((one + other) / 2.0 for one, other in zip(low, high, strict=True)))
     size = Vector3(*(other - one for one, other in zip(low, high, strict=True)))
-    return CubePrimitive(Pose(middle, STRAIGHT), size, color)
-
-
-def ball(at: tuple[float, float, float], radius_m: float, color: Color) -> SpherePrimitive:
-    """A ball with its centre there."""
-    across = 2.0 * radius_m
-    return SpherePrimitive(Pose(Vector3(*at), STRAIGHT), Vector3(across, across, across), color)
+    return SolidPrimitive(Pose(middle, STRAIGHT), size, color)
 
 
 def line(

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from mcap.reader import make_reader
 
-from mirotwin.report.foxglove.convert import convert
+from mirotwin.report.foxglove.convert import Conversion
 
 TWO_TEAMS = """name = "teams"
 title = "Two teams"
@@ -62,7 +62,7 @@ def read(data):
 def exported(data):
     """A recording with Foxglove's topics, and what is said of it."""
     stream = io.BytesIO()
-    result = convert(data, "run.mcap", stream)
+    result = Conversion(data, "run.mcap", stream)
     return stream.getvalue(), result
 
 
