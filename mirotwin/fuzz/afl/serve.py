@@ -39,39 +39,24 @@ if TYPE_CHECKING:
 _FAILED = ctypes.c_void_p(-1).value
 
 
-class _Description(ctypes.Structure):
-    """Head of Linux's `struct shmid_ds` on 64-bit machines: `struct ipc_perm`, then the size (`man 2 shmctl`)."""
-
-    _fields_ = (("permissions", ctypes.c_byte * 48), ("size", ctypes.c_size_t), ("rest", ctypes.c_byte * 128))
-
-
-_IPC_STAT = 2
-
-
-def attach(number: int) -> memoryview:
-    """The segment as writable bytes. Raises OSError when there is none of this number."""
+def attach(number: int, size: int) -> memoryview:
+    """The first `size` bytes of a segment, writable. Raises OSError when there is none of this number."""
     library = ctypes.CDLL(None, use_errno=True)
     library.shmat.restype = ctypes.c_void_p
     library.shmat.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_int)
-    library.shmctl.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p)
-    found = _Description()
-    if library.shmctl(number, _IPC_STAT, ctypes.byref(found)):
-        raise _last_error(number)
     address = library.shmat(number, None, 0)
     if address == _FAILED:
-        raise _last_error(number)
-    return memoryview((ctypes.c_ubyte * found.size).from_address(address)).cast("B")
-
-
-def _last_error(number: int) -> OSError:
-    code = ctypes.get_errno()
-    return OSError(code, f"shared memory {number}: {os.strerror(code)}")
+        code = ctypes.get_errno()
+        raise OSError(code, f"shared memory {number}: {os.strerror(code)}")
+    return memoryview((ctypes.c_ubyte * size).from_address(address)).cast("B")
 
 
 CONTROL_FD, STATUS_FD = 198, 199
 MAP_VARIABLE, CASES_VARIABLE = "__AFL_SHM_ID", "__AFL_SHM_FUZZ_ID"
 
 ENABLED, MAP_SIZE_FOLLOWS, CASES_IN_SHARED_MEMORY = 0x8000_0001, 0x4000_0000, 0x0100_0000
+CASES_BYTES = 4 + (1 << 20)
+"""A length, and as many bytes as AFL++ gives at most (MAX_FILE of its config.h)."""
 NO_PROCESS = 0x7FFF_FFFE
 """Above the highest process id of Linux (2^22)."""
 
@@ -111,7 +96,7 @@ def answer(target: Target, cases: memoryview, control: int, status: int, keep: C
 def serve(target: Target, keep: Callable[[int], None]) -> bool:
     """Serves AFL++ until it ends; False when there is none."""
     if MAP_VARIABLE in os.environ:
-        target.use_map(attach(int(os.environ[MAP_VARIABLE]))[: target.map_size])
+        target.use_map(attach(int(os.environ[MAP_VARIABLE]), target.map_size))
     if not _is_writable(STATUS_FD):
         return False
     if MAP_VARIABLE not in os.environ:
@@ -122,7 +107,7 @@ def serve(target: Target, keep: Callable[[int], None]) -> bool:
             return True
         if CASES_VARIABLE not in os.environ:
             raise BadInput("AFL++", "", f"{CASES_VARIABLE} is not set", "install AFL++ 4.00c or newer")
-        cases = attach(int(os.environ[CASES_VARIABLE]))
+        cases = attach(int(os.environ[CASES_VARIABLE]), CASES_BYTES)
         answer(target, cases, CONTROL_FD, STATUS_FD, keep)
     return True
 
