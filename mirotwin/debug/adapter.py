@@ -35,7 +35,7 @@ CAPABILITIES = (
 _WITHOUT_A_RUN = ("initialize", "launch", "disconnect", "terminate")
 _WHILE_IT_RUNS = (
     "threads", "setBreakpoints", "setFunctionBreakpoints", "setInstructionBreakpoints", "setDataBreakpoints",
-    "dataBreakpointInfo",
+    "dataBreakpointInfo", "disconnect", "terminate",
 )  # fmt: skip
 _MOVES = {
     "continue": "continue", "reverseContinue": "rcontinue", "next": "next", "stepBack": "rnext", "stepIn": "step",
@@ -70,7 +70,7 @@ class Adapter:
         """Until the client leaves. Raises BadInput for what is no message, OSError where it has gone."""
         while not self.ended and (request := self.wire.next()) is not None:
             self.answer(request)
-            if self.run_after is not None:
+            while self.run_after is not None:
                 run, self.run_after = self.run_after, None
                 run()
 
@@ -149,9 +149,10 @@ class Adapter:
         self.run_after = self.begin
 
     def on_disconnect(self, given: Message) -> None:
-        self.ended = True
+        self.paused = self.ended = True
 
     def on_terminate(self, given: Message) -> None:
+        self.paused = True
         self.run_after = partial(self._event, "terminated")
 
     # Breakpoints
@@ -257,8 +258,7 @@ class Adapter:
     def _interrupted(self) -> bool:
         """Answers what comes during a run; true where that ends it."""
         while (request := self.wire.next(wait=False)) != {}:
-            if request is None or request["command"] in ("disconnect", "terminate"):
-                self.wire.back.append(request)
+            if request is None:
                 self.paused = True
             elif request["command"] == "pause":
                 self.paused = True

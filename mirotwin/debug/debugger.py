@@ -159,14 +159,14 @@ class Debugger:
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
         return bool(entered) and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
 
-    def _traps(self, step: Trap | None = None, silent: bool = False) -> dict[int, Trap]:
+    def _traps(self, step: Trap | None = None) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
         places = frozenset[int]().union(*(one.addresses for one in self.breakpoints))
 
         def ask(core: Core) -> object:
             pc = core.cpu.pc
             there = (one for one in self.breakpoints if pc in one.addresses)
-            found = next((one for one in there if self._stops(one, core, silent)), None)
+            found = next((one for one in there if self._stops(one, core)), None)
             if found is None and step is not None and core is self.timeline.core and pc in step.addresses:
                 return step.ask(core)
             return found
@@ -186,7 +186,7 @@ class Debugger:
             return bool(number(one.condition(Moment(self.symbols, core))))
         return False
 
-    def _stops(self, one: Breakpoint, core: Core, silent: bool) -> bool:
+    def _stops(self, one: Breakpoint, core: Core) -> bool:
         if not self._is_met(one, core):
             return False
         at = (core.cpu.cycles, self.timeline.cores.index(core))
@@ -195,7 +195,7 @@ class Debugger:
                 one.hits.append(at)
             if not one.count(bisect.bisect_left(one.hits, at) + 1):
                 return False
-        if one.log is not None and not silent:
+        if one.log is not None:
             self.told.append(LogOutput(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
         return one.log is None
 
@@ -249,7 +249,8 @@ class Debugger:
 
     def _back(self) -> str:
         self._count_hits()
-        hit = self.timeline.find_back(self._traps(silent=True))
+        hit = self.timeline.find_back(self._traps())
+        self.told.clear()
         return self._at_begin() if hit is None else _named(hit)
 
     def _at_begin(self) -> str:

@@ -35,7 +35,6 @@ class Wire:
         self.sink = sink
         self.sequence = 0
         self.came: queue.SimpleQueue[Message | BadInput | None] = queue.SimpleQueue()
-        self.back: list[Message | BadInput | None] = []
         threading.Thread(target=self._read_all, daemon=True).start()
 
     def next(self, wait: bool = True) -> Message | None:
@@ -44,11 +43,12 @@ class Wire:
         Raises BadInput for what is no message, again and again: nothing is read after it.
         """
         try:
-            found = self.back.pop(0) if self.back else self.came.get(block=wait)
+            found = self.came.get(block=wait)
         except queue.Empty:
             return {}
+        if not isinstance(found, dict):
+            self.came.put(found)  # it is the last one
         if isinstance(found, BadInput):
-            self.back.append(found)
             raise found
         return found
 
