@@ -106,13 +106,11 @@ def plain_ratio(scenario: str, seconds: float) -> float:
     """A run under the debugger with a breakpoint that is never hit, over the plain loop: medians, interleaved."""
     plain, debugged = [], []
     for _ in range(5):
-        bare = run_of(scenario, seconds)
-        plain.append(cpu_ms(lambda run=bare: run.to(int(seconds * TICKS_PER_SECOND))))  # type: ignore[misc]
-        debugger = debugger_of(run_of(scenario, seconds))
+        bare, debugger = run_of(scenario, seconds), debugger_of(run_of(scenario, seconds))
+        assert bare.end_tick is not None
+        plain.append(cpu_ms(partial(bare.to, bare.end_tick)))
         debugger.add("0x1fff")
-        debugged.append(
-            cpu_ms(partial(debugger.timeline.find, debugger._traps(), int(seconds * TICKS_PER_SECOND)))
-        )
+        debugged.append(cpu_ms(partial(debugger.move, "continue")))
     return median(debugged) / median(plain)
 
 
@@ -143,7 +141,7 @@ def main() -> None:
         length = min(seconds, run.end_tick / TICKS_PER_SECOND - 0.1)
         debugger = debugger_of(run)
         end = int(length * TICKS_PER_SECOND)
-        debugger.timeline.find({}, end)
+        debugger.timeline.go_to(end)
         lines, instructions, places = steps(debugger, length)
         show(f"{robots}: a line back through the protocol", lines, "50 ms")
         show(f"{robots}: an instruction back", instructions, f"{5 * factor} ms")

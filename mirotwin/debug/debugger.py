@@ -227,14 +227,8 @@ class Debugger:
 
     def go_to(self, tick: int) -> str:
         """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
-        timeline = self.timeline
-        if tick > timeline.frontier:
-            timeline.go_to(timeline.frontier)
-            timeline.find({}, tick)
-        if tick <= timeline.frontier:
-            timeline.go_to(tick)
-            return self._at_end() or "goto"
-        return self._at_end() or INTERRUPTED
+        reached = self.timeline.go_to(tick, self.timeline.interrupted)
+        return self._at_end() or ("goto" if reached else INTERRUPTED)
 
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()

@@ -124,7 +124,8 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, CaseVe
 def _judged(timeline: Timeline, world: World, job: Job) -> CaseVerdict:
     """What the check of a case says this time."""
     checks = Checks(world, job.expectations_of_case())
-    timeline.find({}, job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS)
+    end_tick = job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS
+    timeline.go_to(end_tick, timeline.interrupted)
     checks.finish()
     return job.verdict_of_case(checks)
 

@@ -107,11 +107,6 @@ class Timeline:
         return self._kept[0].tick
 
     @property
-    def frontier(self) -> int:
-        """How far the run has been."""
-        return max(self._kept[-1].tick, self._now)
-
-    @property
     def tick(self) -> int:
         """Where the processor in focus stands."""
         return self.core.cpu.cycles * CYCLE_TICKS
@@ -167,13 +162,17 @@ class Timeline:
 
     # Moving
 
-    def go_to(self, tick: int) -> None:
-        """To the first moment at or after `tick`, or to the end of the run."""
+    def go_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> bool:
+        """To the first moment at or after `tick`, or to the end of the run; whether it came there.
+
+        `stops` is asked between two pieces: true ends it where it is.
+        """
         at = self._before(tick + 1)
         if not self._kept[at].tick <= self._now <= tick:
             self._load(at)
-        self._run_to(tick)
+        self._run_to(tick, stops)
         self._settle()
+        return self._now >= tick
 
     def _settle(self) -> None:
         """Everything else on to where the processor in focus stands: it may have gone past a tick by an instruction.
@@ -187,7 +186,6 @@ class Timeline:
                     core.board.sync(self._now)
 
     def _run_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> None:
-        """`stops` is asked between two pieces."""
         while self._now < tick and not self.run.over:
             end_tick = (self._now // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
             self.run.to(min(tick, end_tick))
@@ -255,10 +253,10 @@ class Timeline:
             finally:
                 self.interrupted = before
 
-    def find(self, traps: Mapping[int, Trap], until_tick: int = NEVER_TICK) -> Hit | None:
+    def find(self, traps: Mapping[int, Trap]) -> Hit | None:
         """Goes on to the first moment after this one at which a trap, by processor, finds something.
 
-        None, and no further than the end of the run, `until_tick` or an interruption, if there is none.
+        None, at the end of the run or where it was interrupted, if there is none.
         """
         here = (self.core.cpu.cycles, self.focus)
         with self._asking(traps, lambda hit: hit[:2] > here) as found:
@@ -266,7 +264,7 @@ class Timeline:
             def later() -> list[Hit]:
                 return [hit for hit in found if hit[:2] > here]
 
-            self._run_to(until_tick, lambda: bool(later()) or self.interrupted())
+            self._run_to(NEVER_TICK, lambda: bool(later()) or self.interrupted())
         hit = min(later(), key=_ORDER, default=None)
         if hit is None:
             self._settle()
