@@ -56,31 +56,24 @@ class HypothesisRun(Engine):
         return BadInput("Hypothesis", "", what, f"see {job.log}")
 
 
-class Stopped(BaseException):
-    """Ends a round: Hypothesis takes exceptions derived from Exception for failures."""
-
-
 def explore(
-    explorer: Explorer, spec: TargetSpec, seeds: Sequence[bytes], seed: int, goes_on: Callable[[], bool]
+    explorer: Explorer, spec: TargetSpec, seeds: Sequence[bytes], seed: int, tell: Callable[[], None]
 ) -> None:
-    """Runs the seeds, then what Hypothesis draws, as long as `goes_on()`, which is asked before each run."""
+    """Runs the seeds, then what Hypothesis draws, for ever. `tell` is called before each run."""
     from miro_exact.rng import Stream  # a hot module: not before the engine was chosen
 
+    def run(data: bytes) -> int:
+        tell()
+        return explorer.run(data)
+
     for data in seeds:
-        if not goes_on():
-            return
-        explorer.run(data)
+        run(data)
     stream = Stream(seed, "rounds of Hypothesis")
-    try:
-        for number in count():
-            _round(explorer, spec, seeds, stream.u64(number), goes_on)
-    except Stopped:
-        return
+    for number in count():
+        _round(run, spec, seeds, stream.u64(number))
 
 
-def _round(
-    explorer: Explorer, spec: TargetSpec, seeds: Sequence[bytes], seed: int, goes_on: Callable[[], bool]
-) -> None:
+def _round(run: Callable[[bytes], int], spec: TargetSpec, seeds: Sequence[bytes], seed: int) -> None:
     import hypothesis
 
     from mirotwin.fuzz.hypothesis_inputs import inputs
@@ -97,9 +90,7 @@ def _round(
     )
     @hypothesis.given(drawn)
     def one(data: bytes) -> None:
-        if not goes_on():
-            raise Stopped
-        hypothesis.target(float(explorer.run(data)), label="edges")
+        hypothesis.target(float(run(data)), label="edges")
 
     one()
 
@@ -115,22 +106,21 @@ def main(arguments: Sequence[str]) -> int:
         print(error, file=sys.stderr)
         return 2
     kept: Counter[str] = Counter()
-    tell, told_s = counter(Path(f"{folder}.counts")), 0.0
+    write, told_s = counter(Path(f"{folder}.counts")), 0.0
 
     def keep(kind: str, data: bytes) -> None:
         path = Path(folder, kind, f"id:{kept[kind]:06d}")
         kept[kind] += 1
         replace_file(path, data)
 
-    def goes_on() -> bool:
+    def tell() -> None:
         nonlocal told_s
         if time.monotonic() - told_s >= TOLD_S:
             told_s = time.monotonic()
-            tell(target.executions)
-        return True
+            write(target.executions)
 
     seeds = [path.read_bytes() for path in sorted(Path(seeds_folder).iterdir())]
-    explore(Explorer(target, keep), spec, seeds, int(seed), goes_on)
+    explore(Explorer(target, keep), spec, seeds, int(seed), tell)
     return 0
 
 

@@ -9,6 +9,7 @@ fails thousands of inputs, which are counted.
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +23,6 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import collect, write
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.minimise import Budget, minimise
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
 from mirotwin.fuzz.target import TargetFailure
 from mirotwin.verify.checks.interface import Failure
@@ -130,7 +130,7 @@ class Triage:
         if self._in_vain[group] >= SAME_TRIED:
             self.more[self._last[group].name] += 1
             return None
-        small = minimise(data, fails, Budget(tries, self.minimise_s, self.tell))
+        small = minimise(data, fails, tries, self.minimise_s, self.tell)
         counts = self.reached.run(small)
         key = (*group, self.reached.path(counts))
         known = self._by_key.get(key)
@@ -196,3 +196,53 @@ class Triage:
         report = collect(self.target.image, counts, self.sources, path)
         write(report.tracefile, report, path, "--out")
         return report.tracefile
+
+
+Question = Callable[[bytes], bool]
+"""Whether an input still does it."""
+
+
+def minimise(
+    data: bytes, still: Question, tries: int, time_s: float, tell: Callable[[], None] = lambda: None
+) -> bytes:
+    """The simplest input found within so many tries and so much wall time for which `still` is true.
+
+    `data` itself, where it is not of that. An input that is shorter is simpler; of two as long as each other, the one
+    with more zeros. `tell` is called before each try, for whoever draws a progress line.
+
+    Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input, IEEE TSE 28(2), 2002), in
+    the form that takes away one chunk after the other, from half of the input down to single bytes, then the same with
+    zeros in the place of chunks. The order of tries depends on the input alone; where time is over first, a slower
+    machine keeps a longer input.
+    """
+    end_s = time.monotonic() + time_s
+
+    def asked(one: bytes) -> bool:
+        nonlocal tries
+        if tries <= 0 or time.monotonic() >= end_s:
+            return False
+        tries -= 1
+        tell()
+        return still(one)
+
+    before = None if asked(data) else data
+    while data != before:
+        before = data
+        data = _simpler(data, asked, lambda chunk: b"")
+        data = _simpler(data, asked, lambda chunk: bytes(len(chunk)))
+    return data
+
+
+def _simpler(data: bytes, asked: Question, instead: Callable[[bytes], bytes]) -> bytes:
+    """What is put in the place of chunks, from the end on: what comes after the crash goes first."""
+    size = max(1, len(data) // 2)
+    while size:
+        end = len(data)
+        while end > 0:
+            begin = max(0, end - size)
+            simpler = data[:begin] + instead(data[begin:end]) + data[end:]
+            if simpler != data and asked(simpler):
+                data = simpler
+            end = begin
+        size //= 2
+    return data

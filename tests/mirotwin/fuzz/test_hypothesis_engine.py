@@ -54,9 +54,22 @@ def exploring():
     return kept, Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
 
 
+class Enough(BaseException):
+    """Ends a round: Hypothesis takes exceptions derived from Exception for failures."""
+
+
+def explore_for(runs, explorer, spec, seeds, seed):
+    def tell():
+        if explorer.target.executions >= runs:
+            raise Enough
+
+    with pytest.raises(Enough):
+        explore(explorer, spec, seeds, seed, tell)
+
+
 def kept_after(runs, seed, seeds=()):
     kept, explorer = exploring()
-    explore(explorer, TOY, seeds, seed, lambda: explorer.target.executions < runs)
+    explore_for(runs, explorer, TOY, seeds, seed)
     return kept, explorer
 
 
@@ -119,7 +132,7 @@ def test_the_shipped_firmware_is_fed_and_its_edges_are_found():
     kept = []
     target = RobotTarget(load_hex(image_path()))
     explorer = Explorer(target, lambda kind, data: kept.append(kind))
-    explore(explorer, TargetSpec(), (), 3, lambda: target.executions < 60)
+    explore_for(60, explorer, TargetSpec(), (), 3)
     assert explorer.edges > 100
     assert set(kept) == {"queue"}
 

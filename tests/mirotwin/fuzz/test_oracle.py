@@ -12,10 +12,9 @@ from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.inputs import input_of, seeds, sent, talks
-from mirotwin.fuzz.minimise import Budget, minimise
 from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
 from mirotwin.fuzz.target import RobotTarget, TargetFailure
-from mirotwin.fuzz.triage import Triage
+from mirotwin.fuzz.triage import Triage, minimise
 from mirotwin.verify.checks.expect import CHECKS
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
@@ -185,7 +184,7 @@ def test_another_number_of_frames_takes_the_same_path_and_other_frames_another_o
 
 
 def small(data, still, tries=100_000):
-    return minimise(data, still, Budget(tries, 60.0))
+    return minimise(data, still, tries, 60.0)
 
 
 def test_what_does_not_matter_goes_away_and_the_rest_becomes_zero():
@@ -228,11 +227,11 @@ def test_an_input_that_does_not_do_it_comes_back_as_it_was():
 
 def test_a_search_ends_with_its_tries():
     tried = []
-    minimise(bytes(range(256)), lambda one: tried.append(one) or len(one) == 256, Budget(10, 60.0))
+    minimise(bytes(range(256)), lambda one: tried.append(one) or len(one) == 256, 10, 60.0)
     assert len(tried) == 10
 
 
 def test_a_search_ends_with_its_time():
     began_s = time.monotonic()
-    minimise(bytes(4000), lambda one: time.sleep(0.01) or len(one) == 4000, Budget(10**9, 0.2))
+    minimise(bytes(4000), lambda one: time.sleep(0.01) or len(one) == 4000, 10**9, 0.2)
     assert time.monotonic() - began_s < 5.0
