@@ -84,30 +84,19 @@ def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     return dict(sorted(hidden.items(), key=lambda one: -len(one[1])))
 
 
-def causes_first(outcomes: Sequence[Outcome]) -> list[Outcome]:
+def causes_first(outcomes: Sequence[Outcome], causes: Sequence[str]) -> list[Outcome]:
     """Failed rules that hide others, then other failed ones, those not judged, those that are kept, and the rest."""
-    places = {id: place for place, id in enumerate(hidden_by(outcomes))}
     verdicts = ("failed", "not judged", "passed", "not observable")
+    places = {id: place for place, id in enumerate(causes)}
     return sorted(outcomes, key=lambda one: (verdicts.index(one.verdict), places.get(one.rule, len(places))))
 
 
-def begin_with(outcomes: Sequence[Outcome]) -> str:
-    """The sentence that says where to begin; "" where every rule was judged."""
-    for id, hidden in hidden_by(outcomes).items():
-        (cause,) = (outcome for outcome in outcomes if outcome.rule == id)
-        because = f"{find(id).broken}{_where(cause)}"
-        first = cause.failures[0]
-        hint = cause.hint or f"wanted {first.wanted}, found {first.found}"
-        return f"{_rules(hidden)} not judged because {because}; begin with {id}: {hint}"
-    return ""
-
-
-def folded(outcomes: Sequence[Outcome]) -> list[str]:
-    """A line for each cause, with the rules that it hides."""
-    return [
-        f"{_rules(hidden)} not judged because {id} failed: {spans(hidden)}"
-        for id, hidden in hidden_by(outcomes).items()
-    ]
+def begin_with(cause: Outcome, hidden: Sequence[str]) -> str:
+    """The sentence that says where to begin."""
+    because = f"{find(cause.rule).broken}{_where(cause)}"
+    first = cause.failures[0]
+    hint = cause.hint or f"wanted {first.wanted}, found {first.found}"
+    return f"{_rules(hidden)} not judged because {because}; begin with {cause.rule}: {hint}"
 
 
 def _rules(ids: Sequence[str]) -> str:
@@ -268,10 +257,13 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
 
 
 def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool, everything: bool) -> None:
-    if begin := begin_with(outcomes):
-        show(begin)
+    hidden, begin = hidden_by(outcomes), ""
+    if hidden:
+        first_cause = next(iter(hidden))
+        (cause,) = (outcome for outcome in outcomes if outcome.rule == first_cause)
+        show(begin := begin_with(cause, hidden[first_cause]))
     table = plain_table("rule", "name", "verdict", "first failure")
-    for outcome in causes_first(outcomes):
+    for outcome in causes_first(outcomes, list(hidden)):
         if (quiet and not outcome.failures) or (outcome.cause and not everything):
             continue
         first = failure_text(outcome.failures[0]) if outcome.failures else outcome.why
@@ -282,8 +274,8 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
     if table.rows:
         show(table)
     if not everything:
-        for line in folded(outcomes):
-            show(line)
+        for id, ids in hidden.items():
+            show(f"{_rules(ids)} not judged because {id} failed: {spans(ids)}")
     if not quiet:
         left_out = [rule.id for rule in LONG if rule not in rules] if len(rules) == len(RULES) else []
         show(_counts(outcomes) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
