@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import NEVER_TICK
 from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.harness.harness import SETTLE_TICKS
@@ -39,14 +37,11 @@ class BarePlayback:
         self.sleeps = False
         self._end_of_last = 0
         self._next = 0
-        starts = [one.tick - AHEAD_TICKS if isinstance(one, Transmission) else one.tick for one in heard]
         first = min((one.tick - AHEAD_TICKS for one in heard), default=line.begin_tick)
-        hears = [partial(self._hear, one) for one in heard]
-        begins = max(0, min(line.begin_tick, first))
-        self._inputs: list[tuple[int, Callable[[], None]]] = [
-            (begins, self._begin),
-            *zip(starts, hears, strict=True),
-        ]
+        self._inputs: list[tuple[int, ScriptItem | None]] = [(max(0, min(line.begin_tick, first)), None)]
+        for one in heard:
+            early = AHEAD_TICKS if isinstance(one, Transmission) else 0
+            self._inputs.append((one.tick - early, one))
 
     def play(self) -> BarePlayback:
         """To the end."""
@@ -57,13 +52,13 @@ class BarePlayback:
     def to(self, tick: int) -> bool:
         """Runs on to `tick`, and hears what comes up to there; False after a fault."""
         while self._next < len(self._inputs):
-            at, hear = self._inputs[self._next]
+            at, one = self._inputs[self._next]
             if at > max(tick, 12 * self.processor.cpu.cycles):
                 break
             if not self._to(at):
                 return False
             self._next += 1
-            hear()
+            self._hear(one)
         return self._to(tick)
 
     def put_back(self) -> None:
@@ -94,8 +89,10 @@ class BarePlayback:
         self.sleeps = bool(cpu.idle or cpu.idle_cycles)
         self.processor.bus.begin()
 
-    def _hear(self, one: ScriptItem) -> None:
-        if isinstance(one, Transmission):
+    def _hear(self, one: ScriptItem | None) -> None:
+        if one is None:
+            self._begin()
+        elif isinstance(one, Transmission):
             self._characters(one)
         elif isinstance(one, Reset):
             self._reset(one)
@@ -132,16 +129,10 @@ class BarePlayback:
             return
         self.idle = cpu.idle_cycles > idle_cycles
         last = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
-        while (
-            self.idle
-            and not self._is_done()
-            and 12 * cpu.cycles < last
-            and self._to(12 * (cpu.cycles + _LOOK))
-        ):
-            pass
+        while self.idle and not self._is_done() and 12 * cpu.cycles < last:
+            if not self._to(12 * (cpu.cycles + _LOOK)):
+                return
 
     def _is_done(self) -> bool:
         cpu = self.processor.cpu
-        if cpu.powered_down:
-            return True
-        return bool(cpu.idle) and cpu.peripherals.uart.ti_tick() >= min(STOPPED_TICK, NEVER_TICK)
+        return bool(cpu.powered_down or (cpu.idle and cpu.peripherals.uart.ti_tick() >= STOPPED_TICK))

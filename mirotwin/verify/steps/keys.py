@@ -113,12 +113,9 @@ class SendFrame(Send, frozen=True, kw_only=True):
         for bit in self.wrong_bits:
             if not 0 <= bit < bits:
                 return f"wrong_bits: {bit} is none of {bits} bits from HDR to CRC; use 0 to {bits - 1}"
-        before = -1
-        for place in self.bad_stop:
-            if not before < place < form.wire_size:
-                what = f"bad_stop: {list(self.bad_stop)} are not characters of the frame in their order"
-                return f"{what}; use 0 to {form.wire_size - 1}"
-            before = place
+        if sorted({*range(form.wire_size)}.intersection(self.bad_stop)) != [*self.bad_stop]:
+            what = f"bad_stop: {[*self.bad_stop]} are not characters of the frame in their order"
+            return f"{what}; use 0 to {form.wire_size - 1}"
         return beyond(self.slot, network.robots)
 
     def do(self, player: Player) -> None:
