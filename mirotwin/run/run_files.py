@@ -21,7 +21,7 @@ import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
@@ -53,8 +53,8 @@ class Stops:
     """
 
     def __init__(self, save_at: Sequence[Time], to_tick: Time | None, resume: str | None = None) -> None:
-        self.save_ticks = sorted({_tick(time) for time in save_at})
-        self.to_tick = None if to_tick is None else _tick(to_tick)
+        self.save_ticks = sorted({time.ticks() for time in save_at})
+        self.to_tick = None if to_tick is None else to_tick.ticks()
         self.resume = resume
         self.resumed = b""
         self.begin_tick = 0
@@ -76,18 +76,21 @@ class Stops:
             if world.in_period:
                 world.run_to(world.period_end)
             self.resumed, self.begin_tick = world.save(), world.tick
-            _forget_commands(world)
+            for robot in world.robots:  # what was told before is no record of this run
+                robot.board.left.commands.clear()
+                robot.board.right.commands.clear()
         self._check(world)
 
     def _check(self, world: World) -> None:
         end_tick = world.periods * CONTROL_PERIOD_TICKS
+        to_tick = end_tick if self.to_tick is None else self.to_tick
+        asked = [("--save-at", tick, to_tick) for tick in self.save_ticks]
         if self.to_tick is not None:
-            if not world.tick < self.to_tick <= end_tick:
-                raise _outside(f"--to {self.to_tick}t", world.tick, end_tick)
-            end_tick = self.to_tick
-        for tick in self.save_ticks:
-            if not world.tick < tick <= end_tick:
-                raise _outside(f"--save-at {tick}t", world.tick, end_tick)
+            asked.insert(0, ("--to", to_tick, end_tick))
+        for option, tick, last in asked:
+            if not world.tick < tick <= last:
+                what = f"the run goes from tick {world.tick} to tick {last}"
+                raise BadInput("", f"{option} {tick}t", what, "give a tick between")
 
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""
@@ -100,23 +103,6 @@ class Stops:
 
     def __bool__(self) -> bool:
         return bool(self.save_ticks or self.to_tick is not None or self.resume is not None)
-
-
-def _tick(time: Time) -> int:
-    return time.ticks(TICKS_PER_SECOND)
-
-
-def _forget_commands(world: World) -> None:
-    """What LM629s were told before is a record of then: whoever begins from what was saved does not have it either."""
-    for robot in world.robots:
-        robot.board.left.commands.clear()
-        robot.board.right.commands.clear()
-
-
-def _outside(option: str, first_tick: int, end_tick: int) -> BadInput:
-    return BadInput(
-        "", option, f"the run goes from tick {first_tick} to tick {end_tick}", "give a tick between"
-    )
 
 
 @dataclass

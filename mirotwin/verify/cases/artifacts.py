@@ -40,12 +40,11 @@ def leave(
 ) -> None:
     """Writes the folder. `case`, `sent`: streams; the second where there is no first. `others`: more files, by name."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, stream in ((CASE, case), (SENT, sent if case is None else None)):
-        if stream is not None:
-            write_case(folder / name, stream)
-    for name, text in {REPORT: report, **others}.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    if case is not None or sent is not None:
+    name, stream = (SENT, sent) if case is None else (CASE, case)
+    streams = {} if stream is None else {name: stream}
+    for name, text in {REPORT: report, **others, **streams}.items():
+        write_case(folder / name, text)
+    if streams:
         leave_image(folder, image)
 
 
