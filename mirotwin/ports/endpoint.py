@@ -105,14 +105,8 @@ class Endpoint:
 
     def plug(self) -> Plug:
         """The counts, for the summary."""
-        return Plug(
-            name=self.name,
-            clients=self.clients,
-            refused=self.refused,
-            bytes_in=self.bytes_in,
-            bytes_out=self.bytes_out,
-            dropped=self.dropped + self.out.dropped,
-        )
+        counts = self.clients, self.refused, self.bytes_in, self.bytes_out
+        return Plug(self.name, *counts, self.dropped + self.out.dropped)
 
     # ---- for derived classes -----------------------------------------------------------------------------
 

@@ -70,7 +70,7 @@ class Chunk:
         self._end()
 
     def add(self, channel: int, time_ns: int, message: msgspec.Struct | msgspec.Raw) -> None:
-        """Adds a message, or raises and adds nothing where it cannot be written as JSON."""
+        """Adds a message that was logged at `time_ns`: a struct, or JSON. Adds nothing where it raises."""
         begin = len(self.data)
         self.data += _EMPTY_HEAD
         try:

@@ -14,7 +14,6 @@ import struct
 from typing import BinaryIO
 from zlib import crc32
 
-import msgspec
 from mcap.opcode import Opcode
 
 from mirotwin.recording.rows import Chunk
@@ -32,7 +31,8 @@ _CRC = 4  # bytes
 
 
 class McapWriter:
-    """A file under way. `stream` is empty and seekable, and may be a raw file; the caller closes it.
+    """A file under way. `stream` is empty and seekable, and may be a raw file; the caller closes it. Messages are added
+    to `chunk`.
 
     Attachments and metadata come before the first message, or end the chunk that is open. After an OSError (a full
     disk) nothing more is written: what there is can be read.
@@ -87,10 +87,6 @@ class McapWriter:
         self._channels.append(_record(Opcode.CHANNEL, struct.pack("<HH", number, schema), texts))
         self.chunk.add_record(self._channels[-1])
         return number
-
-    def add_message(self, channel: int, time_ns: int, message: msgspec.Struct | msgspec.Raw) -> None:
-        """Adds a message: a struct, or JSON as `msgspec.Raw`; `time_ns` is both when it was logged and published."""
-        self.chunk.add(channel, time_ns, message)
 
     def flush(self) -> None:
         """Brings everything so far into the file, so that it outlives this process."""

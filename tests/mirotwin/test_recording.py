@@ -57,7 +57,6 @@ def test_what_goes_in_comes_out_to_the_last_bit():
     recording = parse(RECORDED, "run.mcap")
     assert recording.source == SOURCE
     assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
-    assert recording.digest == recording.periods[-1].digest
 
 
 def test_what_was_done_to_robots_and_radios_comes_out_again():
@@ -526,7 +525,7 @@ def put(writer, step):
     elif what == "channel":
         writer.add_channel(f"/topic{number}", "json", number)
     elif what == "message":
-        writer.add_message(number, time_ns, msgspec.Raw(data))
+        writer.chunk.add(number, time_ns, msgspec.Raw(data))
     else:
         writer.flush()
 

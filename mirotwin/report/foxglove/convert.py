@@ -118,7 +118,7 @@ class Conversion:
     def _take_message(self, record: Message) -> None:
         number, topic = self._channels.get(record.channel_id, (0, None))
         if number:
-            self.writer.add_message(number, record.log_time, msgspec.Raw(record.data))
+            self.writer.chunk.add(number, record.log_time, msgspec.Raw(record.data))
         if topic is None:
             return
         if topic.channel == IMAGE:
@@ -145,7 +145,7 @@ class Conversion:
     def _add(self, said: Said) -> None:
         topic, tick, message = said
         channel = self._topics.get(topic) or self._register(topic, message)
-        self.writer.add_message(channel, nanoseconds(tick), message)
+        self.writer.chunk.add(channel, nanoseconds(tick), message)
 
     def _register(self, topic: str, message: msgspec.Struct) -> int:
         name, text = schema_of(message)

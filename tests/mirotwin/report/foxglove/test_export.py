@@ -240,7 +240,7 @@ def test_a_damaged_frame_is_bad_input():
         recorder.write_image(0, 5, b"png")
         recorder.flush()
         channel = recorder._rows.channels["/net0/camera/image"]
-        recorder._writer.add_message(channel, 250, msgspec.Raw(b'{"tick":'))
+        recorder._writer.chunk.add(channel, 250, msgspec.Raw(b'{"tick":'))
 
     with pytest.raises(RecordingError, match="/net0/camera/image at 250 ns"):
         exported(recorded(2, add))
