@@ -23,7 +23,6 @@ from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
 
 DIRECTIONS = {"down": DOWN, "up": UP}
-PROGRESS_BYTES = 1 << 16
 
 
 FORMAT = Option(
@@ -79,14 +78,12 @@ def decode(options: DecodeOptions) -> int:
 
 def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
     """Moves the progress bar; for input without a size (a pipe), flushes the lines printed so far."""
-    shown = 0
     for one in sent:
         yield one
         if given.size is None:
             sys.stdout.flush()
-        elif given.tell() >= shown + PROGRESS_BYTES:
-            shown = given.tell()
-            bar.to(shown)
+        else:
+            bar.to(given.position)
 
 
 def _print(given: Input, source: Source, layouts: Layouts, found: Iterable[DecodedRow], as_json: bool) -> int:

@@ -73,7 +73,7 @@ class Exported:
                     self.up += one.direction != DOWN
                     self.bad_stops += len(one.bad_stop)
                     yield one
-                self.bar.to(self.given.tell())
+                self.bar.to(self.given.position)
         except READ_ERRORS as error:
             if not self.down + self.up:
                 raise

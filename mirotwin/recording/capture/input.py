@@ -17,7 +17,7 @@ CHUNK_BYTES = 1 << 16
 
 
 class Input:
-    """`path` ("-": standard input), open for reading; `size` is None for a pipe.
+    """`path` ("-": standard input), open for reading; `size` is None for a pipe; `position`: so much was read.
 
     Raises InputError for devices other than the null device and for folders, OSError as `open` does.
     """
@@ -82,9 +82,6 @@ class Input:
             line += self._file.readline(limit - len(line))
         self.position += len(line)
         return line
-
-    def tell(self) -> int:
-        return self.position
 
     def __enter__(self) -> Input:
         return self

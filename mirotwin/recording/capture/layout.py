@@ -89,22 +89,19 @@ class Layouts:
         self.head = head
         self.tell = tell
         self.found: dict[int, int] = {}
-        self.asked: set[int] = set()
 
     def of(self, network: int) -> int:
         """InputError for more networks than decoders are kept for."""
-        self.asked.add(network)
-        if len(self.asked) > MOST_NETWORKS:
-            what = f"characters of more than {MOST_NETWORKS} networks"
-            raise InputError(self.source.label, what, "take one out with `mirotwin export --network`")
-        if self.said is not None:
-            return self.said
-        if network in self.source.robots:
-            return self.source.robots[network]
         if network not in self.found:
-            self.found[network], note = robots_in(self.head, network)
-            if note:
-                self.tell(note)
+            if len(self.found) == MOST_NETWORKS:
+                what = f"characters of more than {MOST_NETWORKS} networks"
+                raise InputError(self.source.label, what, "take one out with `mirotwin export --network`")
+            count = self.said or self.source.robots.get(network)
+            if count is None:
+                count, note = robots_in(self.head, network)
+                if note:
+                    self.tell(note)
+            self.found[network] = count
         return self.found[network]
 
     def __str__(self) -> str:
