@@ -38,7 +38,7 @@ from miro_sim.world.conditions import Answer, Condition, Heard, Sent, answer_of
 from miro_sim.world.events import Cursor, Event, HostLog
 from miro_sim.world.waits import Waits
 from mirotwin.desk.guard import DeskOptions, Guard
-from mirotwin.recording.recorder import TOGETHER, Recorder
+from mirotwin.recording.recorder import Recorder
 from mirotwin.shell.held_signals import held_signals
 
 if TYPE_CHECKING:
@@ -374,8 +374,7 @@ class RobotPort:
             begin_tick = self._recorded * CONTROL_PERIOD_TICKS
             self.recorder.write(Period(self._recorded, begin_tick, (), tuple(there), ""))
             self._recorded += 1
-            if self._recorded % TOGETHER == 0:
-                self.recorder.flush()
+            self.recorder.flush_if_due()
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("_"):

@@ -59,18 +59,12 @@ class PortFixtures:
             pytest.fail(str(error), pytrace=False)
 
     @pytest.fixture
-    def link(self, world: RobotPort) -> Link:
-        return Link(cast("World", world))
+    def links(self, world: RobotPort) -> list[Link]:
+        return [Link(cast("World", world))]
 
     @pytest.fixture
-    def links(self, link: Link) -> list[Link]:
-        return [link]
-
-    @pytest.fixture
-    def robot(self) -> NoReturn:
+    def robots(self) -> NoReturn:
         pytest.skip("not observable on a port: the inside of a robot")
-
-    robots = robot
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, Any, Any]:

@@ -12,7 +12,6 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_sim.scenario.file import load
 from mirotwin.desk.guard import DeskOptions
@@ -20,11 +19,10 @@ from mirotwin.desk.robot_port import SEEN, NotObservable, RobotPort, check_obser
 from mirotwin.recording.recorder import Recorder
 from mirotwin.replay.replay_port import twin_source
 from mirotwin.shell.outputs import RECORDING, whole_file
-from mirotwin.verify.cases.artifacts import clear
 from mirotwin.verify.steps.keys import CheckStep, ConditionStep, PauseStep, SaveStep, Send, Step, StreamStep
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import everything, steps_of
-from mirotwin.verify.steps.running import SCENARIO, Outcome, folder_of
+from mirotwin.verify.steps.running import Outcome, outcome_of
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -51,15 +49,10 @@ def run_port_test(
     path: str, image: Image, desk: DeskOptions, settings: Sequence[str], artifacts: Path | None
 ) -> Outcome:
     """Plays a file's steps at the port. `artifacts`: below it the recording is left. Whatever happens is an outcome."""
-    folder = None if artifacts is None else folder_of(artifacts, path)
     try:
-        if folder is not None:
-            clear(folder, SCENARIO)
-        return _run(path, image, desk, settings, folder)
+        return outcome_of(path, artifacts, lambda folder: _run(path, image, desk, settings, folder))
     except NotObservable as error:
         return Outcome(path, "not observable", notes=(f"{error}",))
-    except BadInput as error:
-        return Outcome(path, "error", (f"{error}",))
 
 
 def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], folder: Path | None) -> Outcome:

@@ -196,9 +196,9 @@ def links(mirotwin_rig: Rig) -> list[Link]:
 
 
 @pytest.fixture
-def link(mirotwin_rig: Rig) -> Link:
+def link(links: list[Link]) -> Link:
     """The host's end of the first network: sends, polls, expects."""
-    return mirotwin_rig.links[0]
+    return links[0]
 
 
 @pytest.fixture
@@ -208,9 +208,9 @@ def robots(mirotwin_rig: Rig) -> list[RobotUnderTest]:
 
 
 @pytest.fixture
-def robot(mirotwin_rig: Rig) -> RobotUnderTest:
+def robot(robots: list[RobotUnderTest]) -> RobotUnderTest:
     """The first robot: wheels, memory, breakpoints, switches."""
-    return mirotwin_rig.robots[0]
+    return robots[0]
 
 
 # Judging and reporting

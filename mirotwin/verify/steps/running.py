@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -71,11 +71,18 @@ def run_test(
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
     file that saves needs one. `again`: the command that gives the verdict again, for its report.
     """
+    return outcome_of(path, artifacts, lambda folder: _run(path, image, seed, settings, folder, again), seed)
+
+
+def outcome_of(
+    path: str, artifacts: Path | None, run: Callable[[Path | None], Outcome], seed: int = 0
+) -> Outcome:
+    """What `run` makes of the file and of its folder below `artifacts`, which holds nothing of an earlier run."""
     folder = None if artifacts is None else folder_of(artifacts, path)
     try:
         if folder is not None:
             clear(folder, SCENARIO)
-        return _run(path, image, seed, settings, folder, again)
+        return run(folder)
     except (DomainError, PluginError) as error:
         show_traceback(error)
         what = f"cannot be run: {error}"
