@@ -53,20 +53,19 @@ class CaseTests:
 
     def run(self, path: str) -> Outcome:
         """Runs one; a case that cannot be run is an outcome, too."""
+        check = None
         try:
-            outcome = self._run_bare(path) if is_bare_case(path) else self._run(path)
+            if is_bare_case(path):
+                from mirotwin.verify.bare.case import check_of_case  # loads the bare processor
+
+                name = check_of_case(path)
+                check = next((text for text in self.checks if text.rpartition(":")[2] == name), None)
+                outcome = self._run_bare(path, check)
+            else:
+                outcome = self._run(path)
         except BadInput as error:
             outcome = Outcome(path, "error", (f"{error}",))
-        return replace(outcome, again=replay_line(path, self.firmware, self.check_of(path)))
-
-    def check_of(self, path: str) -> str | None:
-        """The one of --check that a case names."""
-        if not self.checks or not is_bare_case(path):
-            return None
-        from mirotwin.verify.bare.case import check_of_case  # loads the bare processor
-
-        name = check_of_case(path)
-        return next((text for text in self.checks if text.rpartition(":")[2] == name), None)
+        return replace(outcome, again=replay_line(path, self.firmware, check))
 
     def _run(self, path: str) -> Outcome:
         job = load_stream(path, self.firmware)
@@ -86,10 +85,10 @@ class CaseTests:
             firmware_sha256=job.runs_on.sha256 or "",
         )
 
-    def _run_bare(self, path: str) -> Outcome:
+    def _run_bare(self, path: str, check: str | None) -> Outcome:
         from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 
-        image, check = load_case_firmware(path, self.firmware), self.check_of(path)
+        image = load_case_firmware(path, self.firmware)
         self.unused.discard(check or "")
         failure = rerun_bare_case(path, image, check)[1].failure
         return Outcome(

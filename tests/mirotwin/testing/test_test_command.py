@@ -260,10 +260,11 @@ def test_a_case_whose_check_has_no_occasion_any_more_fails(mirotwin, tmp_path):
     assert "    expectation not judged: acts_within_ms: the run had no occasion for it" in out.splitlines()
 
 
-def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
+@pytest.mark.parametrize("options", [(), ("--check", "mine.py:judge")])
+def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path, options):
     (tmp_path / "a.stream").write_text("# mirotwin stream 2\nx\n")
     (tmp_path / "b.stream").write_text(PASSES.replace("2\n", "2\n#: expect.no_fault = true\n", 1))
-    code, out, _ = mirotwin("test", tmp_path)
+    code, out, _ = mirotwin("test", tmp_path, *options)
     assert code == 2
     assert f"{tmp_path}/a.stream:2:1: " in out
     assert out.splitlines()[-1] == "1 cannot be run, 1 passed"
