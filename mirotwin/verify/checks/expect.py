@@ -16,10 +16,11 @@ from typing import Any, cast
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
 from miro_sim.periods import RobotId
-from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
+from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks.interface import Check, problem_of_class
 
@@ -94,56 +95,57 @@ def checks_of_table(
     for name, value in table.items():
         place = f"{path}.{name}"
         try:
-            struct = struct_of(name)
-        except PluginError as error:
-            raise _no_check(origin, place, name, error) from error.__cause__
-        if problem := problem_of_class(struct):
-            raise ScenarioError(origin, place, problem, "repair the check")
-        found[name] = check = _check(scenario, origin, place, struct, name, value)
-        problem = "" if check is None else _problem(check, origin, place, scenario.end_tick)
-        if problem:
-            raise ScenarioError(origin, place, problem, "give an earlier time, or a longer duration_s")
+            found[name] = _check(_struct(name), name, value, scenario.end_tick)
+        except msgspec.ValidationError as error:
+            raise _wrong(scenario, origin, place, name, value, f"{error}") from None
+        except BadInput as error:
+            at = f"{place}.{error.place}" if error.place else place
+            raise ScenarioError(origin, at, error.what, error.remedy) from error.__cause__
     return found
 
 
-def _problem(check: Check, origin: str, place: str, end_tick: int) -> str:
+def _struct(name: str) -> type[Check]:
     try:
-        return check.problem(end_tick)
-    except (Exception, SystemExit) as error:
-        raise ScenarioError(origin, place, f"`problem` raised {raised(error)}", "repair the check") from error
-
-
-def _no_check(origin: str, place: str, name: str, error: PluginError) -> ScenarioError:
-    if "is not one of the choices" in error.what:
+        struct = struct_of(name)
+    except PluginError as error:
+        if "is not one of the choices" not in error.what:
+            raise
         near = remedy_for_key(name, CHECKS.names())
         remedy = f"{near}{'' if near.endswith('?') else ';'} {WHERE_CHECKS_ARE}"
-        return ScenarioError(origin, place, "there is no such check", remedy)
-    return ScenarioError(origin, place, error.what, error.remedy)
+        raise PluginError("there is no such check", remedy) from None
+    if problem := problem_of_class(struct):
+        raise PluginError(problem, "repair the check")
+    return struct
 
 
-def _check(
-    scenario: Scenario, origin: str, place: str, struct: type[Check], name: str, value: Any
-) -> Check | None:
+def _check(struct: type[Check], name: str, value: Any, end_tick: int) -> Check | None:
     if value is False:
         if name in ALWAYS_ON:
-            raise ScenarioError(origin, place, "this check is always on", "remove the key")
+            raise Refused("this check is always on", "remove the key")
         return None
     bare = not isinstance(value, dict) and value is not True
     if (bare or value is True) and not struct.MAIN and _required(struct):
-        raise ScenarioError(origin, place, *_takes_a_table(struct, name))
+        raise Refused(*_takes_a_table(struct, name))
     if bare and not struct.MAIN:
-        raise ScenarioError(origin, place, f"expected true or false, got {value!r}", f"write {name} = true")
+        raise Refused(f"expected true or false, got {value!r}", f"write {name} = true")
     given = {} if value is True else {struct.MAIN: value} if bare else value
-    unknown = [key for key in given if key not in struct.__struct_encode_fields__]
-    if unknown:
-        remedy = remedy_for_key(unknown[0], list(struct.__struct_encode_fields__))
-        raise ScenarioError(origin, f"{place}.{unknown[0]}", "unknown key", remedy)
+    keys = list(struct.__struct_encode_fields__)
+    for key in given:
+        if key not in keys:
+            raise BadInput("", key, "unknown key", remedy_for_key(key, keys))
     try:
-        return msgspec.convert({**given, "check": name}, struct)
-    except msgspec.ValidationError as error:
-        raise _wrong(scenario, origin, place, struct, value, str(error)) from None
+        check = msgspec.convert({**given, "check": name}, struct)
+    except msgspec.ValidationError:
+        raise
     except (Exception, SystemExit) as error:  # from the check's own look at its parameters
-        raise ScenarioError(origin, place, f"cannot check its parameters: {raised(error)}") from error
+        raise Refused(f"cannot check its parameters: {raised(error)}") from error
+    try:
+        problem = check.problem(end_tick)
+    except (Exception, SystemExit) as error:
+        raise Refused(f"`problem` raised {raised(error)}", "repair the check") from error
+    if problem:
+        raise Refused(problem, "give an earlier time, or a longer duration_s")
+    return check
 
 
 def _required(struct: type[Check]) -> list[str]:
@@ -163,16 +165,12 @@ def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
     return f"{name} takes a table", remedy
 
 
-def _wrong(
-    scenario: Scenario, origin: str, place: str, struct: type[Check], value: Any, message: str
-) -> ScenarioError:
+def _wrong(scenario: Scenario, origin: str, place: str, name: str, value: Any, message: str) -> ScenarioError:
     """What msgspec found, at the path of the scenario."""
     what, _, inner = message.partition(" - at `$")
-    inner = inner.rstrip("`")
     if what.startswith("Object missing required field"):
         key = what.split("`")[1]
-        example = f"{place.rpartition('.')[2]} = .." if key == struct.MAIN else f"{key} = .."
-        return ScenarioError(origin, place, f"{key} is missing", f"give it: {example}")
-    below = inner if isinstance(value, dict) else ""
-    raw = msgspec.to_builtins(scenario)
-    return value_error(origin, raw, f"{what} - at `$.{place}{below}`")
+        example = name if key == struct_of(name).MAIN else key
+        return ScenarioError(origin, place, f"{key} is missing", f"give it: {example} = ..")
+    below = inner.rstrip("`") if isinstance(value, dict) else ""
+    return value_error(origin, msgspec.to_builtins(scenario), f"{what} - at `$.{place}{below}`")
