@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, ParamSpec, TypeVar
 
 import msgspec
@@ -85,18 +87,11 @@ def at(tick: int) -> str:
 
 def in_words(events: Sequence[Event]) -> list[str]:
     """One line each; the characters of a frame are the frame, others that follow each other on one wire are one."""
-    lines: list[str] = []
-    run: list[Event] = []
-    for event in [*_with_frames(events), None]:
-        if run and (event is None or _place(event) != _place(run[0])):
-            lines.append(_line(run))
-            run = []
-        if event is not None:
-            run.append(event)
-            if event.what not in CHARACTERS or event.frame is not None:
-                lines.append(_line(run))
-                run = []
-    return lines
+    keyed: list[tuple[object, Event]] = [
+        (_place(event) if event.what in CHARACTERS and event.frame is None else number, event)
+        for number, event in enumerate(_with_frames(events))
+    ]
+    return [_line([event for _, event in run]) for _, run in groupby(keyed, key=itemgetter(0))]
 
 
 def _with_frames(events: Sequence[Event]) -> list[Event]:
@@ -151,16 +146,16 @@ def _place(event: Event) -> tuple[str, int, int]:
 
 
 def _line(run: Sequence[Event]) -> str:
-    first = run[0]
-    time = f"{first.tick / 24_000:10.3f} ms "
+    first, at = run[0], "tick"
+    _, where, said = f"{first}".split(": ", 2)
     if first.frame is not None:
-        return f"{time}{str(first).split(': ')[1]}: {_frame_text(first)} (tick {first.tick})"
-    if first.what == "sent":
-        return f"{time}{str(first).partition(': ')[2]}: {_sent_text(first)} (tick {first.tick})"
-    if len(run) == 1:
-        return time + str(first).partition(": ")[2] + f" (tick {first.tick})"
-    values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
-    return time + f"{str(first).split(': ')[1]}: {first.what} {values} (from tick {first.tick})"
+        said = _frame_text(first)
+    elif first.what == "sent":
+        said += f": {_sent_text(first)}"
+    elif len(run) > 1:
+        values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
+        said, at = f"{first.what} {values}", "from tick"
+    return f"{first.tick / 24_000:10.3f} ms {where}: {said} ({at} {first.tick})"
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:
