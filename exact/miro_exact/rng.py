@@ -54,9 +54,7 @@ class Stream:
     Raises ValueError for a seed outside 0 .. 2^63 - 1 and for an index outside its range.
     """
 
-    NOT_STATE = (
-        "block", "draws", "group", "k0", "k1", "least", "name", "name0", "name1", "seed", "words",
-    )  # fmt: skip
+    NOT_STATE = ("*",)
 
     def __init__(self, seed: int, name: str) -> None:
         if not 0 <= seed <= MAX_SEED:

@@ -24,7 +24,7 @@ _COMMAND = COMMAND
 class EventLog:
     """The last 2048 events of one board. `end`: serial number of the next one; `first`: of the oldest kept."""
 
-    NOT_STATE = ("end", "first", "_ticks", "_kinds", "_codes", "_values", "_data")
+    NOT_STATE = ("*",)
 
     def __init__(self) -> None:
         self.end = 0

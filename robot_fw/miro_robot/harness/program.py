@@ -72,11 +72,7 @@ class Program:
     `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line.
     """
 
-    NOT_STATE = (
-        "how", "slot", "robots", "repair", "character_ticks", "characters", "flaws", "pauses", "count",
-        "length", "frames", "trailing_ticks", "_frame", "_head", "_payload", "_layout", "_table", "_place",
-        "_end", "_data", "_seq", "_first", "_size", "_damage_at", "_damage", "_cut", "_stop_at", "_flags", "_resets",
-    )  # fmt: skip
+    NOT_STATE = ("*",)
 
     def __init__(
         self,

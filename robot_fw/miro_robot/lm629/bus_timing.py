@@ -60,10 +60,7 @@ class BusTiming:
     ends; write data before and after a write ends.
     """
 
-    NOT_STATE = (
-        *("least", "writing", "reading", "ps", "data", "ticks"),
-        *("begin_tick", "end_tick", "written_tick", "ps_tick", "data_tick"),
-    )
+    NOT_STATE = ("*",)
 
     def __init__(self) -> None:
         self.least = [limit.ticks for limit in LIMITS]

@@ -31,7 +31,7 @@ class WheelOrder:
     given, in 1/65536 count per sample^2. `abrupt`: whether it is a "stop" without a ramp.
     """
 
-    NOT_STATE = ("what", "velocity", "acceleration", "abrupt", "_control", "_velocity", "_acceleration")
+    NOT_STATE = ("*",)
 
     def __init__(self) -> None:
         self.begin()
