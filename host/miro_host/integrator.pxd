@@ -15,5 +15,3 @@ cdef class AdamsBashforth(Integrator):
     cdef public double last_v_dot, last_w_dot
     cdef public int begun
 
-    cpdef step(self, double v_dot_m_s2, double w_dot_rad_s2)
-    cpdef go_to(self, double v_m_s, double w_rad_s)

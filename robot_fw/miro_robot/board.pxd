@@ -62,9 +62,6 @@ cdef class Board(Bus):
     @cython.final
     cdef inline long long _next_interrupt(self, Lm629 chip) noexcept
     cpdef int sync(self, long long tick) except -1
-    cpdef byte_received(self, int value, int stop, long long tick)
-    cpdef byte_sent(self, int value, long long tick)
-    cpdef port_written(self, int port, int latch, long long tick)
     @cython.final
     cdef inline int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.final
@@ -74,7 +71,6 @@ cdef class Board(Bus):
     @cython.locals(changed=bint)
     cpdef movx_write(self, int address, int value, long long tick)
     cdef int _put_address(self, int address, long long start) except -1
-    cpdef fault(self, int kind, int pc, long long tick)
     @cython.final
     cdef inline int _drive_bridge(self, long long tick) except -1
     @cython.final

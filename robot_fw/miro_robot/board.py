@@ -329,9 +329,9 @@ class Board(Bus):
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
         if (
             self.strobed
-            or (pins ^ self.reset_pins) & _BOTH_RST
             or self._strobes(left)
             or self._strobes(right)
+            or (pins ^ self.reset_pins) & _BOTH_RST
         ):
             return False
         left, right = left >> 3 & 1, right >> 3 & 1

@@ -28,11 +28,7 @@ cdef class FastOracle(LiveOracle):
     cdef int decided, fresh_seq, left, right
     cdef readonly int pc, accepted
 
-    cpdef begin(self, long long tick)
     cdef int _forget(self) except -1
-    cpdef restarted(self, long long tick)
-    cpdef bint waits(self) except -1
-    cpdef look(self, long long tick)
     cdef void _found(self, int code, long long tick) noexcept
     cdef int _pass(self, long long tick) except -1
     cdef int _pass_silence(self, int code, SilenceRule silence, long long tick) except -1

@@ -14,16 +14,9 @@ cdef class RecordingBus(XramBus):
     cdef public long long reset_tick
 
     cpdef begin(self)
-    cpdef byte_received(self, int value, int stop, long long tick)
-    cpdef byte_sent(self, int value, long long tick)
-    cpdef fault(self, int kind, int pc, long long tick)
 
 cdef class BareOracle(LiveOracle):
     cdef readonly RecordingBus bus
     cdef readonly Cpu cpu
     cdef long long slept_tick
 
-    cpdef begin(self, long long tick)
-    cpdef restarted(self, long long tick)
-    cpdef look(self, long long tick)
-    cpdef bint waits(self) except -1

@@ -9,7 +9,6 @@ cdef class Counters(Watcher):
     cdef long long cycles[65536]
     cdef long long jumps[65536]
 
-    cpdef executed(self, Cpu cpu, int pc, long long start)
     cpdef long long executed_at(self, int address)
     cpdef long long cycles_at(self, int address)
     cpdef long long jumped_at(self, int address)
@@ -31,9 +30,4 @@ cdef class Activity(Watcher):
     cdef int serving[8]
     cdef int depth
 
-    cpdef attached(self, Cpu cpu)
-    cpdef executed(self, Cpu cpu, int pc, long long start)
-    cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
     cdef int _leave(self, long long cycle) except -1
-    cpdef slept(self, Cpu cpu, long long start, long long end)
-    cpdef ran(self, Cpu cpu, long long start)

@@ -24,8 +24,6 @@ cdef class BoardTap(Probe):
     cpdef attach(self, long long tick)
     cpdef detach(self)
     cpdef long long known(self) except -1
-    cpdef moved(self, long long tick)
-    cpdef passed(self, long long tick)
     cdef int _look_at_pins(self, long long tick) except -1
     cdef int _look(self, long long tick) except -1
     cdef int _look_at_chip(self, long long tick, int side) except -1
@@ -47,12 +45,6 @@ cdef class CpuTap(Watcher):
 
     cpdef long long known(self) except -1
     cpdef detach(self)
-    cpdef attached(self, Cpu cpu)
-    cpdef starting(self, Cpu cpu)
-    cpdef executed(self, Cpu cpu, int pc, long long start)
-    cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
-    cpdef slept(self, Cpu cpu, long long start, long long end)
-    cpdef ran(self, Cpu cpu, long long start)
     cdef int _look(self, Cpu cpu) except -1
     cdef int _leave(self, long long tick, int high, int level) except -1
     cdef int _take_outputs(self, Cpu cpu) except -1

@@ -15,6 +15,7 @@ cdef int _READ_SAMPLE, _WRITE_RISES
 cdef int _FLOATING
 cdef int _MAIN_LOOP_STARVED, _MARK_CYCLES, _ONE_INSTRUCTION
 
+@cython.final
 cdef class Cpu(Executor):
     cdef readonly Peripherals peripherals
     cdef readonly Line rxd, txd
@@ -31,8 +32,6 @@ cdef class Cpu(Executor):
     cpdef int write_code(self, int address, int value) except -1
     cpdef is_loaded(self, int address)
     cpdef int code_at(self, int address) noexcept
-    cpdef int run(self, long long until_cycle) except -1
-    cpdef int go_on(self, long long until_cycle) except -1
     cpdef int step(self) except -1
     cpdef request_stop(self)
     cdef void replan(self) noexcept
@@ -40,30 +39,18 @@ cdef class Cpu(Executor):
     cpdef asleep(self)
     cpdef int peek_iram(self, int address) noexcept
     cpdef int sfr(self, int address) except -1
-    cdef int end_run(self) except -1
-    cdef int boundary(self) except -1
-    @cython.final
     @cython.locals(blocked=bint)
     cdef inline int _attend(self, long long now) except -1
     cdef int _note_end(self, long long now) except -1
     cdef int _look_for_sleep(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1
-    @cython.final
-    cdef inline int _taken_over(self) noexcept
+    cdef inline bint _taken_over(self) noexcept
     cdef int _enter(self, int source) except -1
-    @cython.final
     cdef inline int _block(self) except -1
-    @cython.final
     cdef inline int _expect(self, long long earliest) except -1
-    @cython.final
     cdef inline long long _next_look(self) noexcept
-    @cython.final
     cdef inline int _written(self, int address, int sooner) except -1
-    @cython.final
     cdef int register(self, int address, long long cycle) except -1
-    @cython.final
     cdef inline int _other_register(self, int address, long long cycle) except -1
-    cdef int write_sfr_bit(self, int address, int mask, int level) except -1
     cdef int write_pcon(self, int value) except -1
     cdef int write_port(self, int port, int value) except -1
-    cdef int movx_read(self, int address) except -1

@@ -228,9 +228,8 @@ class Cpu(Executor):
 
     def asleep(self) -> bool:
         """Whether only a reset or a new input can make it execute another instruction."""
-        if self.powered_down:
-            return True
-        return bool(self.idle) and self.peripherals.next_event(self.cycles) == NEVER_TICK
+        idle_for_ever = self.idle != 0 and self.peripherals.next_event(self.cycles) == NEVER_TICK
+        return self.powered_down != 0 or idle_for_ever
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -344,15 +343,11 @@ class Cpu(Executor):
                 self.marks = 1
                 self.fault(_MAIN_LOOP_STARVED)
 
-    def _taken_over(self) -> int:
+    def _taken_over(self) -> bool:
         """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
         which does not count as time of its own.
         """
-        return (
-            1
-            if self.peripherals.interrupts.in_service or self.cycles - self.blocked <= _ONE_INSTRUCTION
-            else 0
-        )
+        return self.peripherals.interrupts.in_service != 0 or self.cycles - self.blocked <= _ONE_INSTRUCTION
 
     def _enter(self, source: int) -> None:
         """The hardware LCALL: two cycles, and the end of idle mode."""

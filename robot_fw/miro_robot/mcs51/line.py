@@ -160,12 +160,8 @@ class Line:
 
     def edges(self) -> list[tuple[int, int]]:
         """The edges kept, oldest first, as (tick, level)."""
-        level = self._before
-        kept = []
-        for serial in range(self._first, self._end):
-            level ^= 1
-            kept.append((self._ticks[serial & self._mask], level))
-        return kept
+        first = self._before ^ 1
+        return [(tick, first ^ (place & 1)) for place, tick in enumerate(self.ticks)]
 
     def last_tick(self) -> int:
         """Tick of the last edge kept, -1 without one."""

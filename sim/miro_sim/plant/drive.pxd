@@ -75,12 +75,8 @@ cdef class DifferentialDrive(Plant):
     cdef readonly RoughBody rough
     cdef long long ticks[17]
 
-    cpdef attach(self, Lm629 left, Lm629 right)
     cpdef tuple pose_at(self, long long tick)
     cpdef tuple velocity_at(self, long long tick)
-    cpdef advance(self, long long tick)
-    cpdef set_bridge(self, long long tick, int side, int enable, int forward)
-    cpdef int run_pulses(self, long long tick) except -1
     @cython.final
     @cython.locals(ticks=cython.int, steps=cython.int)
     cdef void _run(self, long long until, long long last, long long left_tick, long long right_tick) except *

@@ -19,7 +19,6 @@ cdef class RoughBody(Body):
     cpdef int feel(self, long long tick) except -1
     @cython.locals(old_left_slip=double, old_right_slip=double, left_slip=double, right_slip=double)
     cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
-    cdef int _roll(self, int steps) except -1
     cdef int _resist(self, double lever_m, double step_s) except -1
     cdef void _turn_frame(self, double tangent) except *
     @cython.locals(left_stands=cython.bint, right_stands=cython.bint, left_held=cython.bint, changed=double,
@@ -32,5 +31,3 @@ cdef class RoughBody(Body):
     @cython.locals(x=double, y=double, z=double, length=double, fall=double, more_y=double)
     cdef int _drag(self, double most) except -1
     cdef void _glide(self, double forward_m, double left_m, double turn_rad) except *
-    cpdef tuple pose_after(self, long long ticks)
-    cpdef tuple velocity(self)

@@ -39,7 +39,6 @@ cdef class SeeingSight:
 cdef class GeometricSight(SeeingSight):
     cdef readonly object field
 
-    cpdef list look(self, long long tick)
 
 
 cdef class PixelSight(SeeingSight):
@@ -49,7 +48,5 @@ cdef class PixelSight(SeeingSight):
     cdef readonly Camera eye
     cdef readonly Tracker tracker
 
-    cpdef tuple expose(self, long long tick)
-    cpdef list look(self, long long tick)
     @cython.locals(body=Robot, x_m=double, y_m=double, theta_rad=double, v_m_s=double, w_rad_s=double)
     cpdef Camera picture_at(self, long long frame, long long tick)
