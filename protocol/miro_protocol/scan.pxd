@@ -29,11 +29,10 @@ cdef class Scanner:
     @cython.locals(tick='long long')
     cpdef list feed_symbols(self, symbols)
     cdef bint _is_apart(self, long long tick) noexcept
-    cdef int _put_symbol(self, int byte, bint bad_stop, long long tick) noexcept
-    cdef inline void _keep(self, int byte, int flaws, long long tick) noexcept
-    cdef inline int _put(self, int byte, int flaws, long long tick) noexcept
+    cdef int _put(self, int byte, bint bad_stop, long long tick) noexcept
     @cython.locals(byte='unsigned int', register='unsigned int')
     cdef int _test(self, int start) noexcept
     cdef _give_out(self, int found, list events)
+    cdef void _read_body(self, int sync) noexcept
     cdef int _lead_start(self, int sync) noexcept
     cdef _give_out_damaged(self, int length, list events)

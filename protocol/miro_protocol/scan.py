@@ -58,7 +58,7 @@ class Scanner:
         *("format", "_sync", "_white", "_lead", "_table", "_start", "_intact", "_size", "_step"),
         *("_spacing", "_tolerance", "_run_limit"),
         *("_count", "_last_bad", "_last_apart"),  # follow from _data and _flaws
-        "body",  # of the frame that `take` was asked about
+        "body",  # of the last frame, without whitening
     )
 
     def __init__(
@@ -109,11 +109,9 @@ class Scanner:
 
         For who judges millions of frames; `tick` is that of the start bit, below 2^62.
         """
-        found = self._put_symbol(byte, bad_stop, tick)
+        found = self._put(byte, bad_stop, tick)
         if found == _FRAME:
-            sync = self._count - self._size
-            for place in range(self._size - 4):
-                self.body[place] = self._data[sync + 2 + place] ^ self._white[place]
+            self._read_body(self._count - self._size)
             self._clear()
         elif found:
             self._give_out(found, [])
@@ -135,23 +133,14 @@ class Scanner:
         a tick beyond +-2^62.
         """
         events: list[Event] = []
-        length = len(data)
-        if length == 0:
-            return events
-        tick, flaws = self._next_tick, _APART if self._paused else 0
-        if start_tick is not None:
-            tick = checked_tick(start_tick, 0)
-            flaws = _APART if self._is_apart(tick) else 0
-        checked_tick(tick, length * self._step)
+        tick = self._next_tick if start_tick is None else checked_tick(start_tick, 0)
+        checked_tick(tick, len(data) * self._step)
         view = memoryview(data)
-        for place in range(length):
-            found = self._put(view[place], flaws, tick)
+        for place in range(len(data)):
+            found = self._put(view[place], False, tick)
             if found:
                 self._give_out(found, events)
-            flaws = 0
             tick += self._step
-        self._paused = False
-        self._next_tick = tick
         return events
 
     def hear(self, sent: Transmission) -> list[Event]:
@@ -168,7 +157,7 @@ class Scanner:
             if not least <= start_tick <= most:
                 checked_tick(start_tick, self._step)
             tick = start_tick
-            found = self._put_symbol(byte, not stop_good, tick)
+            found = self._put(byte, not stop_good, tick)
             if found:
                 self._give_out(found, events)
         return events
@@ -210,28 +199,21 @@ class Scanner:
         spacing = tick - self._next_tick + self._step
         return self._paused or abs(spacing - self._spacing) > self._tolerance
 
-    def _put_symbol(self, byte: int, bad_stop: bool, tick: int) -> int:
-        flaws = _BAD_STOP if bad_stop else 0
-        if self._is_apart(tick):
-            flaws |= _APART
-        self._paused = False
-        self._next_tick = tick + self._step
-        return self._put(byte, flaws, tick)
-
-    def _keep(self, byte: int, flaws: int, tick: int) -> None:
+    def _put(self, byte: int, bad_stop: bool, tick: int) -> int:
+        """Takes a character; says whether it completed a frame, or a run that is to be given out."""
         place = self._count
         self._data[place] = byte
-        self._flaws[place] = flaws
+        self._flaws[place] = 0
         self._ticks[place] = tick
-        if flaws & _BAD_STOP:
+        if bad_stop:
+            self._flaws[place] = _BAD_STOP
             self._last_bad = place
-        if flaws & _APART:
+        if self._is_apart(tick):
+            self._flaws[place] |= _APART
             self._last_apart = place
         self._count = place + 1
-
-    def _put(self, byte: int, flaws: int, tick: int) -> int:
-        """Takes a character; says whether it completed a frame, or a run that is to be given out."""
-        self._keep(byte, flaws, tick)
+        self._paused = False
+        self._next_tick = tick + self._step
         start = self._count - self._size
         if start < 0:
             return 0
@@ -266,14 +248,17 @@ class Scanner:
         sync = self._count - self._size
         start = self._lead_start(sync)
         end = self._count
-        body = bytearray(self._size - 4)
-        for place in range(self._size - 4):
-            body[place] = self._data[sync + 2 + place] ^ self._white[place]
-        frame = Received(bytes(self._data[start:end]), self._ticks[start], self._ticks[end - 1], bytes(body))
+        self._read_body(sync)
+        body = bytes(self.body[: self._size - 4])
+        frame = Received(bytes(self._data[start:end]), self._ticks[start], self._ticks[end - 1], body)
         if start > 0:
             self._give_out_damaged(start, events)
         events.append(frame)
         self._clear()
+
+    def _read_body(self, sync: int) -> None:
+        for place in range(self._size - 4):
+            self.body[place] = self._data[sync + 2 + place] ^ self._white[place]
 
     def _clear(self) -> None:
         """No character waits for its event."""

@@ -209,10 +209,8 @@ class StreamLine:
         if len(tokens) != 4:
             raise self.error(end, "not an action", _ACTIONS)
         word, value = tokens[2][0], tokens[3][0]
-        if word == "reset" and slot is not None and network is not None and value in ("0", "1"):
-            return Reset(tick, network, slot, int(value))
-        if word == "power" and slot is not None and network is not None and value in ("0", "1"):
-            return Power(tick, network, slot, int(value))
+        if word in ("reset", "power") and slot is not None and network is not None and value in ("0", "1"):
+            return (Reset if word == "reset" else Power)(tick, network, slot, int(value))
         if word == "radio" and slot is None and network is not None and value in RADIO_STATES:
             return RadioState(tick, network, value)  # type: ignore[arg-type]
         if _PIN.fullmatch(word) and network is None and value in ("0", "1"):

@@ -66,9 +66,7 @@ ASIDE = st.floats(-0.002, 0.002)
 
 def made(theta, size, left, right, end_s):
     """A filter in the middle of its work, whose next command but one takes effect `end_s` ago."""
-    one = Filter(size, Motion(TRACK_M, SLOPE, DOUBT), 0.0087)
-    one.drifts(*DRIFT)
-    one.warps(*WARP)
+    one = Filter(size, Motion(TRACK_M, SLOPE, DOUBT), 0.0087, DRIFT, *WARP)
     one.command(0.0, 0.0, 1.0 + PERIOD_S, PERIOD_S)
     for name, values in (("left", left), ("right", right)):
         for end, value in zip(("start", "to"), values, strict=True):

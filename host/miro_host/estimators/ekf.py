@@ -83,11 +83,11 @@ class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
     def estimator(self) -> "Ekf":
         return Ekf(self)
 
-    def filter(self, size: int) -> Filter:
+    def filter(self, size: int, *warp: float) -> Filter:
         """A filter with these parameters, as it is before its first period."""
-        made = Filter(size, Motion(WHEELS.track_m, self.slope_m_s2, self.doubt), self.wheel_spread)
-        made.drifts(self.position_drift_m, self.heading_drift_rad, self.wheel_drift, self.rim_noise_m_s)
-        return made
+        drifts = (self.position_drift_m, self.heading_drift_rad, self.wheel_drift, self.rim_noise_m_s)
+        motion = Motion(WHEELS.track_m, self.slope_m_s2, self.doubt)
+        return Filter(size, motion, self.wheel_spread, drifts, *warp)
 
     def delay_s(self, given: EstimatorInput) -> float:
         """From now to the effect of the next command."""

@@ -64,10 +64,8 @@ class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+
     def estimator(self) -> "EkfTelemetry":
         return EkfTelemetry(self)
 
-    def filter(self, size: int) -> Filter:
-        made = super().filter(size)
-        made.warps(self.warp_m, self.warp_length_m)
-        return made
+    def filter(self, size: int, *warp: float) -> Filter:
+        return super().filter(size, self.warp_m, self.warp_length_m)
 
 
 class EkfTelemetry(Ekf):

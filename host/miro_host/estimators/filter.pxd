@@ -19,7 +19,6 @@ cdef class Filter:
     cdef double column[9]
     cdef double lower[25]
 
-    cpdef check_positive(self)
     @cython.locals(lower='double *')
     cdef int factorise(self, int size) except -1
     @cython.locals(total=double)

@@ -53,15 +53,21 @@ class Filter:
         *("effect_s", "period_s", "column", "lower"),
     )
 
-    def __init__(self, size: int, motion: Motion, wheel_spread: float) -> None:
+    def __init__(
+        self,
+        size: int,
+        motion: Motion,
+        wheel_spread: float,
+        drifts: tuple[float, float, float, float],
+        warp_m: float = 0.0,
+        warp_length_m: float = 1.0,
+    ) -> None:
+        """`drifts`: the four above, in their order."""
         self.size = size
         self.motion = motion
-        self.position_m = 0.0
-        self.heading_rad = 0.0
-        self.wheel = 0.0
-        self.rim_m_s = 0.0
-        self.warp_m = 0.0
-        self.warp_length_m = 1.0
+        self.position_m, self.heading_rad, self.wheel, self.rim_m_s = drifts
+        self.warp_m = warp_m
+        self.warp_length_m = warp_length_m
         self.effect_s = 0.0
         self.period_s = 1.0
         self.known = 0
@@ -80,18 +86,6 @@ class Filter:
     def __repr__(self) -> str:
         return f"Filter(known={self.known}, at_s={self.at_s}, state={list(self.state)})"
 
-    def drifts(self, position_m: float, heading_rad: float, wheel: float, rim_m_s: float) -> None:
-        """Sets the standard deviations of the drift."""
-        self.position_m = position_m
-        self.heading_rad = heading_rad
-        self.wheel = wheel
-        self.rim_m_s = rim_m_s
-
-    def warps(self, warp_m: float, warp_length_m: float) -> None:
-        """Sets the standard deviation of the camera's warp and the way over which it changes."""
-        self.warp_m = warp_m
-        self.warp_length_m = warp_length_m
-
     def after_load(self) -> None:
         """Raises ValueError for what no step leaves."""
         for index in (3, 4):
@@ -103,15 +97,11 @@ class Filter:
             for j in range(i):
                 if self.covariance[i * _N + j] != self.covariance[j * _N + i]:
                     raise ValueError("the covariance is not symmetric")
-        if self.known:
-            self.check_positive()
-
-    def check_positive(self) -> None:
-        """Raises ValueError unless the covariance of the first five is positive definite (Cholesky)."""
-        for i in range(5):
-            for j in range(i + 1):
-                self.lower[5 * i + j] = self.covariance[i * _N + j]
-        self.factorise(5)
+        if self.known:  # the covariance of the first five is positive definite (Cholesky)
+            for i in range(5):
+                for j in range(i + 1):
+                    self.lower[5 * i + j] = self.covariance[i * _N + j]
+            self.factorise(5)
 
     def factorise(self, size: int) -> None:
         """Replaces a symmetric matrix in `lower`, row by row, by its Cholesky triangle. ValueError if there is none."""

@@ -17,6 +17,7 @@ from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import ROBOT_HEIGHT_M
+from miro_host.eye.pitch_marks import BOTTOM_M, LEFT_M, RIGHT_M, TOP_M
 
 CENTRE_PX = 1.0
 FOCAL_SHARE = 0.01
@@ -25,9 +26,6 @@ TILT_RAD = 0.009948376736367678
 WORST_M = 0.0240
 """Paper, section V-A."""
 
-PITCH_X_M = (-0.10, 1.20)
-PITCH_Y_M = (-0.10, 0.80)
-"""The 130 x 90 cm of the pitch in the paper's axes."""
 GRID_M = 0.10
 
 _STEPS = 20
@@ -136,15 +134,15 @@ def _grid(true: CameraParameters) -> list[tuple[float, float, float, float]]:
     """x, y, u, v: points of the pitch, and where the true camera draws them."""
     lens = Lens(true)
     found = []
-    for column in range(_steps(PITCH_X_M) + 1):
-        for row in range(_steps(PITCH_Y_M) + 1):
-            x_m, y_m = PITCH_X_M[0] + column * GRID_M, PITCH_Y_M[0] + row * GRID_M
+    for column in range(_steps(RIGHT_M - LEFT_M) + 1):
+        for row in range(_steps(TOP_M - BOTTOM_M) + 1):
+            x_m, y_m = LEFT_M + column * GRID_M, BOTTOM_M + row * GRID_M
             found.append((x_m, y_m, *lens.pixel(x_m, y_m, ROBOT_HEIGHT_M)))
     return found
 
 
-def _steps(ends: tuple[float, float]) -> int:
-    return math.floor((ends[1] - ends[0]) / GRID_M + 0.5)
+def _steps(length_m: float) -> int:
+    return math.floor(length_m / GRID_M + 0.5)
 
 
 def _worst_m(grid: list[tuple[float, float, float, float]], calibration: Calibration) -> float:

@@ -131,17 +131,16 @@ def remedy_for_key(key: str, known: list[str]) -> str:
 
 def unit_name(key: str) -> str:
     """The unit that ends a key, in words, or the empty string."""
-    for unit in sorted(UNITS, key=len, reverse=True):
-        if key.endswith(f"_{unit}"):
-            return UNITS[unit]
-    return ""
+    return UNITS.get(_unit(key), "")
+
+
+def _unit(key: str) -> str:
+    """The longest unit that ends a key."""
+    return max((unit for unit in (*UNITS, *MORE_UNITS) if key.endswith(f"_{unit}")), key=len, default="")
 
 
 def _stem(key: str) -> str:
-    for unit in sorted((*UNITS, *MORE_UNITS), key=len, reverse=True):
-        if key.endswith(f"_{unit}"):
-            return key[: -len(unit) - 1]
-    return key
+    return key.removesuffix(f"_{_unit(key)}")
 
 
 def _unit_of(path: str) -> str:

@@ -74,7 +74,6 @@ class GaussianSight:
         return f"GaussianSight({self.visions!r}, frame={self.frame})"
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
-        """See `Sight`."""
         found = []
         for place in range(len(self.visions)):
             vision, noise, body = self.visions[place], self.streams[place], self.bodies[place]
@@ -83,7 +82,6 @@ class GaussianSight:
         return found
 
     def counts(self) -> dict[str, int]:
-        """See `Sight`."""
         return {}
 
 
@@ -118,7 +116,6 @@ class SeeingSight:
         return f"{type(self).__name__}({self.grabber!r}, frame={self.frame}, lost={self.lost})"
 
     def counts(self) -> dict[str, int]:
-        """See `Sight`."""
         names = ("lost", "dropped", "repeated", "wrong", "swapped")
         return {"frames": self.frame, **{name: getattr(self, name) for name in names}}
 
@@ -127,7 +124,6 @@ class SeeingSight:
         raise NotImplementedError
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
-        """See `Sight`."""
         robots = len(self.bodies)
         first = self.frame * (robots + 2)
         camera, chance = self.camera, self.chances
@@ -213,7 +209,6 @@ class GeometricSight(SeeingSight):
         self.field = StaticField(camera.lens, calibration, camera.pattern)
 
     def look(self, tick: int) -> list[Sighting | None]:
-        """See `SeeingSight`."""
         return [self._see(body, tick) for body in self.bodies]
 
     def _see(self, body: Robot, tick: int) -> Sighting | None:
@@ -258,14 +253,12 @@ class PixelSight(SeeingSight):
         )
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
-        """See `Sight`."""
         arrived = SeeingSight.expose(self, tick)
         if self.watch is not None:
             self.watch(self.frame - 1, tick)
         return arrived
 
     def look(self, tick: int) -> list[Sighting | None]:
-        """See `SeeingSight`."""
         return self.tracker.track(self.picture_at(self.frame, tick), tick)
 
     def picture_at(self, frame: int, tick: int) -> Camera:
