@@ -52,7 +52,7 @@ def run_ratio(runs: int) -> float:
         began_s = time.process_time()
         run_single(job)
         whole_s = time.process_time() - began_s
-        world = World(prepared(job.origin, job.text, job.settings).text.scenario, job.seed, load_firmware())
+        world = World(prepared(job.origin, job.text, job.settings)[0].scenario, job.seed, load_firmware())
         began_s = time.process_time()
         while not world.finished:
             world.step()
