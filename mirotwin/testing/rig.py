@@ -84,26 +84,21 @@ def world_for(options: RigOptions) -> tuple[World, Trace, Checks]:
     """
     world = World(options.scenario, options.seed, options.image)
     trace = Trace(world)
-    if not options.boot:
-        return world, trace, Checks(world, options.expected)
     scenario = msgspec.json.encode(msgspec.structs.replace(options.scenario, expect={}))
     key = (scenario, options.seed, options.image.sha256)
-    if key in _STATES and not _watched(world):
-        world.load(_STATES[key])
-        return world, trace, Checks(world, options.expected)
+    # the coverage of the firmware is to count the same however the tests are spread
+    watched = any(robot.board.cpu.inspector for robot in world.robots)
+    saved = None if watched or not options.boot else _STATES.get(key)
+    if saved is not None:
+        world.load(saved)
     checks = Checks(world, options.expected)
-    _boot(world)
-    seen = checks.failures or world.faults  # every test is to see them
-    if not seen and not _watched(world):
-        if len(_STATES) >= _KEPT:
-            del _STATES[next(iter(_STATES))]
-        _STATES[key] = world.save()
+    if options.boot and saved is None:
+        _boot(world)
+        if not (checks.failures or world.faults or watched):  # every test is to see what failed
+            if len(_STATES) >= _KEPT:
+                del _STATES[next(iter(_STATES))]
+            _STATES[key] = world.save()
     return world, trace, checks
-
-
-def _watched(world: World) -> bool:
-    """Whether the coverage of the firmware is taken: it is to count the same however the tests are spread."""
-    return any(robot.board.cpu.inspector for robot in world.robots)
 
 
 def _boot(world: World) -> None:

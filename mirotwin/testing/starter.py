@@ -74,22 +74,14 @@ OF_FIRMWARE = "tests/test_firmware.py"
 
 def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
     """(name in the project, file) of all, in the order of names; with the C sources if `firmware`."""
-    of_project = folder() / PROJECT
-    sources = source_folder()
+    of_project, sources = folder() / PROJECT, source_folder()
     if sources is None:
         what = "the sample project is not part of this installation"
         raise BadInput("", "mirotwin init", what, "install mirotwin from a wheel or a checkout")
     found = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
-    if not firmware:
-        yield from (one for one in found if one[0] != OF_FIRMWARE)
-        return
-    found += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
-    yield from sorted(found)
-
-
-def begin(target: Path, firmware: bool = True) -> list[str]:
-    """Writes the project into `target`, which is made, and returns the names. Raises BadInput if one is there."""
-    return write(target, project_files(firmware), "name a folder that is new or empty")
+    if firmware:
+        found += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
+    yield from sorted(one for one in found if firmware or one[0] != OF_FIRMWARE)
 
 
 _LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv"}
@@ -185,8 +177,8 @@ def init(options: InitOptions) -> None:
     runs them with `mirotwin conform` at each push. With --without-firmware the project tests a controller or
     a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
     """
-    folder = options.folder
-    names = begin(folder, not options.without_firmware)
+    folder, remedy = options.folder, "name a folder that is new or empty"
+    names = write(folder, project_files(not options.without_firmware), remedy)
     for name in names:
         if not name.startswith("firmware/"):
             click.echo(folder / name)
