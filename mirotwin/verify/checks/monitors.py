@@ -15,7 +15,7 @@ after a simulated one the caches hold nothing of this.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -24,7 +24,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.plugins import PluginError
 from miro_host.raised import raised
-from miro_protocol.events import Received
+from miro_protocol.events import Damaged, Received
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period, RobotId
 from miro_sim.world.events import Cursor, Event
@@ -43,19 +43,18 @@ from mirotwin.verify.checks.interface import (
 )
 
 
-def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
-    """The `frame` and `damaged` events that a `received` one completes, at its tick."""
-    for found, fresh in receiver.character(received.value, received.good_stop, received.tick):
-        frame = found if isinstance(found, Received) else None
-        yield Event(
-            tick=received.tick,
-            what="damaged" if frame is None else "frame",
-            network=received.network,
-            slot=received.slot,
-            value=int(bool(fresh)),
-            data=found.data,
-            frame=frame,
-        )
+def reception(received: Event, found: Received | Damaged, fresh: bool | None) -> Event:
+    """The `frame` or `damaged` event that a `received` one completes, at its tick."""
+    frame = found if isinstance(found, Received) else None
+    return Event(
+        tick=received.tick,
+        what="damaged" if frame is None else "frame",
+        network=received.network,
+        slot=received.slot,
+        value=int(bool(fresh)),
+        data=found.data,
+        frame=frame,
+    )
 
 
 Expected = Mapping[RobotId, Sequence[Check]]
@@ -242,8 +241,8 @@ class _RobotMonitors:
                 self._restart(event.tick)
             self._tell_one(event)
             if event.what == "received" and self.receiver is not None:
-                for heard in receptions(self.receiver, event):
-                    self._tell_one(heard)
+                for heard in self.receiver.character(event.value, event.good_stop, event.tick):
+                    self._tell_one(reception(event, *heard))
         del self.waiting[:told]
         for monitor in self.of_times:
             self.check = monitor.check
