@@ -219,19 +219,15 @@ def robot(robots: list[RobotUnderTest]) -> RobotUnderTest:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """The checks judge a test that has come to its end."""
+    if _RIG not in getattr(item, "funcargs", ()):
+        return (yield)
+    from mirotwin.testing import items
+
     try:
         result = yield
     except (ValueError, TimeoutError) as error:
-        shown: BaseException = error
-        if _RIG in getattr(item, "funcargs", ()):
-            from mirotwin.testing import items
-
-            shown = items.at_the_tests_line(item, error)
-        raise shown from None
-    if _RIG in getattr(item, "funcargs", ()):
-        from mirotwin.testing import items
-
-        items.judge(item)
+        raise items.at_the_tests_line(item, error) from None
+    items.judge(item)
     return result
 
 
