@@ -70,39 +70,31 @@ class Console(Cmd):
         self.ended = False
         self.last = ""
 
-    def onecmd(self, line: str) -> bool:
-        """Runs a line that was typed; whether it is the last one."""
-        if line == "EOF":
-            self.ended = True
-        else:
-            self.done = self.run(line) and self.done
-        return self.ended
-
     def completenames(self, text: str, *ignored: object) -> list[str]:
         return [verb for verb in sorted(VERBS) if verb.startswith(text)]
 
     def completedefault(self, text: str, *ignored: object) -> list[str]:
         return [name for name in self.symbols.known if name.startswith(text)]
 
-    def run(self, line: str) -> bool:
-        """Does one command; the last step again where the line is empty. False where it could not, which it says.
+    def onecmd(self, line: str) -> bool:
+        """Does one line, or the last step again where it is empty, and shows what came of it; whether it is the last.
 
         Ctrl-C ends a search, where it is.
         """
         stopped: list[int] = []
         before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))
-        words = line.strip() or self.last
+        words = "quit" if line == "EOF" else line.strip() or self.last
         try:
             with self.timeline.shown(words, lambda: bool(stopped)):
                 self.last = words if self.do(words) in MOVES else ""
         except BadInput as error:
             complain(f"error: {error}")
-            return False
+            self.done = False
         finally:
             signal.signal(signal.SIGINT, before)
             for told in self.lines:
                 show_line(told)
-        return True
+        return self.ended
 
     def do(self, line: str) -> str:
         """The same, which shows nothing; returns the verb. Raises BadInput."""

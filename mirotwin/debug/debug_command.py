@@ -60,11 +60,9 @@ def debug(options: DebugOptions) -> int:
         return _interact(console)
     for line in options.commands:
         show_line(f"{console.prompt}{line}")
-        if not console.run(line):
-            return BAD_INPUT
-        if console.ended:
+        if console.onecmd(line) or not console.done:
             break
-    return DONE
+    return DONE if console.done else BAD_INPUT
 
 
 def _listen(port: int) -> int:

@@ -297,7 +297,7 @@ class Debugger:
         inner, _ = self._caller()
         if self.cpu.pc != inner.entry or self.cpu.sp != inner.base:
             entered = Trap({inner.entry}, lambda core: core.cpu.sp == inner.base or None)
-            if self.timeline.find_back({self.timeline.focus: entered}, closely=True) is None:
+            if self.timeline.find_back({self.timeline.focus: entered}) is None:
                 return self._at_begin()
         self.timeline.step_back()
         return STEPPED
@@ -337,7 +337,7 @@ class Debugger:
         outermost = here.base - here.entered
         begin: Hit | None = None
         line: _Line | None = None
-        for hit in self.timeline.hits_back({self.timeline.focus: trap}, closely=True):
+        for hit in self.timeline.hits_back({self.timeline.focus: trap}):
             there = hit.found
             assert isinstance(there, _Line)
             if there.base > outermost and (over or there.level != here.level):

@@ -121,14 +121,11 @@ class Moment:
 
     def find(self, name: str, module: str) -> Value:
         """What a name means; `module`: the file that is named before it, if any. Raises NoValue."""
-        local = None if module else self.locals().get(name)
-        if local is not None:
+        if not module and (local := self.locals().get(name)):
             return local()
-        variable = self._variable(name, module)
-        if variable is not None:
+        if variable := self._variable(name, module):
             return self.placed(variable)
-        special = None if module else self._special(name)
-        if special is not None:
+        if not module and (special := self._special(name)):
             return special
         symbol = self.symbols.image.symbols.find(name)
         if symbol is None:

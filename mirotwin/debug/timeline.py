@@ -231,7 +231,7 @@ class Timeline:
         if before < 0:
             return False
         self.go_to(before * CYCLE_TICKS)
-        if asleep and self.find_back({self.focus: Trap(self.everywhere, lambda core: True)}, closely=True):
+        if asleep and self.find_back({self.focus: Trap(self.everywhere, lambda core: True)}):
             self.step()
         return True
 
@@ -272,16 +272,15 @@ class Timeline:
             self.land(hit)
         return hit
 
-    def hits_back(self, traps: Mapping[int, Trap], closely: bool = False) -> Iterator[Hit]:
+    def hits_back(self, traps: Mapping[int, Trap]) -> Iterator[Hit]:
         """The moments before this one at which a trap finds something, the latest first; meanwhile it is anywhere.
 
-        After the last one it stands where the run begins, or where it was interrupted. `closely`: one is likely near.
+        After the last one it stands where the run begins, or where it was interrupted.
         """
         here = (self.core.cpu.cycles, self.focus)
         end_tick, first = self.tick + 1, False
+        self._look_closely(end_tick)  # where a hit is likely
         while not first:
-            if closely:
-                self._look_closely(end_tick)
             at = self._before(end_tick)
             begin_tick, first = self._kept[at].tick, at == 0
             self._load(at)
@@ -292,9 +291,9 @@ class Timeline:
             end_tick, first = begin_tick, first or self.interrupted()
         self.go_to(begin_tick)
 
-    def find_back(self, traps: Mapping[int, Trap], closely: bool = False) -> Hit | None:
+    def find_back(self, traps: Mapping[int, Trap]) -> Hit | None:
         """Goes back to the last moment before this one at which a trap finds something; None if there is none."""
-        hit = next(self.hits_back(traps, closely), None)
+        hit = next(self.hits_back(traps), None)
         if hit is not None:
             self.land(hit)
         return hit

@@ -140,7 +140,7 @@ def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
     one.log = lambda moment: "tick"
     debugger.add("failsafe_fresh")
     console = Console(debugger)
-    console.run("continue")
+    console.onecmd("continue")
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) > 3
     assert all(line.endswith("tick") for line in lines[:-1])
@@ -151,7 +151,9 @@ def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypa
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(ProgressBar, "PATIENCE_S", 0.0)
     monkeypatch.setattr(sys, "stderr", screen := Screen())
-    assert Console(debugger).run("continue")
+    console = Console(debugger)
+    console.onecmd("continue")
+    assert console.done
     assert "continue" in screen.getvalue()
     assert "the run ends here" in capsys.readouterr().out
 
