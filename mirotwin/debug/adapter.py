@@ -19,7 +19,7 @@ from typing import Any
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
-from miro_robot.mcs51.opcodes import BITS, SFRS
+from miro_robot.mcs51.opcodes import SFRS
 from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import STEPPED, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
@@ -368,7 +368,7 @@ class Adapter:
             whole = content(value)
         except BadInput as error:
             return {key: str(error), "variablesReference": 0}
-        inner = _inner(value)
+        inner = children(value)
         text = shown_value(whole) if not inner or isinstance(whole, int) else str(value.kind or "")
         place = None
         if value.moment is not None and value.space in SIZES:
@@ -423,14 +423,6 @@ class Adapter:
         place = {} if row.line is None else self._place(row.address, "location")
         data = {"instructionBytes": row.data.hex(" "), "instruction": row.text}
         return {"address": f"{row.address:#06x}", **data, **place}
-
-
-def _inner(value: Value) -> list[tuple[str, Shown]]:
-    """Members and elements; of a special function register its bits."""
-    if value.space == "sfr" and value.kind is not None and value.kind.size == 1:
-        bits = [(name, bit) for name, bit in BITS.items() if bit & 0xF8 == value.address]
-        return [(name, partial(Value, CType("bit", 1), "bit", bit, value.moment)) for name, bit in bits]
-    return children(value)
 
 
 def _logged(text: str) -> Callable[[Moment], str]:

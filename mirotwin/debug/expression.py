@@ -19,6 +19,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.image.c_types import CType, Fields, value_of
+from miro_robot.mcs51.opcodes import BITS
 
 if TYPE_CHECKING:
     from mirotwin.debug.symbols import Moment
@@ -69,7 +70,7 @@ def expression(text: str, known: Collection[str] = ()) -> Term:
 
 
 def content(value: Value) -> Any:
-    """What it holds: int, float, bool, list, dict. Raises NoValue for bytes of a memory that is not there."""
+    """What it holds: int, float, bool, list, dict. Raises BadInput for bytes of a memory that is not there."""
     if value.members is not None:
         return {name: content(get()) for name, get in value.members.items()}
     if value.moment is None or value.kind is None:
@@ -88,10 +89,13 @@ def number(value: Value) -> Any:
 
 
 def children(value: Value) -> list[tuple[str, Callable[[], Value]]]:
-    """Members and elements by name, empty for a single number."""
+    """Members and elements by name, empty for a single number; of a special function register its bits."""
     kind = value.kind
     if value.members is not None or kind is None:
         return list((value.members or {}).items())
+    if value.space == "sfr" and kind.size == 1:
+        bits = [(name, bit) for name, bit in BITS.items() if bit & 0xF8 == value.address]
+        return [(name, partial(Value, CType("bit", 1), "bit", bit, value.moment)) for name, bit in bits]
     if kind.kind == "array":
         return [(f"[{at}]", partial(_element, value, at)) for at in range(kind.count)]
     fields = value.fields.get(kind.tag, ()) if kind.kind == "struct" else ()

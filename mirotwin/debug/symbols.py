@@ -225,14 +225,10 @@ class Moment:
         return Value(number=port_pins(tap.start, port))
 
     def read(self, space: str, address: int, count: int) -> bytes:
-        """Bytes of a memory. Raises NoValue."""
+        """Bytes of a memory. Raises BadInput for one that is not there."""
         cpu = self.core.cpu
-        if space == "xram":
-            if self.core.board is not None:
-                raise NoValue("is in external RAM, which the board has not")
+        if space == "xram" and self.core.board is None:
             return bytes(cpu.bus.movx_read((address + at) & 0xFFFF, 0) for at in range(count))
-        if space == "sfr" and address < 0x80:
-            raise NoValue(f"{address:#04x} is no special function register", "they begin at sfr[0x80]")
         return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
 
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.bad_input import BadInput
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from mirotwin.debug.expression import NoValue, Value, content, expression
@@ -95,6 +96,7 @@ def shown(debugger, text, frame=0):
         ("frames_accepted", "iram[&frames_accepted] + 256 * iram[&frames_accepted + 1]"),
         ("failsafe:age", "age"),
         ("P1.3", "P1 >> 3 & 1"),
+        ("SCON.RI", "RI"),
         ("RI", "SCON.0"),
         ("R3", "iram[(PSW & 0x18) + 3]"),
         ("lm629.left.pid.kp", "400"),
@@ -148,10 +150,11 @@ def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp
     ("text", "said"),
     [
         ("frames_acepted", "did you mean frames_accepted"),
-        ("xram[1]", "is in external RAM, which the board has not"),
+        ("xram[1]", "is in xram: the board has no such memory"),
+        ("sfr[3]", "is in sfr: the board has no such memory"),
         ("iram[256]", "give 0 to 255"),
     ],
 )
 def test_a_name_that_is_not_there_names_what_comes_close(debugger, text, said):
-    with pytest.raises(NoValue, match=said):
+    with pytest.raises(BadInput, match=said):
         shown(debugger, text)
