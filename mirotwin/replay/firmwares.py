@@ -130,11 +130,11 @@ class FirmwareDifference(Record, frozen=True):
     `notes`: what was compared, and what is missing.
     """
 
-    changed: InstructionDifference | None
-    effect: InstructionDifference | None
-    mapped: InstructionDifference | None
-    variables: tuple[VariableDifference, ...]
-    notes: tuple[str, ...]
+    changed: InstructionDifference | None = None
+    effect: InstructionDifference | None = None
+    mapped: InstructionDifference | None = None
+    variables: tuple[VariableDifference, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def first_instruction(
@@ -154,7 +154,7 @@ def first_instruction(
             notes.insert(0, "no changed instruction is executed: what differs is data in code memory")
         if effect is None:
             notes.insert(0, "the states are the same each millisecond: no instruction has a lasting effect")
-        return FirmwareDifference(changed, effect, None, (), tuple(notes))
+        return FirmwareDifference(changed, effect, notes=tuple(notes))
     mapping = moved(one, other)
     mapped = _first_mapped(worlds(), annotated, mapping, until_tick)
     builds = Builds(*worlds(), annotated)
@@ -164,7 +164,7 @@ def first_instruction(
         notes.insert(0, f"the code lies at other addresses and was mapped by symbols: {mapping}")
     if variables and not builds.since:
         notes.append("when the runs differ no variable does any more; these did for a while before")
-    return FirmwareDifference(None, None, mapped, tuple(variables), tuple(notes))
+    return FirmwareDifference(mapped=mapped, variables=tuple(variables), notes=tuple(notes))
 
 
 def _first_mapped(

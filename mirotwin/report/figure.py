@@ -8,7 +8,7 @@ from pathlib import Path
 from miro_exact.clock import seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, Tracks
 from mirotwin.report.summary import rms_name, settling_text, tracking_of
-from mirotwin.report.svg import COLOURS, Drawing, Panel, PanelBox
+from mirotwin.report.svg import COLOURS, Drawing, Panel, PanelBox, Stroke
 
 ERRORS = (
     ("(b)  x_e", "x_e [cm]", "x_cm", SETTLED_CM, "cm"),
@@ -46,13 +46,14 @@ def path_panel(tracks: Tracks) -> Panel:
     panel = Panel("(a)  x-y, from the circle", "x [cm]", "y [cm]", equal=True)
     for index, (place, track) in enumerate(tracks.robots.items()):
         colour, first = 1 + index % COLOURS, index == 0
-        panel.dots(*track.measured.points_cm(), colour=colour, label="camera" if first else "")
+        label = "camera" if first else ""
+        panel.marks.append(Stroke(*track.measured.points_cm(), "dots", colour, label))
         label = "reference" if first else ""
         panel.line(*track.reference.points_cm(), colour=0, style="dotted", label=label)
         label = "robot" if len(tracks.robots) == 1 else f"robot {place[0]}/{place[1]}"
         x_cm, y_cm = track.truth.points_cm()
         panel.line(x_cm, y_cm, colour=colour, label=label)
-        panel.start(x_cm[0], y_cm[0], colour=colour)
+        panel.marks.append(Stroke(x_cm[:1], y_cm[:1], "start", colour))
     return panel
 
 

@@ -19,17 +19,15 @@ from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.summary import Summary
-from mirotwin.rerun.job import Job, load_job, replaying
+from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
-from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine, plain_parameters
+from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
-from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
-from mirotwin.verify.checks.expect import expectations_of
 
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
@@ -126,31 +124,21 @@ def _file_of(subject: str) -> str:
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 
 
-def _reproduced(wanted: ReportOptions, job: Job, until_tick: int | None) -> Reproduction:
-    with plain_parameters(job.file, "replayed"):
-        world = job.world_of()
-    total = until_tick or job.scenario.end_tick
-    with ProgressBar("running it again", total, wanted.quiet) as bar, replaying(job.file, world):
-        return reproduce(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
-
-
 def _of_recording(wanted: ReportOptions, job: Job) -> Material:
     file, image, shown = job.file, job.runs_on, wanted.shown
     recorded = [period for period in job.recorded if period.index in shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-        from_tick, _ = window(wanted.from_time, wanted.to_time)
-        place = f"--from {from_tick}t"
+        place = f"--from {window(wanted.from_time, wanted.to_time)[0]}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-    again = _reproduced(wanted, job, end_tick)
+    again = reproduce(job, end_tick, wanted.quiet)
     extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
     notes, what = [], "This page's own run of it"
     if extras.broken_off:
-        notes.append(
-            f"This run was broken off: the page shows what it recorded, {amount(len(recorded), 'control period')}."
-        )
+        count = amount(len(recorded), "control period")
+        notes.append(f"This run was broken off: the page shows what it recorded, {count}.")
     if job.image is None or job.image.code != image.code:
         recorded = [period for period in again.periods if period.index in shown]
         extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
@@ -176,7 +164,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
 def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     _, to_tick = window(wanted.from_time, wanted.to_time)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
-    again = _reproduced(wanted, job, min(ends, default=None))
+    again = reproduce(job, min(ends, default=None), wanted.quiet)
     report = Path(job.file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     return Material(

@@ -53,13 +53,13 @@ class PanelBox(NamedTuple):
 
 
 class Stroke(NamedTuple):
-    """Points and how they are drawn: `style` of STYLE, `colour` 0 (ink) to 5."""
+    """Points and how they are drawn: `style` of STYLE, `dots` and `start` (a ring) included, `colour` 0 (ink) to 5."""
 
     x: Sequence[float]
     y: Sequence[float]
     style: str
     colour: int
-    label: str
+    label: str = ""
 
 
 class Panel:
@@ -82,13 +82,6 @@ class Panel:
         """`style`: classes besides `line`; `label`: its name in the legend."""
         style = f"line {look.get('style', '')}".rstrip()
         self.marks.append(Stroke(x, y, style, colour, look.get("label", "")))
-
-    def dots(self, x: Sequence[float], y: Sequence[float], *, colour: int, label: str = "") -> None:
-        self.marks.append(Stroke(x, y, "dots", colour, label))
-
-    def start(self, x: float, y: float, *, colour: int) -> None:
-        """A ring."""
-        self.marks.append(Stroke([x], [y], "start", colour, ""))
 
     def spans(self) -> tuple[float, float, float, float]:
         """The least and the most of x, then of y."""

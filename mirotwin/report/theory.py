@@ -11,6 +11,7 @@ import msgspec
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.laws.yang_kim import Gains as PaperGains
+from miro_sim.periods import RobotId
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.theory_track import PERIOD_S, Broken, TheoryTrack
 
@@ -46,30 +47,29 @@ class DisturbanceFigures(msgspec.Struct, frozen=True):
     f2_above_authority: float | None
 
 
-class Assumption1(msgspec.Struct, frozen=True):
-    """How long phi_c, theta_c, phi_r or theta_r, followed without jumps, was outside of (-pi, pi]; passages of pi."""
+class Assumption(msgspec.Struct, frozen=True):
+    """For how long an assumption was broken, and when first and last."""
 
     broken_s: float
     first_s: float | None
     last_s: float | None
+
+
+class Assumption1(Assumption, frozen=True):
+    """phi_c, theta_c, phi_r or theta_r, followed without jumps, was outside of (-pi, pi]; `seams`: passages of pi."""
+
     seams: int
 
 
-class Assumption2(msgspec.Struct, frozen=True):
-    """How long rho_c was within 2.40 cm, or rho_r was 0, after the start; the least rho_c in cm."""
+class Assumption2(Assumption, frozen=True):
+    """rho_c was within 2.40 cm, or rho_r was 0, after the start; the least rho_c in cm."""
 
-    broken_s: float
-    first_s: float | None
-    last_s: float | None
     nearest_cm: float | None
 
 
-class Assumption3(msgspec.Struct, frozen=True):
-    """How long the heading was within 0.1 rad of across, in how many frames; the least distance; crossings of it."""
+class Assumption3(Assumption, frozen=True):
+    """The heading was within 0.1 rad of across, in how many frames; the least distance; crossings of it."""
 
-    broken_s: float
-    first_s: float | None
-    last_s: float | None
     frames: int
     nearest_rad: float
     crossings: int
@@ -93,7 +93,7 @@ class Theory(msgspec.Struct, frozen=True):
     effort_m_s2: float | None
 
 
-def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], SlidingGains]:
+def gains_of(scenario: Scenario) -> Mapping[RobotId, SlidingGains]:
     """The gains of each robot that the paper's law steers, by network and slot: other laws have other surfaces."""
     return {
         (index, robot.slot): _gains(robot.controller)

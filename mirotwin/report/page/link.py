@@ -24,7 +24,7 @@ from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
-from miro_sim.world.events import Cursor, Event
+from miro_sim.world.events import Cursor, Event, RobotLog
 from miro_sim.world.world import World
 
 OF_PC = ("answer", "reset", "power", "radio")
@@ -54,22 +54,25 @@ class Arrival(NamedTuple):
 
 
 class Arrivals:
-    """What a robot's serial port delivers, and when each character came."""
+    """What the serial port of one of `robots` delivers, and when each character came."""
 
-    def __init__(self, robots: int) -> None:
+    def __init__(self, log: RobotLog, robots: int) -> None:
         self.all: list[Arrival] = []
+        self._log = Cursor(log)
         self._robots = robots
         self._ticks: list[int] = []
         self._receiver = RobotReceiver(robots)
 
-    def restart(self) -> None:
-        """The robot begins again, and knows nothing of before."""
-        self.flush()
-        self._receiver = RobotReceiver(self._robots)
-
-    def take(self, received: Event) -> None:
-        self._ticks.append(received.tick - TO_RI_TICKS)
-        self._note(self._receiver.character(received.value, received.good_stop, received.tick))
+    def look(self, restarts: Sequence[Event]) -> None:
+        """Takes over what is new; a robot that begins again knows nothing of before."""
+        received = [event for _, event in self._log.read() if event.what == "received"]
+        for event in sorted([*received, *restarts], key=lambda event: event.tick):
+            if event.what == "received":
+                self._ticks.append(event.tick - TO_RI_TICKS)
+                self._note(self._receiver.character(event.value, event.good_stop, event.tick))
+            else:
+                self.flush()
+                self._receiver = RobotReceiver(self._robots)
 
     def flush(self) -> None:
         """Nothing more comes."""
@@ -90,13 +93,11 @@ class LinkLog:
         self.wire: list[Transmission] = []
         self._at_pc: dict[int, list[Event]] = {network.index: [] for network in world.networks}
         self._pc = {network.index: Cursor(network.log) for network in world.networks}
-        self._board: dict[tuple[int, int], Cursor] = {}
-        self._arrivals: dict[tuple[int, int], Arrivals] = {}
-        for network in world.networks:
-            for robot in network.robots:
-                place = (network.index, robot.slot)
-                self._board[place] = Cursor(robot.log)
-                self._arrivals[place] = Arrivals(network.spec.robots)
+        self._arrivals = {
+            (network.index, robot.slot): Arrivals(robot.log, network.spec.robots)
+            for network in world.networks
+            for robot in network.robots
+        }
         world.observers.append(self.look)
 
     def look(self, period: Period) -> None:
@@ -108,15 +109,7 @@ class LinkLog:
             self._at_pc[index] += new
             for robot in network.robots:
                 restarts = [event for event in new if event.what in RESTARTS and event.slot == robot.slot]
-                self._look_at((index, robot.slot), restarts)
-
-    def _look_at(self, place: tuple[int, int], restarts: Sequence[Event]) -> None:
-        received = [event for _, event in self._board[place].read() if event.what == "received"]
-        for event in sorted([*received, *restarts], key=lambda event: event.tick):
-            if event.what in RESTARTS:
-                self._arrivals[place].restart()
-            else:
-                self._arrivals[place].take(event)
+                self._arrivals[index, robot.slot].look(restarts)
 
     def marks(self) -> list[LinkMark]:
         """All marks, lane by lane, in the order of time."""
@@ -221,22 +214,16 @@ def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
 
 def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: int) -> list[LinkMark]:
     """What the PC heard: characters without a valid answer are a damaged one, or too few for that, noise."""
-    answers = [event for event in events if event.what == "answer" and event.frame is not None]
+    answers = [(event.tick, _said(event.frame, 3)) for event in events if event.frame is not None]
     marks = []
     for one in heard:
         end = one.tick + len(one.data) * ROBOT_CHARACTER_TICKS
-        within = [event for event in answers if one.tick <= event.tick <= end + SLACK_TICKS]
+        within = [text for tick, text in answers if one.tick <= tick <= end + SLACK_TICKS]
         enough = len(one.data) >= TELEMETRY.wire_size // 2
         kind = "answer" if within else "damaged" if enough else "noise"
-        who = (
-            ", ".join(_answer(event) for event in within) or f"{_characters(len(one.data))}, no valid answer"
-        )
+        who = ", ".join(within) or f"{_characters(len(one.data))}, no valid answer"
         marks.append(LinkMark(f"net{network} PC hears", kind, one.tick, end, who))
     return marks
-
-
-def _answer(event: Event) -> str:
-    return _said(event.frame, 3) if event.frame is not None else ""
 
 
 def _action(event: Event) -> LinkMark:

@@ -5,8 +5,6 @@ The first robot's processor is watched instruction by instruction; the bits of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-
 import msgspec
 
 from miro_robot.faults import FirmwareFault
@@ -16,12 +14,15 @@ from miro_robot.inspect.coverage import Counts, counts_of
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from miro_robot.inspect.watcher import attach, detach
-from miro_sim.periods import Period, RobotId
-from miro_sim.world.world import World
+from miro_sim.periods import Period
 from mirotwin.report.page.link import LinkLog, LinkMark
+from mirotwin.rerun.job import Job, replaying
 from mirotwin.shell.debug_files import with_debug_files
+from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.rerun import rerun
-from mirotwin.verify.checks.interface import Check, Expectation, Failure
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.interface import Expectation, Failure
 
 
 class Reproduction(msgspec.Struct, frozen=True):
@@ -41,23 +42,20 @@ class Reproduction(msgspec.Struct, frozen=True):
     counts: Counts
 
 
-def reproduce(
-    world: World,
-    until_tick: int | None,
-    expected: Mapping[RobotId, Sequence[Check]] | None = None,
-    progress: Callable[[int], object] = lambda tick: None,
-) -> Reproduction:
-    """Runs `world` as `rerun` does, and on to the end of that control period. Raises TransmissionError as that does."""
+def reproduce(job: Job, until_tick: int | None, quiet: bool) -> Reproduction:
+    """Runs it to `until_tick` (None: to its end), and on to the end of that control period. Raises BadInput."""
+    with plain_parameters(job.file, "replayed"):
+        world = job.world_of()
     log = LinkLog(world)
     counters, activity = Counters(), Activity()
     cpu = world.networks[0].robots[0].board.cpu
     attach(cpu, counters, activity)
-    try:
-        again = rerun(world, until_tick, expected, progress)
-    finally:
+    total = until_tick or job.scenario.end_tick
+    with ProgressBar("running it again", total, quiet) as bar, replaying(job.file, world):
+        again = rerun(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
         detach(cpu, counters, activity)
-    if not world.stopped and world.in_period:
-        world.run_to(world.period_end)
+        if not world.stopped and world.in_period:
+            world.run_to(world.period_end)
     image = with_debug_files(world.image)
     place = world.networks[0].index, world.networks[0].robots[0].slot
     return Reproduction(
