@@ -200,18 +200,18 @@ def replay(options: ReplayOptions) -> int:
         show(debug_line(file, options.firmware, found[0].tick))
     code = (faults or failed) if decides else (differs or faults or failed)
     if compare.as_json:
-        compared = {
+        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256}
+        document = {
+            "file": file,
+            "seed": job.seed,
+            "firmware": firmwares,
             "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
             **compare.rule_as_json(),
-        }
-        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256}
-        document = {"file": file, "seed": job.seed, "firmware": firmwares, **compared}
-        result = {
             **differences_as_json(found, options.everything),
             "instruction": None if apart is None else apart.as_json(),
             "exit_code": code,
         }
-        print_json({**document, **result})
+        print_json(document)
     return code
 
 

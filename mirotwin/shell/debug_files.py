@@ -47,7 +47,12 @@ def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
 
     Raises BadInput for a folder that is not there.
     """
-    return Sources([*map(Path, checked_sources(given)), image.path.parent, *_own_sources(image)])
+    folders, own = [*map(Path, checked_sources(given)), image.path.parent], source_folder()
+    if (
+        own is not None and load_firmware(named=False).sha256 == image.sha256
+    ):  # another's files may have the same names
+        folders.append(own)
+    return Sources(folders)
 
 
 def checked_sources(given: Sequence[str]) -> Sequence[str]:
@@ -77,9 +82,3 @@ def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]
     """
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
     return known, source_folders(known, sources)
-
-
-def _own_sources(image: Image) -> list[Path]:
-    """The folder of the robot's firmware if the image is that one: another's files may have the same names."""
-    folder = source_folder()
-    return [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]

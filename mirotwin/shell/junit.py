@@ -1,4 +1,4 @@
-"""JUnit XML: what continuous integration shows of tests, as pytest writes it."""
+"""JUnit XML: what continuous integration shows of tests, as pytest writes it. XML has no control characters."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, st
         one = ElementTree.SubElement(
             within,
             "testcase",
-            classname=_clean(case.classname),
-            name=_clean(case.name),
+            classname=one_line(case.classname),
+            name=one_line(case.name),
             **_time(case.time_s),
         )
         _properties(one, case.properties)
         if case.verdict != "passed":
-            message = _clean(case.lines[0]) if case.lines else case.verdict
+            message = one_line(case.lines[0]) if case.lines else case.verdict
             said = ElementTree.SubElement(one, case.verdict, message=message)
-            said.text = "\n".join(map(_clean, case.lines))
+            said.text = "\n".join(map(one_line, case.lines))
         elif case.lines:
-            ElementTree.SubElement(one, "system-out").text = "\n".join(map(_clean, case.lines))
+            ElementTree.SubElement(one, "system-out").text = "\n".join(map(one_line, case.lines))
     ElementTree.indent(top)
     content: bytes = ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)
     return content + b"\n"
@@ -71,9 +71,4 @@ def _properties(within: ElementTree.Element, properties: Mapping[str, str]) -> N
     if properties:
         listed = ElementTree.SubElement(within, "properties")
         for name, value in properties.items():
-            ElementTree.SubElement(listed, "property", name=name, value=_clean(value))
-
-
-def _clean(text: str) -> str:
-    """XML has no control characters."""
-    return one_line(text)
+            ElementTree.SubElement(listed, "property", name=name, value=one_line(value))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from miro_sim.periods import Period, RobotId, RobotPeriod
+from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
@@ -83,7 +83,9 @@ class Derived:
         yield Said(TRAILS, tick, SceneUpdate((), tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
-            yield Said(f"{PREFIX}net{place[0]}/robot{place[1]}/error", tick, _error(robot, tick))
+            found = error_of(robot.truth, robot.reference, tick)
+            error = found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch
+            yield Said(f"{PREFIX}{frames.robot_frame(*place)}/error", tick, ErrorMessage(tick, *error))
             for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
                 yield Said(LOG, tick, line)
         for action in period.actions:
@@ -116,11 +118,6 @@ class Derived:
 
 def _networks(period: Period) -> list[int]:
     return sorted({robot.network for robot in period.robots})
-
-
-def _error(robot: RobotPeriod, tick: int) -> ErrorMessage:
-    found = error_of(robot.truth, robot.reference, tick)
-    return ErrorMessage(tick, found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch)
 
 
 PREFIX = "/foxglove/"

@@ -54,11 +54,10 @@ def coverage_rows(image: Image, counts: Counts, sources: Sources) -> CoverageRow
     else:
         found = by_line(image, debug, counts)
         files = []
-        for name in sorted(found, key=_base):
+        for name in sorted(found, key=lambda name: PurePath(name).name):
             path = sources.path(name)
-            files.append(
-                _file(_base(name), [] if path is None else read_text(path).splitlines(), found[name])
-            )
+            lines = [] if path is None else read_text(path).splitlines()
+            files.append(_file(PurePath(name).name, lines, found[name]))
     return CoverageRows(files, line_share(found), branch_share(found), instructions, not debug.lines)
 
 
@@ -70,7 +69,3 @@ def _file(name: str, lines: list[str], record: FileRecord) -> SourceFile:
         rows = [(number, count, "") for number, count in sorted(record.lines.items())]
     one = {name: record}
     return SourceFile(name, line_share(one), branch_share(one), rows)
-
-
-def _base(name: str) -> str:
-    return PurePath(name).name

@@ -70,8 +70,8 @@ class PageTrack(RobotTrack):
         self.w_rad_s.append(robot.w_rad_s)
         self.told_v_m_s.append(NAN if control is None else control.v_m_s)
         self.told_w_rad_s.append(NAN if control is None else control.w_rad_s)
-        self.wheels["left"].add(robot.left, None if control is None else control.left)
-        self.wheels["right"].add(robot.right, None if control is None else control.right)
+        for side in SIDES:
+            self.wheels[side].add(getattr(robot, side), None if control is None else getattr(control, side))
 
 
 class PageTracks(msgspec.Struct, frozen=True):
