@@ -59,8 +59,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     record_frames: Annotated[
-        bool,
-        Option(help="Put every frame into the recording; `camera track` and Foxglove read them."),
+        bool, Option(help="Put every frame into the recording; `camera track` and Foxglove read them.")
     ] = False
     save_at: Annotated[
         tuple[Time, ...],
@@ -70,10 +69,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
         ),
     ] = ()
     to_time: Annotated[Time | None, TO.saying("End the run there.")] = None
-    resume: Annotated[
-        str | None,
-        RESUME,
-    ] = None
+    resume: Annotated[str | None, RESUME] = None
     force: Annotated[bool, FORCE.saying("Replace the files of an earlier run in the folders.")] = False
     no_figure: Annotated[bool, Option(help="Do not draw figure.svg.")] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no table.")] = False

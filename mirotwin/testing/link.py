@@ -173,12 +173,7 @@ class Link(FrameSender):
         return self._until(taken, Heard(network=self.network), within, what, judged=False)
 
     def _until(
-        self,
-        taken: Callable[[], T | None],
-        condition: Condition,
-        within: int,
-        what: str,
-        judged: bool = True,
+        self, taken: Callable[[], T | None], condition: Condition, within: int, what: str, judged: bool = True
     ) -> T:
         """What `taken` gives now, or after an event of this condition. Raises WaitFailed when the time is over."""
         begun_tick, left = self.world.tick, within

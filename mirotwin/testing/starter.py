@@ -164,8 +164,7 @@ class InitOptions(Options, frozen=True, kw_only=True):
     COMMAND = "init"
     folder: Annotated[Path, Argument("FOLDER", PATH)]
     without_firmware: Annotated[
-        bool,
-        Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours."),
+        bool, Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours.")
     ] = False
 
 

@@ -24,8 +24,7 @@ class CaseOptions(Options, frozen=True, kw_only=True):
     ] = None
     expected: Expected = ()
     check: Annotated[
-        str | None,
-        CHECK.saying("FILE.py:FUNCTION, for a case of a bare processor whose check is in a file."),
+        str | None, CHECK.saying("FILE.py:FUNCTION, for a case of a bare processor whose check is in a file.")
     ] = None
 
 
