@@ -47,9 +47,7 @@ class CalibrateOptions(Options, frozen=True, kw_only=True):
     points: Annotated[
         Path | None,
         Option(
-            type=PATH,
-            help="CSV file: x_cm, y_cm, height_cm, u_px, v_px of each point.",
-            apart="scenario",
+            type=PATH, help="CSV file: x_cm, y_cm, height_cm, u_px, v_px of each point.", apart="scenario"
         ),
     ] = None
     scenario: Annotated[

@@ -55,8 +55,7 @@ class ShowOptions(Options, frozen=True, kw_only=True):
     tolerance: Annotated[
         float,
         Option(
-            type=FiniteNumber(0.0, 1000.0),
-            help="Per cent by which a mean may be worse than the baseline's.",
+            type=FiniteNumber(0.0, 1000.0), help="Per cent by which a mean may be worse than the baseline's."
         ),
     ] = 0.0
     as_json: Annotated[bool, JSON] = False

@@ -176,8 +176,7 @@ class PageOptions(Options, frozen=True, kw_only=True):
     COMMAND = "campaign page"
     results: Annotated[str, Argument("RESULTS", NAME)]
     out: Annotated[
-        Path | None,
-        OUT.saying("The page to write. Default: report.html, which replaces an earlier page."),
+        Path | None, OUT.saying("The page to write. Default: report.html, which replaces an earlier page.")
     ] = None
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET.saying("No last line.")] = False

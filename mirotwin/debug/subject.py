@@ -42,8 +42,7 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     resume: Annotated[str | None, RESUME.saying("Scenario: begin with a saved world of it.")] = None
     check: Annotated[
-        str | None,
-        CHECK.saying("Case of a bare processor: FILE.py:FUNCTION, where its check is in a file."),
+        str | None, CHECK.saying("Case of a bare processor: FILE.py:FUNCTION, where its check is in a file.")
     ] = None
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()

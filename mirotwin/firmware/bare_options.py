@@ -60,8 +60,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     max_cycles: Annotated[
-        int | None,
-        Option(type=Whole(1), metavar="N", help="Stop after N machine cycles, with exit code 42."),
+        int | None, Option(type=Whole(1), metavar="N", help="Stop after N machine cycles, with exit code 42.")
     ] = None
     stdin: Annotated[
         tuple[str, ...],
@@ -80,8 +79,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
         ),
     ] = ()
     stdin_by_line: Annotated[
-        bool,
-        Option(help="Send one line of --stdin each time the program has sent TEXT."),
+        bool, Option(help="Send one line of --stdin each time the program has sent TEXT.")
     ] = False
     stdin_after: Annotated[
         Time | None,
@@ -101,8 +99,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     go_on: Annotated[
-        bool,
-        Option(help="Continue after firmware faults; list them at the end, with exit code 3."),
+        bool, Option(help="Continue after firmware faults; list them at the end, with exit code 3.")
     ] = False
     start: Annotated[
         str | None,

@@ -10,9 +10,7 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.shell.command import Option
 
 SYMBOL = Option(
-    "--symbol",
-    metavar="SYMBOL|ADDRESS",
-    help="Only the function at this symbol or address; may be repeated.",
+    "--symbol", metavar="SYMBOL|ADDRESS", help="Only the function at this symbol or address; may be repeated."
 )
 
 

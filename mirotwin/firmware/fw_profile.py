@@ -115,8 +115,7 @@ def _percent(part: int, whole: int) -> str:
 class CoverageOptions(WindowOptions, frozen=True, kw_only=True):
     COMMAND = "fw coverage"
     out: Annotated[
-        Path | None,
-        OUT.saying("Write an lcov tracefile (genhtml, CI services).", metavar="FILE.info"),
+        Path | None, OUT.saying("Write an lcov tracefile (genhtml, CI services).", metavar="FILE.info")
     ] = None
     append: Annotated[bool, Option(help="Add the counts to the file at --out.", apart="force")] = False
     force: Annotated[bool, FORCE.saying("Replace the file at --out, and its listing.")] = False

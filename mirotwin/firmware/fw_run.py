@@ -119,16 +119,11 @@ class FwRunOptions(Options, frozen=True, kw_only=True):
     more: Annotated[tuple[str, ...], Argument("[MORE.ihx]...", NAME, several=True)] = ()
     bare: BareOptions = BareOptions()
     terminal: Annotated[
-        bool,
-        Option(help="Connect the terminal to the serial port, in real time; Ctrl-] ends the run."),
+        bool, Option(help="Connect the terminal to the serial port, in real time; Ctrl-] ends the run.")
     ] = False
     dump: Annotated[
         Path | None,
-        Option(
-            type=PATH,
-            metavar="FILE.json",
-            help="Write registers and memories to this file at the end.",
-        ),
+        Option(type=PATH, metavar="FILE.json", help="Write registers and memories to this file at the end."),
     ] = None
     engine: Engine = None
 

@@ -95,8 +95,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = None
     force: Annotated[bool, FORCE.saying("Replace an earlier campaign in --out.")] = False
     minimise_s: Annotated[
-        float,
-        Option("--minimise", type=wall_time(LONGEST_S), help="Longest time for making a crash small."),
+        float, Option("--minimise", type=wall_time(LONGEST_S), help="Longest time for making a crash small.")
     ] = MINIMISE_S
     sources: SourceFolders = ()
     engine: EngineOption = None
@@ -109,8 +108,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
         int | None, CRYSTAL.saying("Its crystal. Default 24000000.", heading=BARE, needs="bare")
     ] = None
     baud: Annotated[
-        int | None,
-        BAUD.saying("Rate on RXD. Default: what the firmware sets.", heading=BARE, needs="bare"),
+        int | None, BAUD.saying("Rate on RXD. Default: what the firmware sets.", heading=BARE, needs="bare")
     ] = None
     boot_ms: Annotated[
         int | None,
@@ -190,11 +188,7 @@ def fuzz(options: FuzzOptions) -> int:
 
 
 def _campaign(
-    spec: TargetSpec,
-    image: Image,
-    options: FuzzOptions,
-    check: NamedCheck | None,
-    expected: dict[str, Any],
+    spec: TargetSpec, image: Image, options: FuzzOptions, check: NamedCheck | None, expected: dict[str, Any]
 ) -> int:
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)

@@ -72,11 +72,7 @@ IMAGE_SCHEMA: dict[str, Any] = {
             "description": "Timestamp of image",
         },
         "frame_id": {"type": "string", "description": "Frame of reference for the image"},
-        "data": {
-            "type": "string",
-            "contentEncoding": "base64",
-            "description": "Compressed image data",
-        },
+        "data": {"type": "string", "contentEncoding": "base64", "description": "Compressed image data"},
         "format": {"type": "string", "description": "Image format"},
         "tick": {**_WHOLE, "description": "Of the middle of the exposure"},
     },

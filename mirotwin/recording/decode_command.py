@@ -26,9 +26,7 @@ DIRECTIONS = {"down": DOWN, "up": UP}
 
 
 FORMAT = Option(
-    "--format",
-    type=click.Choice(FORMATS),
-    help="Format of FILE. Default: recognized by its first bytes.",
+    "--format", type=click.Choice(FORMATS), help="Format of FILE. Default: recognized by its first bytes."
 )
 ROBOTS = Option(
     "--robots",

@@ -90,10 +90,7 @@ class Recorder:
     """
 
     def __init__(
-        self,
-        stream: BinaryIO,
-        source: RunSource,
-        undisturbed: AbstractContextManager[object] | None = None,
+        self, stream: BinaryIO, source: RunSource, undisturbed: AbstractContextManager[object] | None = None
     ) -> None:
         self._undisturbed = undisturbed or nullcontext()
         self._schemas: dict[bytes, int] = {}

@@ -92,8 +92,7 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     compare: CompareOptions = CompareOptions()
     desk: DeskOptions = DeskOptions()
     out: Annotated[
-        Path | None,
-        OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=AT_PORT),
+        Path | None, OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=AT_PORT)
     ] = None
     force: Annotated[bool, FORCE.saying("Replace a recording in the folder.", heading=AT_PORT)] = False
     engine: Engine = None

@@ -38,8 +38,7 @@ class ReportOptions(Options, frozen=True, kw_only=True):
     COMMAND = "report"
     subject: Annotated[str, Argument("RUN|CASE|TEST-FAILURE", NAME)]
     out: Annotated[
-        Path | None,
-        OUT.saying("The page to write. Default: report.html, which replaces an earlier page."),
+        Path | None, OUT.saying("The page to write. Default: report.html, which replaces an earlier page.")
     ] = None
     from_time: Annotated[Time | None, FROM] = None
     to_time: Annotated[Time | None, TO.saying("End there. Default: the end of the run.")] = None

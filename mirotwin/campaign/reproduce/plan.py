@@ -71,10 +71,7 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 }
 """Of each controller; with the scenario's gains where there are none."""
 CONTROLLERS = tuple(SETTINGS)
-CAMERAS = {
-    "white noise": "camera={kind = 'gaussian'}",
-    "pixels, exact": "camera.calibration=exact",
-}
+CAMERAS = {"white noise": "camera={kind = 'gaussian'}", "pixels, exact": "camera.calibration=exact"}
 """Other cameras than that of the scenarios, which is `1997`; for Figs. 6 to 8."""
 DISTURBANCES = {
     "integration of second order": ("host.integration=adams_bashforth",),

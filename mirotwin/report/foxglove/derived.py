@@ -15,13 +15,7 @@ from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.track import error_of
 from mirotwin.report.foxglove import frames, notes, pitch, robots
-from mirotwin.report.foxglove.messages import (
-    FrameTransforms,
-    SceneEntity,
-    SceneUpdate,
-    Timestamp,
-    time_of,
-)
+from mirotwin.report.foxglove.messages import FrameTransforms, SceneEntity, SceneUpdate, Timestamp, time_of
 from mirotwin.report.foxglove.shapes import Point
 
 AGAIN = 30
