@@ -40,6 +40,11 @@ class Recording(msgspec.Struct, frozen=True):
     periods: tuple[Period, ...]
     broken_off: str = ""
 
+    @property
+    def digest(self) -> str:
+        """Digest of the whole run, or the empty string if not even one period is in it."""
+        return self.periods[-1].digest if self.periods else ""
+
 
 def read(path: str | Path) -> Recording:
     """Reads a recording, as far as it goes. Raises RecordingError for any other content, OSError as `open` does."""

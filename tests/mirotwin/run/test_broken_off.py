@@ -93,7 +93,7 @@ def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
     assert recording.broken_off
     summary = json.loads((tmp_path / "summary.part.json").read_bytes())
     assert summary["complete"] is False
-    assert summary["digest"] == recording.periods[-1].digest
+    assert summary["digest"] == recording.digest
     assert "complete" not in json.loads(before["summary.json"])
 
 
