@@ -104,7 +104,7 @@ SECTIONS = {
         "reproduce": Lazy(
             "campaign.reproduce.reproduce_command",
             "Runs the paper's figures again and writes one page about them.",
-        ),
+        )
     },
     "Camera, firmware, installation": {
         "camera": camera,
@@ -114,11 +114,7 @@ SECTIONS = {
 }
 
 
-@click.group(
-    cls=MainGroup,
-    sections=SECTIONS,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+@click.group(cls=MainGroup, sections=SECTIONS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="mirotwin", prog_name="mirotwin", help="Show the version.")
 def main() -> None:
     """A bit-exact twin of a vision-guided soccer robot.

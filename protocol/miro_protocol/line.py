@@ -41,11 +41,7 @@ def edges_of(bits: Sequence[int], start_tick: int, bit_ticks: int = HOST_BIT_TIC
 class LineReceiver:
     """A UART's receiver. Fed the edges of a line, in order, it gives the characters that are over."""
 
-    STATE = {
-        "edges": Rows(1 << 20, TICK, FLAG, ordered=True),
-        "level": FLAG,
-        "looking_from": TICK,
-    }
+    STATE = {"edges": Rows(1 << 20, TICK, FLAG, ordered=True), "level": FLAG, "looking_from": TICK}
     NOT_STATE = ("bit_ticks",)
 
     def __init__(self, bit_ticks: int = ROBOT_BIT_TICKS) -> None:

@@ -9,11 +9,7 @@ from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES, AnyEstimator, AnyReference, Controller
 
-REGISTRIES: dict[type, Registry[Any]] = {
-    AnyReference: REFERENCES,
-    AnyEstimator: ESTIMATORS,
-    Controller: LAWS,
-}
+REGISTRIES: dict[type, Registry[Any]] = {AnyReference: REFERENCES, AnyEstimator: ESTIMATORS, Controller: LAWS}
 """By the type that a field of the scenario has."""
 
 
