@@ -19,12 +19,12 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.rig import Rig
-from mirotwin.testing.waiting import WaitFailed, at
+from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import case_lines, clear, leave, report_line
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.cases.rerun import case_of_expect
-from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.interface import Failure, at
 from mirotwin.verify.rig_options import rig_options
 
 OWN = ("miro_", "mirotwin")

@@ -17,6 +17,7 @@ from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.happens import expect_of
+from mirotwin.verify.checks.interface import at
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -80,11 +81,6 @@ def why_ended(world: World) -> str:
     return f"the limit of virtual time was reached, duration_s = {world.scenario.duration_s:g}"
 
 
-def at(tick: int) -> str:
-    """A tick for people."""
-    return f"tick {tick} ({tick / 24_000:.3f} ms)"
-
-
 def in_words(events: Sequence[Event]) -> list[str]:
     """One line each; the characters of a frame are the frame, others that follow each other on one wire are one."""
     keyed: list[tuple[object, Event]] = [
@@ -146,7 +142,7 @@ def _place(event: Event) -> tuple[str, int, int]:
 
 
 def _line(run: Sequence[Event]) -> str:
-    first, at = run[0], "tick"
+    first, when = run[0], "tick"
     _, where, said = f"{first}".split(": ", 2)
     if first.frame is not None:
         said = _frame_text(first)
@@ -154,8 +150,8 @@ def _line(run: Sequence[Event]) -> str:
         said += f": {_sent_text(first)}"
     elif len(run) > 1:
         values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
-        said, at = f"{first.what} {values}", "from tick"
-    return f"{first.tick / 24_000:10.3f} ms {where}: {said} ({at} {first.tick})"
+        said, when = f"{first.what} {values}", "from tick"
+    return f"{first.tick / 24_000:10.3f} ms {where}: {said} ({when} {first.tick})"
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:

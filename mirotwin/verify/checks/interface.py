@@ -58,8 +58,7 @@ class Failure(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         place = f"{self.check}: net{self.network}/robot{self.slot}"
-        when = f"tick {self.tick} ({self.tick / TICKS_PER_MS:.3f} ms)"
-        return f"{place}: {when}: wanted {self.wanted}, found {self.found}"
+        return f"{place}: {at(self.tick)}: wanted {self.wanted}, found {self.found}"
 
 
 class Subject(msgspec.Struct, frozen=True):
@@ -171,6 +170,11 @@ def ms_ticks(time_ms: float) -> int:
 def in_ms(duration_ticks: int) -> str:
     """A duration for people."""
     return f"{duration_ticks / TICKS_PER_MS:.3f} ms"
+
+
+def at(tick: int) -> str:
+    """A tick for people."""
+    return f"tick {tick} ({in_ms(tick)})"
 
 
 class FirstFailure(msgspec.Struct, frozen=True):

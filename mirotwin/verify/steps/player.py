@@ -26,7 +26,7 @@ from miro_sim.world.conditions import Answer, Condition, Reached, WheelSpeeds, W
 from miro_sim.world.events import Event
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
-from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
+from mirotwin.verify.checks.interface import Check, at, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.frame_sender import FrameSender
 from mirotwin.verify.steps.keys import Step
@@ -97,7 +97,7 @@ class StepFailure(msgspec.Struct, frozen=True):
     timed_out: bool = False
 
     def __str__(self) -> str:
-        return f"{self.step}: tick {self.tick} ({in_ms(self.tick)}): wanted {self.wanted}, found {self.found}"
+        return f"{self.step}: {at(self.tick)}: wanted {self.wanted}, found {self.found}"
 
 
 class _Failed(Exception):
