@@ -10,9 +10,11 @@ stays up through its own routine counts from that routine's end.
 
 from __future__ import annotations
 
+import msgspec
+
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import LENGTH
+from miro_robot.mcs51.opcodes import INTERRUPTS, LENGTH
 
 _SPACE = 0x10000
 
@@ -55,12 +57,25 @@ _CALL_CYCLES = 2  # of the hardware's LCALL
 _DEPTH = 8
 
 
+class InterruptProfile(msgspec.Struct):
+    """Latency and duration in machine cycles; ticks of 24 MHz at which the worst ones began.
+
+    `total_cycles`: from the call of the routine to the end of its RETI, routines that came in between included.
+    """
+
+    source: str
+    count: int = 0
+    worst_latency: int = 0
+    worst_latency_tick: int = 0
+    worst_duration: int = 0
+    worst_duration_tick: int = 0
+    total_cycles: int = 0
+
+
 class Activity(Watcher):
     """Cycles asleep, stack and the six interrupts of one CPU, from when it is attached.
 
-    `cycles`: how long it was watched, `asleep_cycles` of them in idle mode or power-down.
-    By source number: `count`, `worst_latency` and `worst_duration` in machine cycles with the tick at which each began,
-    `total_cycles` from the call of the routine to the end of its RETI, routines that came in between included.
+    `cycles`: how long it was watched, `asleep_cycles` of them in idle mode or power-down. `interrupts`: by number.
     """
 
     def __init__(self) -> None:
@@ -68,12 +83,7 @@ class Activity(Watcher):
         self.asleep_cycles = 0
         self.highest_sp = 0
         self.highest_sp_tick = 0
-        self.count = [0] * 6
-        self.worst_latency = [0] * 6
-        self.latency_tick = [0] * 6
-        self.worst_duration = [0] * 6
-        self.duration_tick = [0] * 6
-        self.total_cycles = [0] * 6
+        self.interrupts = [InterruptProfile(name) for name in INTERRUPTS]
         self.ended = [0] * 6  # cycle at which the source's routine was last over
         self.began = [0] * 8  # of the routines in service, outermost first
         self.serving = [0] * 8
@@ -94,14 +104,15 @@ class Activity(Watcher):
         if cpu.sp > self.highest_sp:
             self.highest_sp = cpu.sp
             self.highest_sp_tick = 12 * cpu.cycles
-        self.count[source] += 1
+        profile = self.interrupts[source]
+        profile.count += 1
         asked = cpu.peripherals.interrupts.since[source]
         if asked < self.ended[source]:
             asked = self.ended[source] - 1
         latency = start + _CALL_CYCLES - asked - 1
-        if latency > self.worst_latency[source]:
-            self.worst_latency[source] = latency
-            self.latency_tick[source] = 12 * asked
+        if latency > profile.worst_latency:
+            profile.worst_latency = latency
+            profile.worst_latency_tick = 12 * asked
         if self.depth < _DEPTH:
             self.began[self.depth] = start
             self.serving[self.depth] = source
@@ -112,24 +123,14 @@ class Activity(Watcher):
         source = self.serving[self.depth]
         duration = cycle - self.began[self.depth]
         self.ended[source] = cycle
-        self.total_cycles[source] += duration
-        if duration > self.worst_duration[source]:
-            self.worst_duration[source] = duration
-            self.duration_tick[source] = 12 * self.began[self.depth]
+        profile = self.interrupts[source]
+        profile.total_cycles += duration
+        if duration > profile.worst_duration:
+            profile.worst_duration = duration
+            profile.worst_duration_tick = 12 * self.began[self.depth]
 
     def slept(self, cpu: Cpu, start: int, end: int) -> None:
         self.asleep_cycles += end - start
 
     def ran(self, cpu: Cpu, start: int) -> None:
         self.cycles += cpu.cycles - start
-
-    def of_source(self, source: int) -> tuple[int, int, int, int, int, int]:
-        """Count, worst latency and its tick, worst duration and its tick, total cycles."""
-        return (
-            self.count[source],
-            self.worst_latency[source],
-            self.latency_tick[source],
-            self.worst_duration[source],
-            self.duration_tick[source],
-            self.total_cycles[source],
-        )

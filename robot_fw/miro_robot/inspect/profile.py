@@ -5,10 +5,9 @@ from __future__ import annotations
 import msgspec
 
 from miro_robot.image import Image
-from miro_robot.inspect.counters import Activity, Counters
+from miro_robot.inspect.counters import Activity, Counters, InterruptProfile
 from miro_robot.inspect.stack_depth import StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_robot.mcs51.opcodes import INTERRUPTS
 
 
 class FunctionProfile(msgspec.Struct, frozen=True):
@@ -19,18 +18,6 @@ class FunctionProfile(msgspec.Struct, frozen=True):
     calls: int
     instructions: int
     cycles: int
-
-
-class InterruptProfile(msgspec.Struct, frozen=True):
-    """Latency, duration and total in machine cycles; ticks of 24 MHz at which the worst ones began."""
-
-    source: str
-    count: int
-    worst_latency: int
-    worst_latency_tick: int
-    worst_duration: int
-    worst_duration_tick: int
-    total_cycles: int
 
 
 class StackProfile(msgspec.Struct, frozen=True):
@@ -80,9 +67,7 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
         asleep_cycles=activity.asleep_cycles,
         instructions=sum(function.instructions for function in functions),
         functions=sorted(functions, key=lambda function: (-function.cycles, function.address)),
-        interrupts=[
-            InterruptProfile(name, *activity.of_source(source)) for source, name in enumerate(INTERRUPTS)
-        ],
+        interrupts=activity.interrupts,
         stack=StackProfile(
             first=first_address or None,
             last=last,
