@@ -24,7 +24,7 @@ cdef class Stream:
     cdef void load(self, u64_t block) noexcept
     @cython.locals(four='unsigned int[16]', at='long long', lane=int)
     cdef void blocks(self, u64_t first, int count, unsigned int *words) noexcept
-    @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, lane=int, _=int, k0='unsigned int', k1='unsigned int', p0=u64_t, p1=u64_t)
+    @cython.locals(m0=u64_t, m1=u64_t, mask=u64_t, lane=int, _=int, k0='unsigned int', k1='unsigned int')
     cdef void _four_blocks(self, u64_t first, unsigned int *four) noexcept
     cdef void _load_draws(self, long long group) noexcept
     cpdef u64_t u32(self, long long index) except? 1

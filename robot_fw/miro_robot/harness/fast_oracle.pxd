@@ -40,6 +40,6 @@ cdef class FastOracle(LiveOracle):
     cdef bint _stops_already(self) except -1
     cdef bint _read_pair(self) noexcept
     cdef int _word(self, int place) noexcept
-    @cython.locals(moved=bint, driven=bint)
+    @cython.locals(driven=bint)
     cdef int _command(self, long long tick, int code, bytes data) except -1
     cdef int _sent(self, long long tick, int value) except -1

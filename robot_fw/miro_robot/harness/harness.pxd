@@ -4,7 +4,6 @@ from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
-from miro_robot.mcs51.line cimport Line
 
 cdef long long _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD, RESET_TICKS, _LOOK, _WAIT
 cdef int _DONE, _STOPPED, _AWAKE, _BURST, _BAD_STOP, _RESET

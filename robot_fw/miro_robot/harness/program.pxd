@@ -39,8 +39,7 @@ cdef class Program:
     cdef int _frame_operation(self, int kind) except -1
     cdef void _payload_from_input(self) noexcept
     cdef void _own_velocities(self) noexcept
-    @cython.locals(frame='unsigned char *', register='unsigned int')
+    @cython.locals(register='unsigned int')
     cdef int _seal(self, int hdr) except -1
-    @cython.locals(value=int)
     cdef int _foreign(self) except -1
     cdef int _send(self, bytes frame) except -1

@@ -1,5 +1,4 @@
 from miro_robot.inspect.watcher cimport Watcher
-from miro_robot.mcs51.cpu cimport Cpu
 
 cdef int _SPACE
 
@@ -19,12 +18,7 @@ cdef class Activity(Watcher):
     cdef readonly long long cycles, asleep_cycles
     cdef readonly int highest_sp
     cdef readonly long long highest_sp_tick
-    cdef long long count[6]
-    cdef long long worst_latency[6]
-    cdef long long latency_tick[6]
-    cdef long long worst_duration[6]
-    cdef long long duration_tick[6]
-    cdef long long total_cycles[6]
+    cdef readonly list interrupts
     cdef long long ended[6]
     cdef long long began[8]
     cdef int serving[8]

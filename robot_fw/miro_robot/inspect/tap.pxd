@@ -2,7 +2,6 @@ cimport cython
 
 from miro_robot.board cimport Board
 from miro_robot.inspect.watcher cimport Watcher
-from miro_robot.lm629.chip cimport Lm629
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line
 from miro_robot.probe cimport Probe

@@ -34,8 +34,7 @@ cdef class Executor:
     @cython.locals(line='unsigned int')
     cdef unsigned int line_at(self, int address) noexcept
     cpdef int run(self, long long until_cycle) except -1
-    @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
-                   pc='long long', line='unsigned long long', row=int, at='long long', address=int, value=int)
+    @cython.locals(now='long long', pc='long long', line='unsigned long long', row=int, value=int)
     cpdef int go_on(self, long long until_cycle) except -1
 
     @cython.final

@@ -15,7 +15,6 @@ cdef class Line:
     cpdef int append(self, long long tick, int level) except -1
     cdef int _change_last(self, long long tick, int level) except -1
     cdef int _make_room(self) except -1
-    @cython.locals(old='long long[::1]')
     cdef int _resize(self, long long size) except -1
     cpdef int level_at(self, long long tick) noexcept
     cpdef long long next_edge(self, long long tick) noexcept
