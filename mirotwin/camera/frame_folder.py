@@ -14,27 +14,22 @@ from pathlib import Path
 from mirotwin.camera.view import View
 from mirotwin.shell.outputs import FULL, OutputError, entries, not_empty, part_name, reason_of
 
+OPTION = "--frames"
 _OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
 
 
-def frame_name(network: int | None, frame: int) -> str:
-    """Of a file; `network` None: there is only one."""
-    return f"{'' if network is None else f'net{network}-'}frame-{frame:06d}.png"
-
-
 class FrameFolder:
-    """`path` for the frames of one run; `option` is the one it was given with.
+    """`path` for the frames of one run.
 
     Checks at once. Raises OutputError for what is no folder, one with content (unless `force`), and a full disk.
     `fill` makes it, removes frames of an earlier run, and saves those of views from then on.
     """
 
-    def __init__(self, path: Path, option: str, force: bool = False) -> None:
+    def __init__(self, path: Path, force: bool = False) -> None:
         self.path = path
-        self.option = option
-        present = entries(path, option)
+        present = entries(path, OPTION)
         if present and not force:
-            remedy = f"choose another with {option}, or replace frame-*.png in it with --force"
+            remedy = f"choose another with {OPTION}, or replace frame-*.png in it with --force"
             raise not_empty(path, present, remedy)
 
     def __repr__(self) -> str:
@@ -45,8 +40,8 @@ class FrameFolder:
         self._open()
 
         def save(view: View) -> None:
-            name = frame_name(view.network if len(views) > 1 else None, view.frame)
-            self._add(name, view.png(plain=True), undisturbed)
+            network = f"net{view.network}-" if len(views) > 1 else ""
+            self._add(f"{network}frame-{view.frame:06d}.png", view.png(plain=True), undisturbed)
 
         for view in views:
             view.shows.append(save)
@@ -55,11 +50,11 @@ class FrameFolder:
         """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            for name in entries(self.path, self.option):
+            for name in entries(self.path, OPTION):
                 if _OURS.fullmatch(name):
                     (self.path / name).unlink()
         except OSError as error:
-            remedy = f"choose another folder with {self.option}"
+            remedy = f"choose another folder with {OPTION}"
             raise OutputError(self.path, reason_of(error), remedy) from None
 
     def _add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
@@ -71,7 +66,7 @@ class FrameFolder:
                 os.replace(part, self.path / name)
             except OSError as error:
                 room = "make room, or " if error.errno in FULL else ""
-                remedy = f"{room}choose another folder with {self.option}"
+                remedy = f"{room}choose another folder with {OPTION}"
                 raise OutputError(self.path, reason_of(error), remedy) from None
             finally:
                 part.unlink(missing_ok=True)

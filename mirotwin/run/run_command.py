@@ -87,7 +87,7 @@ def run(options: RunOptions) -> int:
     if options.frames is not None:
         from mirotwin.camera.frame_folder import FrameFolder
 
-        saved = FrameFolder(options.frames, "--frames", options.force)
+        saved = FrameFolder(options.frames, options.force)
     with plain_parameters(text.origin), held_signals() as hold, folder:
         if saved is not None:
             saved.fill(views, hold)
