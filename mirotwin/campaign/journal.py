@@ -21,6 +21,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.plan import Head
 from mirotwin.campaign.worker import RunOutcome
+from mirotwin.shell.outputs import locked_elsewhere
 
 SYNC_S = 1.0
 _LINE_BYTES = 1 << 20
@@ -47,7 +48,9 @@ class Journal:
         check_regular(path)
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
-            self._lock()
+            if locked_elsewhere(self._stream.fileno()):
+                remedy = "wait, or choose another file with --out"
+                raise BadInput(path, "", "another process is writing to it", remedy)
             if begin_anew:
                 self._stream.truncate(0)
             self._take_up()
@@ -104,19 +107,6 @@ class Journal:
             if not self.done[outcome.run]:
                 self._count(outcome.run)
         self._stream.truncate(whole)
-
-    def _lock(self) -> None:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return
-        try:
-            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            what = "another process is writing to it"
-            raise BadInput(self.path, "", what, "wait, or choose another file with --out") from None
-        except OSError:  # a disk without locks
-            return
 
 
 def read_head(path: Path) -> tuple[Head | None, int]:

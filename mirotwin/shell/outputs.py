@@ -123,27 +123,31 @@ class OutputFolder:
                 self.part(name).unlink(missing_ok=True)
 
 
-def _lock(path: Path) -> int | None:
-    """Locks a folder against other processes; it is free again when the descriptor is closed or the process is gone.
+def locked_elsewhere(descriptor: int) -> bool:
+    """Locks a file or folder until it is closed or this process is gone; True where another process has it.
 
-    None where there are no such locks (Windows, some network disks). Raises OutputError if another process has it.
+    Where there are no such locks (Windows, some network disks), nobody has.
     """
     try:
         import fcntl
-    except ImportError:
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except (ImportError, OSError):
+        return False
+    return False
+
+
+def _lock(path: Path) -> int | None:
+    """Locks a folder; None where folders cannot be opened. Raises OutputError if another process has it."""
+    if os.name == "nt":
         return None
     folder = os.open(path, os.O_RDONLY)
-    try:
-        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    if locked_elsewhere(folder):
         os.close(folder)
-        what = "another process is writing into the folder"
-        raise OutputError(
-            path, what, "wait until it has finished, or choose another folder with --out"
-        ) from None
-    except OSError:
-        os.close(folder)
-        return None
+        remedy = "wait until it has finished, or choose another folder with --out"
+        raise OutputError(path, "another process is writing into the folder", remedy)
     return folder
 
 
