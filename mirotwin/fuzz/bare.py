@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -25,13 +25,11 @@ from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image
+from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target, TargetFailure, described
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, Exchange, NamedCheck, check_named
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
-
-if TYPE_CHECKING:
-    from mirotwin.fuzz.spec import TargetSpec
 
 OPTION = "--protocol"
 PROTOCOLS: Registry[Protocol] = Registry(

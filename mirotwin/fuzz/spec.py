@@ -17,7 +17,7 @@ from miro_exact.bad_input import BadInput
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
-MAKERS = {"miro": "mirotwin.fuzz.spec:miro_target", "bare": "mirotwin.fuzz.bare:bare_target"}
+MAKERS = {"miro": "mirotwin.fuzz.target:robot_target", "bare": "mirotwin.fuzz.bare:bare_target"}
 """Board -> "module:function"; the function takes the specification and returns its target."""
 
 MAP_SIZE = 8192
@@ -57,7 +57,13 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
         """The target, on the engine that the specification names. Raises BadInput for what cannot be had."""
         if self.engine:
             engine.select(self.engine)
-        return cast("Target", _function(self.maker or MAKERS[self.board])(self))
+        place = self.maker or MAKERS[self.board]
+        module, _, name = place.partition(":")
+        try:
+            make = getattr(import_module(module), name)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise BadInput("target", "maker", f"{place}: {error}", "write it as module:function") from None
+        return cast("Target", make(self))
 
 
 def spec_of(text: str) -> TargetSpec:
@@ -67,19 +73,3 @@ def spec_of(text: str) -> TargetSpec:
     except msgspec.DecodeError as error:  # a ValidationError is one too
         remedy = f"give JSON with {', '.join(TargetSpec.__struct_fields__)}"
         raise BadInput("target", "", f"{error}", remedy) from None
-
-
-def miro_target(spec: TargetSpec) -> Target:
-    """The MIRO's board with the firmware of the specification."""
-    from mirotwin.fuzz.target import RobotTarget
-    from mirotwin.shell.firmware_image import load_firmware
-
-    return RobotTarget(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
-
-
-def _function(place: str) -> Any:
-    module, _, name = place.partition(":")
-    try:
-        return getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise BadInput("target", "maker", f"{place}: {error}", "write it as module:function") from None

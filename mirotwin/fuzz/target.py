@@ -21,8 +21,8 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.inputs import seeds
-from mirotwin.fuzz.spec import MAP_SIZE
-from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
+from mirotwin.fuzz.spec import MAP_SIZE, TargetSpec
+from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, load_firmware, not_up
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS
 
 NEVER_SLEEPS_CODE = len(NAMES)
@@ -184,6 +184,11 @@ class RobotTarget(Target):
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"
+
+
+def robot_target(spec: TargetSpec) -> RobotTarget:
+    """The target of a specification. Raises BadInput."""
+    return RobotTarget(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
 
 
 def _booted(image: Image, slot: int, robots: int) -> Board:
