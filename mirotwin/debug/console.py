@@ -107,12 +107,12 @@ class Console(Cmd):
         verb = word if word in VERBS else next((name for name in VERBS if name.startswith(word)), "")
         if not verb:
             raise BadInput("", word, "is no command", f"there are {', '.join(VERBS)}")
-        if verb in MOVES and rest:
-            raise BadInput("", rest, f"is more than {verb} takes", "repeat it by an empty line")
-        if verb in MOVES:
-            self.say(self.debugger.move(verb))
-        else:
+        if verb not in MOVES:
             getattr(self, f"_{verb}")(rest.strip())
+        elif rest:
+            raise BadInput("", rest, f"is more than {verb} takes", "repeat it by an empty line")
+        else:
+            self.say(self.debugger.move(verb))
         return verb
 
     # Moving
@@ -153,9 +153,9 @@ class Console(Cmd):
             what = "is a condition of a robot's world"
             raise BadInput("", name, what, "stop the bare processor by breakpoints")
         fields = kind.__struct_fields__
-        given: dict[str, Any] = {"network": robot.network} | (
-            {"slot": robot.slot} if "slot" in fields else {}
-        )
+        given: dict[str, Any] = {"network": robot.network}
+        if "slot" in fields:
+            given["slot"] = robot.slot
         for key, _, value in (word.partition("=") for word in keys):
             given[key] = int(value, 16) if _HEX.fullmatch(value) else value
         try:
