@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from miro_exact.clock import CYCLE_TICKS, seconds
+from miro_exact.clock import CYCLE_TICKS
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation
 from mirotwin.replay.lockstep import WorldPair
@@ -45,10 +45,6 @@ class VariableDifference(Record, frozen=True):
     one: int | str
     other: int | str
     writers: tuple[CodeLocation | None, CodeLocation | None] = (None, None)
-
-    def __str__(self) -> str:
-        at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
-        return f"{at}: net{self.network}/robot{self.slot}: {self.name}: {self.one}, {self.other}"
 
 
 class Builds:

@@ -20,7 +20,7 @@ from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin.recording.compare import differences
-from mirotwin.recording.difference import DIGEST, Difference
+from mirotwin.recording.difference import DIGEST, Difference, shown
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import RunSource
 from mirotwin.recording.writer import MAGIC
@@ -71,7 +71,7 @@ def source_differences(one: Made, other: Made) -> Iterator[SourceDifference]:
             yield from _first_byte(one.image, other.image)
     keys, others = (dict(_flat("", msgspec.to_builtins(made.scenario))) for made in (one, other))
     for key in {**keys, **others}:
-        here, there = (_shown(found.get(key)) for found in (keys, others))
+        here, there = (shown(found.get(key)) for found in (keys, others))
         if here != there:
             yield SourceDifference(key, here, there)
     if one.source.state and other.source.state and one.source.state != other.source.state:
@@ -99,10 +99,6 @@ def _flat(path: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from _flat(f"{path}.{index}", inner)
     else:
         yield path, value
-
-
-def _shown(value: Any) -> str:
-    return "nothing" if value is None else str(value)
 
 
 Both = tuple[Made, Made]

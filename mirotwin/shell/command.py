@@ -185,15 +185,9 @@ class _Field(NamedTuple):
 
     def parameter(self) -> click.Parameter:
         declared = self.declared
-        given: dict[str, Any] = {"required": self.required}
-        if (
-            not self.required
-            and self.default is not None
-            and self.default != ()
-            and self.default is not False
-        ):
-            given["default"] = self.default
         assert declared is not None
+        bare = self.required or self.default is None or self.default is False or self.default == ()
+        given: dict[str, Any] = {"required": self.required, **({} if bare else {"default": self.default})}
         if isinstance(declared, Argument):
             nargs = -1 if declared.several else 1
             return click.Argument(
@@ -209,7 +203,7 @@ class _Field(NamedTuple):
             type=declared.type,
             metavar=declared.metavar,
             multiple=self.default == (),
-            show_default=given.get("default", "") != "",
+            show_default=not bare and self.default != "",
             **({"is_flag": True} if self.default is False else {}),
             **given,
         )

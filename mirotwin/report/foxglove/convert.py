@@ -25,9 +25,9 @@ from mirotwin.recording.container import Cut, RecordingError, Records
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.writer import McapWriter
-from mirotwin.report.foxglove import derived, messages, notes
+from mirotwin.report.foxglove import derived, messages
 from mirotwin.report.foxglove.derived import Derived, Said
-from mirotwin.report.foxglove.frames import camera_frame
+from mirotwin.report.foxglove.frames import camera_frame, robot_frame
 
 PREFIX = "foxglove."
 
@@ -125,7 +125,8 @@ class Conversion:
             self._take_image(topic, record)
         elif topic.channel == FAULT and topic.slot >= 0:
             fault = self._faults.decode(record.data)
-            line = notes.of_fault(topic.network, topic.slot, fault.tick, fault.text)
+            at, robot = messages.time_of(fault.tick), robot_frame(topic.network, topic.slot)
+            line = messages.Log(at, messages.ERROR, f"firmware fault: {fault.text}", robot)
             self._add(Said(derived.LOG, fault.tick, line))
         elif topic.channel == PERIOD and (period := next(self._coming, None)):
             for said in self.derive.period(period):

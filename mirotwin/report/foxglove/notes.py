@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from miro_protocol.actions import Action, RadioState, Reset
 from miro_sim.periods import RobotPeriod
 from mirotwin.report.foxglove.frames import robot_frame
-from mirotwin.report.foxglove.messages import ERROR, INFO, WARNING, Log, time_of
+from mirotwin.report.foxglove.messages import INFO, WARNING, Log, time_of
 
 COUNTER = 1 << 16
 """The firmware's counters start over here."""
@@ -57,11 +57,6 @@ def _more(before: int | None, now: int | None) -> int:
     if before is None or now is None or (now < before and before < COUNTER // 2):
         return 0
     return (now - before) % COUNTER
-
-
-def of_fault(network: int, slot: int, tick: int, text: str) -> Log:
-    """What the firmware did that it must not do."""
-    return Log(time_of(tick), ERROR, f"firmware fault: {text}", robot_frame(network, slot))
 
 
 def of_action(action: Action) -> Log:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import base64
 import math
-import sys
-from array import array
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import tomli_w
 
 from miro_exact.bad_input import amount
@@ -69,9 +68,9 @@ def run_page(material: Material) -> bytes:
     delay_frames = getattr(scenario.camera, "delay_frames", 0)
     tracks = tracks_of(material.periods, steered, delay_frames)
     add_samples(tracks, material.extras.samples)
-    marks = _within(again.marks, tracks)
+    marks = [mark for mark in again.marks if tracks.shows(mark.start_tick)]
     ticks = [*(one.tick for one in again.failures), *(fault.tick for _, _, fault in again.faults)]
-    figures = figures_of(tracks, marks, [tick for tick in ticks if _shows(tracks, tick)])
+    figures = figures_of(tracks, marks, list(filter(tracks.shows, ticks)))
     kinds = {mark.kind for mark in marks}
     values = {
         "about": material,
@@ -86,7 +85,7 @@ def run_page(material: Material) -> bytes:
         "pitch": pitch_of(tracks),
         "again": again,
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
-        "lanes": [(lane, _counts(marks, lane)) for lane in lanes_of(marks)],
+        "lanes": [(lane, Counter(one.kind for one in marks if one.lane == lane)) for lane in lanes_of(marks)],
         "interrupts": [one for one in again.profile.interrupts if one.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),
         "channels": first_per_channel(material.differences),
@@ -142,11 +141,8 @@ def _verdict(material: Material) -> tuple[str, str]:
     again, steps = material.again, material.steps
     verdicts = [*again.verdicts, *(steps.expectations if steps else ())]
     failed = [one for one in verdicts if one.verdict == "failed"]
-    of = (
-        f"{len(failed)} of {amount(len(verdicts), 'check')} failed"
-        if failed
-        else amount(len(verdicts), "check")
-    )
+    count = amount(len(verdicts), "check")
+    of = f"{len(failed)} of {count} failed" if failed else count
     if again.faults:
         return "fault", of
     if material.verdict:
@@ -174,18 +170,6 @@ def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]
             facts.append((rms_name(robot.errors), rms, f"of {robot.name}, position and heading"))
             facts.append(("settling", settling_text(robot.errors), "within 3 cm and 0.15 rad"))
     return facts
-
-
-def _within(marks: Sequence[LinkMark], tracks: PageTracks) -> list[LinkMark]:
-    return [mark for mark in marks if _shows(tracks, mark.start_tick)]
-
-
-def _shows(tracks: PageTracks, tick: int) -> bool:
-    return bool(tracks.ticks) and tracks.ticks[0] <= tick < tracks.ticks[-1] + CONTROL_PERIOD_TICKS
-
-
-def _counts(marks: Sequence[LinkMark], lane: str) -> list[tuple[str, int]]:
-    return list(Counter(mark.kind for mark in marks if mark.lane == lane).items())
 
 
 def _data(
@@ -232,7 +216,4 @@ def _packed(postures: Postures) -> list[str]:
 
 def _base64(numbers: Column) -> str:
     """Little-endian."""
-    ordered = array("d", numbers)
-    if sys.byteorder == "big":
-        ordered.byteswap()
-    return base64.b64encode(ordered.tobytes()).decode()
+    return base64.b64encode(np.asarray(numbers, "<f8").tobytes()).decode()

@@ -81,6 +81,9 @@ class PageTracks(msgspec.Struct, frozen=True):
     ticks: list[int]
     robots: list[PageTrack]
 
+    def shows(self, tick: int) -> bool:
+        return bool(self.ticks) and self.ticks[0] <= tick < self.ticks[-1] + CONTROL_PERIOD_TICKS
+
     @property
     def times_s(self) -> list[float]:
         return [tick / TICKS_PER_SECOND for tick in self.ticks]
@@ -101,10 +104,8 @@ def tracks_of(periods: Sequence[Period], steered: Sequence[bool], delay_frames: 
 
 def add_samples(tracks: PageTracks, samples: Sequence[tuple[RobotId, SampleMessage]]) -> None:
     """Puts the LM629 samples of a full recording to their robots, as far as the tracks go."""
-    if not tracks.ticks:
-        return
     robots = {robot.id: robot for robot in tracks.robots}
     for id, sample in samples:
-        if id in robots and tracks.ticks[0] <= sample.tick < tracks.ticks[-1] + CONTROL_PERIOD_TICKS:
+        if id in robots and tracks.shows(sample.tick):
             for side, fine in robots[id].fine.items():
                 fine.append(sample.tick, getattr(sample, f"{side}_desired_velocity") * _VELOCITY_SCALE)
