@@ -14,6 +14,7 @@ import pytest
 from intelhex import IntelHex
 
 from miro_robot.firmware import image_path
+from mirotwin.report.foxglove.pitch import CIRCLE_M
 from mirotwin.report.page import bokeh_page, document
 from mirotwin.report.page.axes import at_least
 from mirotwin.report.page.plots import LEAST_M_S, LEAST_RAD_S, figures_of
@@ -72,6 +73,13 @@ def test_a_page_forbids_the_browser_every_request(fig6_page):
     assert policy.startswith("default-src 'none';")
     assert "http" not in policy
     assert "unsafe-eval" not in policy
+
+
+def test_the_pitch_has_the_circle_that_foxglove_has(fig6_page):
+    assert (
+        re.search(r'<circle cx="55.0" cy="35.0" r="([0-9.]+)"', fig6_page.read_text())[1]
+        == f"{100 * CIRCLE_M:g}"
+    )
 
 
 def test_the_header_says_what_ran_and_its_verdict(markup, fig6):
