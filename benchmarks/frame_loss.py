@@ -98,7 +98,7 @@ def received(robots: int, params: Radio, frames: int, seed: int, eb_n0_db: float
     """How many of so many frames do not come out of the decoder as they were sent; how many come out wrong."""
     line, draws = Line(), Stream(seed, "velocities")
     downlink = Downlink(params, seed, f"decoder{robots}/{eb_n0_db}")
-    uart = Uplink(Radio.ideal(), seed, "uart")
+    uart = Uplink(Radio(bit_error_rate=0.0), seed, "uart")
     downlink.listen(0, line)
     uart.listen(line)
     scanner = Decoder(robots)

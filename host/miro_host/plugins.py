@@ -14,6 +14,8 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
+import msgspec
+
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.raised import raised
 
@@ -27,7 +29,7 @@ class PluginError(BadInput):
         super().__init__("", "", what, remedy)
 
 
-class Registry(Generic[Plugin]):
+class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
     """Plug-ins of one kind.
 
     `group` is the name of the entry points, `word` what a message calls a plug-in, `key` the scenario key that names
@@ -35,25 +37,12 @@ class Registry(Generic[Plugin]):
     `module:class`. `default` is the plug-in of a table that does not say its name, if there is one.
     """
 
-    def __init__(
-        self,
-        group: str,
-        *,
-        word: str,
-        key: str,
-        base: str,
-        own: Mapping[str, str],
-        default: str | None = None,
-    ) -> None:
-        self.group = group
-        self.word = word
-        self.key = key
-        self.base = base
-        self.own = own
-        self.default = default
-
-    def __repr__(self) -> str:
-        return f"Registry({self.group!r}, own={list(self.own)})"
+    group: str
+    word: str
+    key: str
+    base: str
+    own: Mapping[str, str]
+    default: str | None = None
 
     def names(self) -> list[str]:
         """All names that can be used: our own in the order of the table, then the others sorted."""

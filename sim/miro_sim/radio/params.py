@@ -145,11 +145,6 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
         elif self.bit_error_rate is not None:
             raise ValueError("eb_n0_db: sets the same as bit_error_rate; give one of the two")
 
-    @classmethod
-    def ideal(cls) -> "Radio":
-        """A wire: no latency, no errors, mark level while idle."""
-        return cls(bit_error_rate=0.0, keyup_s=0.0, squelch=True)
-
     @property
     def latency_ticks(self) -> int:
         """From the UART pin of the sender to that of the receiver."""

@@ -65,8 +65,11 @@ def _check(robot: RobotSpec, scenario: Scenario, origin: str, path: str) -> None
         raise ScenarioError(origin, f"{path}.{key}", f"the robot starts off the pitch: {what}", remedy)
     check_start(scenario, start, origin, path)
     on_s = 0.0
+    whole_path = []
     for t_s in _instants(reference, duration_s):
-        off = _off_pitch(reference.at(t_s).posture)
+        at = reference.at(t_s)
+        whole_path.append((t_s, at))
+        off = _off_pitch(at.posture)
         if off is not None:
             what = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
             remedy = f"let it stop before, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
@@ -76,9 +79,8 @@ def _check(robot: RobotSpec, scenario: Scenario, origin: str, path: str) -> None
         on_s = t_s
     law = robot.controller
     assert isinstance(law, LawParameters)
-    problem = origin_problem(
-        ((t_s, reference.at(t_s)) for t_s in _instants(reference, duration_s)), law
-    ) or limits_problem(((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s)), law)
+    frames = ((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s))
+    problem = origin_problem(whole_path, law) or limits_problem(frames, law)
     if problem is not None:
         raise ScenarioError(origin, f"{path}.reference", *problem)
 
@@ -112,8 +114,6 @@ def _every(step_s: float, until_s: float) -> Iterator[float]:
 
 def _off_pitch(at: Posture) -> tuple[str, str] | None:
     """(axis, what) for a square that is not on the pitch."""
-    if pitch.holds(at):
-        return None
     reach = pitch.reach_m(at.theta_rad)
     for axis, centre, low, high in (
         ("x", at.x_m, pitch.LEFT_M, pitch.RIGHT_M),

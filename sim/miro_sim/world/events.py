@@ -240,18 +240,11 @@ class Cursor:
 
 
 def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: int, slot: int) -> Event:
-    if kind == event_log.COMMAND:
+    what = _KINDS[kind]
+    if what == "command":
         side, opcode = SIDES[code >> 8], code & 0xFF
-        return Event(
-            tick=tick, what="command", network=network, slot=slot, side=side, opcode=opcode, data=data
-        )
-    if kind == event_log.RECEIVED:
-        good = code == 1
-        return Event(tick=tick, what="received", network=network, slot=slot, value=value, good_stop=good)
-    if kind == event_log.SENT:
-        return Event(tick=tick, what="transmitted", network=network, slot=slot, value=value)
-    if kind == event_log.FAULT:
-        return Event(tick=tick, what="fault", network=network, slot=slot, value=code, address=value)
-    if kind == event_log.TRUE:
-        return Event(tick=tick, what="true", network=network, slot=slot)
-    return Event(tick=tick, what="reached", network=network, slot=slot, value=code, address=value)
+        return Event(tick=tick, what=what, network=network, slot=slot, side=side, opcode=opcode, data=data)
+    if what in ("fault", "reached"):
+        return Event(tick=tick, what=what, network=network, slot=slot, value=code, address=value)
+    good = what != "received" or code == 1
+    return Event(tick=tick, what=what, network=network, slot=slot, value=value, good_stop=good)

@@ -15,7 +15,7 @@ from miro_exact.state import Flat
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import PC, Cursor, Event
-from miro_sim.world.watch import Watch
+from miro_sim.world.watch import Entry, Watch
 
 if TYPE_CHECKING:
     from miro_sim.world.world import Mark, World
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 FIRST_PIECE_TICKS = 24_000
 """1 ms. Pieces double up to the end of the control period: most waits are short, and a piece costs a snapshot."""
 SEEN_AT_MOST = 1000
-Key = tuple[int, int, int, int]
-"""Order of events: (tick, network, slot, serial number in its log)."""
-Entry = tuple[Key, Event]
 
 
 class WaitExpired(TimeoutError):
@@ -110,7 +107,7 @@ class Waits:
                 found = self._consume(watch, world.tick, seen)
                 piece *= 2
             self._close_period()
-            self.backlog += watch.rest()
+            self.backlog += watch.edges(beyond=True)
         return found
 
     def _run_piece(self, watch: Watch, until_tick: int) -> None:

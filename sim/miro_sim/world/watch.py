@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _EDGES, _TRUE = 1 << 40, 1 << 41
 """Serial numbers of events that are in no log begin here."""
+Entry = tuple[tuple[int, int, int, int], Event]
+"""An event and what it is sorted by: (tick, network, slot, serial number in its log)."""
 _PLACE = {name: place for place, name in enumerate(PLACES)}
 
 
@@ -74,18 +76,15 @@ class Watch:
         for (network, slot), names in pins.items():
             self.pins[network, slot] = PinWatch(self.world.robot(network, slot).board, frozenset(names))
 
-    def edges(self) -> list[tuple[tuple[int, int, int, int], Event]]:
-        """The edges up to where the world is that were not taken yet."""
-        return self._taken(lambda pins: self.world.tick)
+    def edges(self, beyond: bool = False) -> list[Entry]:
+        """The edges up to where the world is that were not taken yet.
 
-    def rest(self) -> list[tuple[tuple[int, int, int, int], Event]]:
-        """Those behind that the CPU has made already, in the instruction with which it went past that tick."""
-        return self._taken(lambda pins: pins.board.cpu.cycles * CYCLE_TICKS)
-
-    def _taken(self, known_tick: Callable[[PinWatch], int]) -> list[tuple[tuple[int, int, int, int], Event]]:
+        `beyond`: also those that the CPU has made already, in the instruction with which it went past that tick.
+        """
         found = []
         for (network, slot), pins in self.pins.items():
-            for tick, pin, level in pins.take(known_tick(pins)):
+            known_tick = pins.board.cpu.cycles * CYCLE_TICKS if beyond else self.world.tick
+            for tick, pin, level in pins.take(known_tick):
                 edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
                 found.append(((tick, network, slot, self.next_edge), edge))
                 self.next_edge += 1
@@ -98,7 +97,7 @@ class Watch:
 
     # Predicates
 
-    def true_now(self) -> list[tuple[tuple[int, int, int, int], Event]]:
+    def true_now(self) -> list[Entry]:
         """Predicates that are true before anything moves."""
         tick = self.world.tick
         found = []

@@ -71,7 +71,7 @@ def exercise(seed, radio):
 def echo(params, seed, sent, until):
     """The symbols that come back when a robot's RXD is wired to its TXD."""
     line = Line()
-    down, up = Downlink(params, seed, "down"), Uplink(Radio.ideal(), seed, "up")
+    down, up = Downlink(params, seed, "down"), Uplink(Radio(bit_error_rate=0.0), seed, "up")
     down.listen(0, line)
     up.listen(line)
     for start, data in sent:

@@ -30,11 +30,6 @@ def test_a_rate_that_is_no_probability_is_refused(rate):
         threshold(rate)
 
 
-def test_an_ideal_band_is_a_wire():
-    ideal = Radio.ideal()
-    assert (ideal.latency_ticks, ideal.error_threshold, ideal.keyup_ticks, ideal.squelch) == (0, 0, 0, True)
-
-
 def ber(eb_n0_db, margin=1):
     with mpmath.workprec(120):
         return mpmath.exp(-(mpmath.mpf(10) ** (mpmath.mpf(eb_n0_db) / 10)) * mpmath.mpf(margin) ** 2 / 2) / 2
