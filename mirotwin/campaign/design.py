@@ -8,6 +8,7 @@ A run is computed from its number, so a plan of millions takes no memory.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -34,6 +35,17 @@ def _key(key: str) -> str:
 
 Value = float | int | bool | str
 """What a column of the results can hold."""
+
+
+def kind_of(values: Iterable[Value]) -> type:
+    """The type of a column that holds these values: theirs, else float for numbers, and str for all others."""
+    kinds = {type(value) for value in values}
+    return float if kinds == {int, float} else kinds.pop() if len(kinds) == 1 else str
+
+
+def as_kind(value: Value, kind: type) -> Any:
+    """The value as such a column shows it."""
+    return inline(value) if kind is str and not isinstance(value, str) else kind(value)
 
 
 class Level(msgspec.Struct, frozen=True):

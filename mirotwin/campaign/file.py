@@ -16,7 +16,7 @@ from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_o
 from miro_sim.scenario.base import beside
 from miro_sim.scenario.file import decode
 from miro_sim.scenario.settings import EXPECT, in_text
-from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, inline
+from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, as_kind, inline, kind_of
 from mirotwin.campaign.plan import OWN_IMAGE, Plan, checked
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
 
@@ -181,12 +181,5 @@ def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "")
 
 def _of_one_kind(levels: list[Level]) -> tuple[Level, ...]:
     """Levels whose values share a column: numbers, truth values, or else text."""
-    kinds = {type(level.value) for level in levels}
-    if len(kinds) == 1:
-        return tuple(levels)
-    if kinds == {int, float}:
-        return tuple(msgspec.structs.replace(level, value=float(level.value)) for level in levels)
-    shown = [level.value if isinstance(level.value, str) else inline(level.value) for level in levels]
-    return tuple(
-        msgspec.structs.replace(level, value=value) for level, value in zip(levels, shown, strict=True)
-    )
+    kind = kind_of(level.value for level in levels)
+    return tuple(msgspec.structs.replace(level, value=as_kind(level.value, kind)) for level in levels)

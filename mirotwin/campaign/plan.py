@@ -18,7 +18,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
-from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value
+from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value, as_kind, kind_of
 from mirotwin.campaign.single import prepared
 from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageFile, Work
@@ -117,7 +117,8 @@ class Plan(msgspec.Struct, frozen=True):
         found: dict[str, Value] = {
             factor.name: level.value for factor, level in zip(self.design.factors, point.levels, strict=True)
         }
-        found |= {draw.name: value for draw, value in zip(self.design.draws, point.drawn, strict=True)}
+        for draw, value in zip(self.design.draws, point.drawn, strict=True):
+            found[draw.name] = as_kind(value, kind_of(draw.ends()))
         if self.design.draws:
             found["draw"] = point.draw
         return {**found, "seed": point.seed}

@@ -8,7 +8,7 @@ pyarrow is loaded when a file is written or read; it comes with the extra `campa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from itertools import islice
@@ -20,7 +20,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN, TEXTS
-from mirotwin.campaign.design import Level
+from mirotwin.campaign.design import Level, kind_of
 from mirotwin.campaign.journal import in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Head, Plan
 from mirotwin.campaign.worker import RunOutcome
@@ -205,33 +205,19 @@ def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str
 def _schema(plan: Plan) -> pa.Schema:
     import pyarrow as pa
 
-    types: dict[type, Any] = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
-    columns: list[tuple[str, Any]] = [("run", pa.int64())]
-    for factor in plan.design.factors:
-        columns.append((factor.name, types[type(factor.levels[0].value)]))
-    for draw in plan.design.draws:
-        columns.append((draw.name, types[_kind(draw.ends())]))
-    if plan.design.draws:
-        columns.append(("draw", pa.int64()))
-    columns.append(("seed", pa.int64()))
-    columns += [(name, pa.string()) for name in TEXTS]
-    columns += [(name, types[kind]) for name, kind in FIGURES.items()]
-    columns += [(CHECK + name, pa.string()) for name in plan.checks]
-    return pa.schema(columns)
-
-
-def _kind(values: Iterable[Any]) -> type:
-    kinds = {type(value) for value in values}
-    if kinds == {int, float}:
-        return float
-    return kinds.pop() if len(kinds) == 1 else str
+    design = plan.design
+    kinds: dict[str, type] = {"run": int}
+    kinds |= {factor.name: type(factor.levels[0].value) for factor in design.factors}
+    kinds |= {draw.name: kind_of(draw.ends()) for draw in design.draws}
+    kinds |= {"draw": int} if design.draws else {}
+    kinds |= {"seed": int, **dict.fromkeys(TEXTS, str), **FIGURES}
+    kinds |= {CHECK + name: str for name in plan.checks}
+    types = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
+    return pa.schema([(name, types[kind]) for name, kind in kinds.items()])
 
 
 def _row(plan: Plan, outcome: RunOutcome) -> dict[str, Any]:
     row: dict[str, Any] = {"run": outcome.run, **plan.varied(outcome.run)}
-    for draw in plan.design.draws:
-        if _kind(draw.ends()) is str:
-            row[draw.name] = f"{row[draw.name]}"
     row |= {name: getattr(outcome, name) for name in TEXTS}
     row |= {name: outcome.figures.get(name) for name in FIGURES}
     return row | {CHECK + name: outcome.checks.get(name) for name in plan.checks}
