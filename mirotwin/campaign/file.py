@@ -74,7 +74,7 @@ def load(path: str | Path, settings: Sequence[str] = ()) -> Plan:
 
 
 def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
-    """The same of a text, as if it stood at `path`."""
+    """The campaign of a text, as if it stood at `path`. Raises BadInput as `load` does."""
     return checked(_parsed(text, Path(path)), settings)
 
 
