@@ -118,7 +118,6 @@ class RobotPort:
         self.log = HostLog(0, lambda tick: tick, spec.robots)
         self.robots = ()  # a PC sees none from inside
         self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=self.robots)]
-        self.end_tick = scenario.end_tick
         self.observers: list[Callable[[Period], object]] = []
         self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []
@@ -141,11 +140,10 @@ class RobotPort:
     def __exit__(self, *raised: object) -> None:
         with held_signals():
             self.stop()
-            if self.prompt:
-                realtime_priority(False)
+            realtime_priority(False)
             self._keep(self._decoder.flush(), self._heard_tick)
             self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
-            with suppress(serial.SerialException, OSError):
+            with suppress(OSError):
                 self._serial.close()
 
     # ---- time --------------------------------------------------------------------------------------------
@@ -163,7 +161,7 @@ class RobotPort:
 
     @property
     def finished(self) -> bool:
-        return self.tick >= self.end_tick
+        return self.tick >= self.scenario.end_tick
 
     @property
     def period_end(self) -> int:
@@ -241,7 +239,7 @@ class RobotPort:
         """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
         frames = self.guard.stop_frames()
         for _ in range(REOPENINGS):
-            with suppress(serial.SerialException, OSError, PortError):
+            with suppress(OSError, PortError):
                 if not self._serial.is_open:
                     self._serial = _opened(self.url)
                 self._serial.reset_output_buffer()
@@ -249,7 +247,7 @@ class RobotPort:
                 if not self._virtual:
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
                 return
-            with suppress(serial.SerialException, OSError):
+            with suppress(OSError):
                 self._serial.close()
             time.sleep(LOOK_S)
 
@@ -352,14 +350,15 @@ class RobotPort:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
+        """Errors of the port, which pyserial derives from OSError, as a PortError."""
         try:
             yield
         except serial.SerialTimeoutException:
             what = f"it takes no characters for {BLOCKED_S:g} s"
             raise PortError(self.url, "", what, "look at its flow control, and at who reads it") from None
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             seconds = self._now / TICKS_PER_SECOND
-            with suppress(serial.SerialException, OSError):
+            with suppress(OSError):
                 self._serial.close()
             what, remedy = f"the port is lost: {error}", "robots that hear nothing stop after 110 ms"
             raise PortError(self.url, f"{seconds:.3f} s", what, remedy) from None
@@ -404,7 +403,7 @@ def _opened(url: str) -> Any:
         realtime_priority()  # of the thread that reads there, too
     try:
         return serial.serial_for_url(address, BAUD, timeout=0, **more)
-    except (serial.SerialException, OSError, ValueError) as error:
+    except (OSError, ValueError) as error:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":
             number = errno.EBUSY

@@ -101,11 +101,6 @@ class ImageMessage(msgspec.Struct, frozen=True, gc=False):
     tick: Annotated[int, Meta(ge=0, le=MAX_TICK)]
 
 
-def image_message(network: int, tick: int, png: bytes) -> ImageMessage:
-    """The frame of a network's camera that was exposed at `tick`."""
-    return ImageMessage(time_of(tick), f"net{network}/camera", png, "png", tick)
-
-
 class TheoryMessage(msgspec.Struct, frozen=True, gc=False):
     """`theory`: terms of the paper's theory.
 

@@ -19,7 +19,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels
-from mirotwin.recording.channels import ControlMessage, FaultMessage, TheoryMessage, image_message
+from mirotwin.recording.channels import ControlMessage, FaultMessage, ImageMessage, TheoryMessage
 from mirotwin.recording.rows import Message, Rows
 from mirotwin.recording.writer import McapWriter
 
@@ -180,8 +180,9 @@ class Recorder:
                 self.add("fault", robot.network, robot.slot, FaultMessage(*values))
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
-        """Adds a frame of a network's camera, after all that was added before."""
-        self.add(channels.IMAGE, network, -1, image_message(network, tick, png))
+        """Adds the frame of a network's camera that was exposed at `tick`, after all that was added before."""
+        message = ImageMessage(channels.time_of(tick), f"net{network}/camera", png, "png", tick)
+        self.add(channels.IMAGE, network, -1, message)
 
     def _add_channel(self, topic: str, message: msgspec.Struct) -> int:
         """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""
