@@ -24,9 +24,8 @@ def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
     found = {}
     for package, folder in package_dirs.items():
         root = len(os.fspath(folder))
-        for inner, folders, files in os.walk(
-            folder
-        ):  # quicker than `rglob`: every start of a program waits for it
+        # quicker than `rglob`: every start of a program waits for it
+        for inner, folders, files in os.walk(folder):
             folders[:] = [name for name in folders if name != "__pycache__"]
             within = f"{package}{inner[root:]}".replace(os.sep, ".")
             for stem in (name[:-4] for name in files if name.endswith(".pxd")):

@@ -233,9 +233,8 @@ class Flat:
     def difference(self, one: bytes, other: bytes) -> tuple[str, Any, Any] | None:
         """Path and both values of the first field that differs between two states, None if none does."""
         first, second = self.decode(one), self.decode(other)
-        return next(
-            ((path, first[path], second[path]) for path in first if first[path] != second[path]), None
-        )
+        found = ((path, first[path], second[path]) for path in first if first[path] != second[path])
+        return next(found, None)
 
     def _check(self, data: bytes) -> None:
         at = 0

@@ -99,9 +99,8 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if source not in ("left.hi", "right.hi", "slot.0", "slot.1", "slot.2", "three", "0", "1"):
                 raise WiringError(self.name, "nets", f"{source!r} cannot drive a pin of P{port}")
             if f"P{port}" == self.data:
-                raise WiringError(
-                    self.name, "nets", f"P{port} is the data bus, nothing else can drive its pins"
-                )
+                what = f"P{port} is the data bus, nothing else can drive its pins"
+                raise WiringError(self.name, "nets", what)
         return inputs
 
     def _latch_bank(self, name: str, net: str) -> int:

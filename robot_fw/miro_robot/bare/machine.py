@@ -84,10 +84,9 @@ class BareMachine:
         pins: tuple[PinEvent, ...] = (),
         start: int = 0,
     ) -> None:
-        if not CRYSTAL_RANGE_HZ[0] <= crystal_hz <= CRYSTAL_RANGE_HZ[1]:
-            raise ValueError(
-                f"crystal {crystal_hz} Hz is outside {CRYSTAL_RANGE_HZ[0]}..{CRYSTAL_RANGE_HZ[1]}"
-            )
+        least, most = CRYSTAL_RANGE_HZ
+        if not least <= crystal_hz <= most:
+            raise ValueError(f"crystal {crystal_hz} Hz is outside {least}..{most}")
         self.image = image
         self.output = output
         self.stop_on_fault = stop_on_fault

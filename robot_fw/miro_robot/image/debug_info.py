@@ -62,18 +62,15 @@ class DebugInfo:
         """
         cdb = parse_cdb(read_text(image.path.with_suffix(".cdb")))
         link_map = read_text(image.path.with_suffix(".map"))
-        listed = [
-            found for listing in listings(image.path, link_map) for found in _read_listing(listing, image)
-        ]
+        listed = [row for path in listings(image.path, link_map) for row in _read_listing(path, image)]
         lines = [(address, line) for address, _, line in listed if line is not None]
         tables = [(address, end) for address, end, line in listed if line is None]
         known = {_name(line.file) for _, line in lines}
         lines += [(address, line) for address, line in cdb.lines if _name(line.file) not in known]
         paths = {_name(line.file): line.file for _, line in lines}
         symbols = [symbol.address for symbol in image.symbols.names.values() if symbol.space == "code"]
-        return cls(
-            lines, _cdb_functions(cdb, image.code, paths), [*map_constants(link_map), *tables], symbols
-        )
+        functions = _cdb_functions(cdb, image.code, paths)
+        return cls(lines, functions, [*map_constants(link_map), *tables], symbols)
 
     def line_at(self, address: int) -> SourceLine | None:
         """The source line of the instruction there; None outside C functions."""
@@ -159,11 +156,8 @@ def _name(path: str) -> str:
 def listings(image: Path, link_map: str) -> Iterator[Path]:
     """The relinked listings of the image's modules: beside the image, or where the linker found the modules."""
     for module in dict.fromkeys([*map_modules(link_map), image.stem]):
-        places = (
-            _inside(image.parent, f"{_name(module)}.rst"),
-            _inside(image.parent, f"{module}.rst"),
-            _inside(Path(), f"{module}.rst"),
-        )
+        ways = ((image.parent, _name(module)), (image.parent, module), (Path(), module))
+        places = (_inside(folder, f"{name}.rst") for folder, name in ways)
         found = next((path for path in places if path is not None), None)
         if found is not None:
             yield found

@@ -63,10 +63,8 @@ def _check_start_up(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> 
     target = high << 8 | low
     if opcode not in _JUMPS or target == main.address:
         return None
-    return Contradiction(
-        main.line,
-        f"_main is at {main.address:#06x} here, and the image's start-up code jumps to {target:#06x}",
-    )
+    reason = f"_main is at {main.address:#06x} here, and the image's start-up code jumps to {target:#06x}"
+    return Contradiction(main.line, reason)
 
 
 def _check_places(places: Sequence[CodePlace], loaded: bytes) -> Contradiction | None:
@@ -99,9 +97,9 @@ def _check_functions(places: Sequence[CodePlace], code: bytes, loaded: bytes) ->
         return None
     first = strays[0]
     count = f"{len(strays)} of {len(functions)} functions"
+    where = f"{first.name} ({first.address:#06x})"
     return Contradiction(
-        first.line,
-        f"no function of the image begins where {count} do, the first is {first.name} ({first.address:#06x})",
+        first.line, f"no function of the image begins where {count} do, the first is {where}"
     )
 
 
@@ -139,7 +137,5 @@ def _check_instructions(
     if few_strays and 4 * len(misfits) <= len(records):
         return None
     address, line = records[misfits[0]]
-    return Contradiction(
-        line,
-        f"{len(misfits)} of its {len(records)} instructions are not in the image, the first at {address:#06x}",
-    )
+    count = f"{len(misfits)} of its {len(records)} instructions"
+    return Contradiction(line, f"{count} are not in the image, the first at {address:#06x}")

@@ -178,9 +178,8 @@ def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
 def _record(text: bytes, number: int) -> tuple[int, int, bytes]:
     """One line, taken apart and checked: address, type, data."""
     if text[:1] != b":":
-        raise ImageError(
-            "", number, "is not Intel HEX: a record begins with ':'", "give an .ihx or .hex file"
-        )
+        reason = "is not Intel HEX: a record begins with ':'"
+        raise ImageError("", number, reason, "give an .ihx or .hex file")
     try:
         record = bytes.fromhex(text[1:].decode("ascii"))
     except ValueError:

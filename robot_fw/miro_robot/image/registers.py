@@ -55,10 +55,8 @@ class Blocks(msgspec.Struct, frozen=True, eq=False):
             return set()
         _, level, block = self.places[at]
         found = {block}
-        opened = sorted(
-            {(number, depth) for _, depth, number in self.places[start:] if number < block}, reverse=True
-        )
-        for number, depth in opened:
+        opened = {(number, depth) for _, depth, number in self.places[start:] if number < block}
+        for number, depth in sorted(opened, reverse=True):
             if depth < level:
                 found.add(number)
                 level = depth

@@ -287,10 +287,8 @@ class Symbols:
         start = None if self.problem is not None else self.names.get(STACK)
         if start is None or start.space != "iram":
             return 0, 0xFF
-        above = [
-            one.address for one in self.names.values() if one.space == "iram" and one.address > start.address
-        ]
-        return start.address, min([*above, 0x100]) - 1
+        in_ram = [one.address for one in self.names.values() if one.space == "iram"]
+        return start.address, min([*(at for at in in_ram if at > start.address), 0x100]) - 1
 
     def name_at(self, address: int) -> str:
         """The last code symbol at or before `address`, "" if there is none or there is a `problem`.

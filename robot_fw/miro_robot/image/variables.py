@@ -115,9 +115,8 @@ def variables_of(image: Image) -> Variables:
     found = parse_variables(read_text(image.path.with_suffix(".cdb")))
     if not found.unplaced:
         return found
-    texts = {
-        path.stem: read_text(path) for path in listings(image.path, read_text(image.path.with_suffix(".map")))
-    }
+    link_map = read_text(image.path.with_suffix(".map"))
+    texts = {path.stem: read_text(path) for path in listings(image.path, link_map)}
     by_name = dict(found.by_name)
     for bit in found.unplaced:
         own = [texts[bit.module]] if bit.scope and bit.module in texts else list(texts.values())
@@ -168,11 +167,8 @@ def _named(image: Image, variables: Variables, scope: str, plain: str, as_type: 
         raise BadInput(image.path, plain, "no .cdb beside the image says its type", remedy)
     if symbol is not None and not there:
         raise BadInput(image.path, plain, "is code, no variable", "give a variable's name")
-    names = [
-        name
-        for name, each in variables.by_name.items()
-        if each[0].space not in ("sfr", "bit") or each[0].scope
-    ]
+    known = variables.by_name.items()
+    names = [name for name, each in known if each[0].scope or each[0].space not in ("sfr", "bit")]
     names += [name.removeprefix("_") for name, one in image.symbols.names.items() if one.space == "iram"]
     near = did_you_mean(plain, names) or did_you_mean(plain, variables.by_name)
     remedy = near or "its .map and .cdb list the names"

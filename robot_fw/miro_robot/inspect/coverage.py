@@ -35,10 +35,7 @@ class Share(msgspec.Struct, frozen=True):
 
 
 def counts_of(counters: Counters) -> Counts:
-    return {
-        address: (counters.executed_at(address), counters.jumped_at(address))
-        for address in counters.addresses()
-    }
+    return {at: (counters.executed_at(at), counters.jumped_at(at)) for at in counters.addresses()}
 
 
 def merged(many: Iterable[Counts]) -> Counts:

@@ -62,11 +62,8 @@ def functions(image: Image) -> list[tuple[int, str]]:
         named.setdefault(function.first, function.name)
     instructions = _sweep(image)
     if not named:
-        entries = {
-            target(image.code, address)
-            for address in instructions
-            if is_call(image.code[address]) or address in _VECTORS
-        }
+        leading = [at for at in instructions if is_call(image.code[at]) or at in _VECTORS]
+        entries = {target(image.code, address) for address in leading}
         named = {address: f"{address:04X}h" for address in instructions if address in entries}
     first = min(named, default=len(image.code))
     for vector, source in zip(_VECTORS[1:], INTERRUPTS, strict=True):

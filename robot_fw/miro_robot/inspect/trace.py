@@ -105,11 +105,8 @@ def registers(cpu: Cpu) -> tuple[int, ...]:
 
 
 def _changed(before: tuple[int, ...], after: tuple[int, ...]) -> str:
-    return " ".join(
-        _change(name, old, value)
-        for name, old, value in zip(REGISTERS, before, after, strict=True)
-        if old != value
-    )
+    each = zip(REGISTERS, before, after, strict=True)
+    return " ".join(_change(name, old, value) for name, old, value in each if old != value)
 
 
 def _change(name: str, old: int, value: int) -> str:
