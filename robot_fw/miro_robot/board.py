@@ -327,12 +327,8 @@ class Board(Bus):
         """
         pins = self._pins()
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
-        if (
-            self.strobed
-            or self._strobes(left)
-            or self._strobes(right)
-            or (pins ^ self.reset_pins) & _BOTH_RST
-        ):
+        strobed = self.strobed | self._strobes(left) | self._strobes(right)
+        if strobed or (pins ^ self.reset_pins) & _BOTH_RST:
             return False
         left, right = left >> 3 & 1, right >> 3 & 1
         data = self.bank[self.data_bank]
@@ -423,12 +419,8 @@ class Board(Bus):
             self.right.set_bus(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
         else:
             self.right.port.ps, self.right.port.data = right >> 3 & 1, data
-        self.strobed = (
-            self.left.port.writing
-            | self.left.port.reading
-            | self.right.port.writing
-            | self.right.port.reading
-        )
+        self.strobed = self.left.port.writing | self.left.port.reading
+        self.strobed |= self.right.port.writing | self.right.port.reading
         due = min(self._next_interrupt(self.left), self._next_interrupt(self.right))
         if due < self.horizon:  # a reset has begun to end, or a mask has gone
             self.horizon = due

@@ -124,9 +124,8 @@ class FastOracle(LiveOracle):
         self.decided = 1
 
     def waits(self) -> bool:
-        return self.decided != 0 and (
-            self.answers.asked_tick != NEVER_TICK or self.driving.deadline != NEVER_TICK
-        )
+        due = self.answers.asked_tick != NEVER_TICK or self.driving.deadline != NEVER_TICK
+        return self.decided != 0 and due
 
     def look(self, tick: int) -> None:
         """Judges what has happened before `tick`."""

@@ -213,12 +213,9 @@ class Cpu(Executor):
 
     def set_external(self, port: int, levels: int, tick: int) -> None:
         """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
-        if (
-            self.peripherals.ports.next_cycle == NEVER_TICK
-            and (port == 0 or port == 2)
-            and tick <= 12 * self.cycles + 9
-        ):
-            self.peripherals.ports.outside[port] = levels
+        ports = self.peripherals.ports
+        if ports.next_cycle == NEVER_TICK and not port & 1 and tick <= 12 * self.cycles + 9:
+            ports.outside[port] = levels
         else:
             self.peripherals.push(port, levels, tick)
             self.next_event = 0

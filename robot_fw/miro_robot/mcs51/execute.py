@@ -619,9 +619,7 @@ class Executor:
         if value > self.highest_sp:
             self.highest_sp = value
         if self.stack_floor <= before < end:  # else it has not been set up yet, or was outside already
-            round_the_top = (
-                value < before and value - before + 0x100 < 0x80 and self.rom[self.at] != _MOV_DATA
-            )
+            round_the_top = value < before - 0x80 and self.rom[self.at] != _MOV_DATA
             if round_the_top or value >= end:
                 self.fault(_STACK_OVERFLOW)
             elif value < self.stack_floor:

@@ -56,15 +56,8 @@ class Peripherals:
         "frozen": FLAG,
         "p3_reads": TICK,
     }
-    NOT_STATE = (
-        "bus",
-        "pulsed",
-        "now",
-        "timer_wait",
-        "serial_wait",
-        "quiet",
-        "timer1_free",
-    )  # all but the first follow from the registers
+    NOT_STATE = ("bus", "pulsed", "now", "timer_wait", "serial_wait", "quiet", "timer1_free")
+    """All but the first follow from the registers."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -340,9 +333,8 @@ class Peripherals:
             self.p3_reads += 1
             self.sync(cycle + 1)
             self.settle()
-            levels &= (
-                0xFC | (self.uart.level(tick) & self.shift.data.level_at(tick)) | (self.uart.tx_level << 1)
-            )
+            rxd = self.uart.level(tick) & self.shift.data.level_at(tick)
+            levels &= 0xFC | rxd | (self.uart.tx_level << 1)
         elif port == 1 and self.timer2.drives_pin():
             self.sync(cycle + 1)
             self.settle()
