@@ -119,7 +119,6 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.freshness = Freshness()
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
-        self.air = self.before = self._air()
         self.seen: list[tuple[int, int]] = []
         """Air, and tick of the last reset, at the end of each control period that is not judged, oldest first."""
         self.counted = self.shown = 0
@@ -127,6 +126,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.chip = self.board.left
         self.reset_tick = self.chip.reset_tick
         self.resets: list[int] = []  # of the LM629s, that are not judged yet
+        self.period_over()
+        self.air = self.before = self.seen.pop()[0]
         self._begin()
 
     def _begin(self) -> None:
@@ -135,15 +136,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.turned = False  # a wheel was told to turn since the processor began
         self.words: tuple[int | None, int | None] = (0, 0)
 
-    def _air(self) -> int:
-        """A number that changes when something comes between the transmitter and the robot; -1 while nothing passes."""
-        board, listener = self.board, self.listener
-        if listener is None or not board.powered or board.held or listener.link_state != UP:
-            return -1
-        return listener.bit_errors
-
     def period_over(self) -> None:
-        self.seen.append((self._air(), self.chip.reset_tick))
+        board, listener, air = self.board, self.listener, -1
+        if listener is not None and board.powered and not board.held and listener.link_state == UP:
+            air = listener.bit_errors
+        self.seen.append((air, self.chip.reset_tick))
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick
@@ -168,7 +165,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
 
     def period(self, record: RobotPeriod, tick: int) -> None:
         air, reset_tick = self.seen.pop(0)
-        self._look_at_resets(record, tick, reset_tick)
+        if reset_tick != self.reset_tick:
+            self.resets.append(reset_tick)
+            self.reset_tick = reset_tick
+        if self.resets or not self.turned:
+            self._look_at_resets(record, tick)
         if not self.needed:
             return
         self.before, self.air = self.air, air
@@ -185,13 +186,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
         if due:
             self._judge(record, tick)
 
-    def _look_at_resets(self, record: RobotPeriod, now: int, reset_tick: int) -> None:
+    def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
         """In the order of time. The board may have gone on: what it has done after `now` is kept for later."""
-        if reset_tick != self.reset_tick:
-            self.resets.append(reset_tick)
-            self.reset_tick = reset_tick
-        if self.turned and not self.resets:
-            return
         due = [one for one in self.resets if one <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)

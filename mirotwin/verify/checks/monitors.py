@@ -92,6 +92,7 @@ class Checks:
             for robot in network.robots
         ]
         self._each(_RobotMonitors.begin)
+        self.at_ends = [(one, monitor) for one in self.robots for monitor in one.that_have("period_over")]
         self.finished = False
         self.index = world.index
         self.untold: list[tuple[Period, int]] = []  # and where the world stood at their end
@@ -105,7 +106,11 @@ class Checks:
             )
         self.index += 1
         self.untold.append((period, self.world.tick))
-        self._each(_RobotMonitors.period_over)
+        try:  # without a call that could be saved: after a simulated period the caches hold nothing of this
+            for told in self.at_ends:
+                told[1].period_over()
+        except (Exception, SystemExit) as error:
+            raise told[0].cannot_judge(told[1].check, error) from error
         if len(self.untold) >= self.together:
             self._tell()
 
@@ -128,7 +133,7 @@ class Checks:
             try:
                 tell(watched)
             except (Exception, SystemExit) as error:
-                raise watched.cannot_judge(error) from error
+                raise watched.cannot_judge(watched.check, error) from error
 
     @property
     def monitors(self) -> list[Monitor[Any]]:
@@ -185,9 +190,7 @@ class _RobotMonitors:
             self.monitors.append(monitor)
             for what in monitor.EVENTS:
                 self.of_events.setdefault(what, []).append(monitor)
-        self.of_ends, self.of_periods, self.of_times = map(
-            self._that_have, ("period_over", "period", "until")
-        )
+        self.of_ends, self.of_periods, self.of_times = map(self.that_have, ("period_over", "period", "until"))
         self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
         self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
         if any(what in self.of_events for what in _FROM_RECEIVED):
@@ -195,15 +198,9 @@ class _RobotMonitors:
             self.heard_of_board.add("received")
         self.later = not self.heard_of_board and all(monitor.LATER for monitor in self.monitors)
 
-    def _that_have(self, method: str) -> list[Monitor[Any]]:
+    def that_have(self, method: str) -> list[Monitor[Any]]:
         """The monitors with a method of their own; telling the others would cost time."""
         return [one for one in self.monitors if getattr(type(one), method) is not getattr(Monitor, method)]
-
-    def period_over(self) -> None:
-        """A control period is over."""
-        for monitor in self.of_ends:
-            self.check = monitor.check
-            monitor.period_over()
 
     def look(self, periods: Sequence[tuple[Period, int]]) -> None:
         """Tells the monitors of control periods, each with the first tick after it."""
@@ -269,9 +266,9 @@ class _RobotMonitors:
             self.check = monitor.check
             monitor.end(tick)
 
-    def cannot_judge(self, error: BaseException) -> PluginError:
+    def cannot_judge(self, check: Check, error: BaseException) -> PluginError:
         """What to raise for what a check raised."""
-        named = f"net{self.network.index}/robot{self.robot.slot}: check {self.check.name!r} cannot judge"
+        named = f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
         if isinstance(error, PluginError):
             return PluginError(f"{named}: {error.what}", error.remedy)
         return PluginError(f"{named}: {raised(error)}", "repair the check")
