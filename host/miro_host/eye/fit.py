@@ -86,7 +86,8 @@ def fit(
     Raises EyeError: too few points, points on one line, a point that the camera at the start cannot see, no
     convergence, a result out of the parameters' ranges. Points are numbered from 1.
     """
-    free = _told_by(points)
+    heights = [point.z_m for point in points]
+    free = IN_SPACE if heights and max(heights) - min(heights) >= PLANE_M else IN_PLANE
     _check_points(points, free, start, origin)
     scales = [SCALES.get(name, 1.0) for name in free]
 
@@ -101,11 +102,6 @@ def fit(
             origin, "", f"no convergence: {error}", "begin nearer to the truth, check the points"
         ) from None
     return _calibration(points, found, free, origin)
-
-
-def _told_by(points: Sequence[ControlPoint]) -> tuple[str, ...]:
-    heights = [point.z_m for point in points]
-    return IN_SPACE if heights and max(heights) - min(heights) >= PLANE_M else IN_PLANE
 
 
 def _check_points(

@@ -67,8 +67,6 @@ class Waits:
 
     def collect(self) -> None:
         """Takes over what the logs hold, which is not for ever: for who moves the world without a wait."""
-        if not self.decoders:
-            self._make_decoders()
         self._gather(Watch(self.world, ()))
 
     def pass_over(self) -> None:
@@ -92,8 +90,6 @@ class Waits:
         begun_tick = world.tick
         deadline = NEVER_TICK if within is None else world.tick + within
         seen: list[Event] = []
-        if not self.decoders:
-            self._make_decoders()
         with Watch(world, conditions) as watch:
             self.backlog += watch.true_now()
             self._gather(watch)
@@ -175,6 +171,8 @@ class Waits:
 
     def _gather(self, watch: Watch) -> None:
         """Reads what is new in all logs."""
+        if not self.decoders:
+            self._make_decoders()
         for source, cursor in self.cursors.items():
             for serial, event in cursor.read():
                 if event.what == "reached" and self.reached.get(source) == event.value:

@@ -99,6 +99,7 @@ def test_samples_are_collected_by_colour():
         "yellow": [(200, 40, 140), (201, 41, 141)],
         "blue": [(60, 190, 110)],
     }
+    assert parse_samples("cr,colour,y,cb\n3,a,1,2\n", "s.csv") == {"a": [(1, 2, 3)]}
 
 
 def test_red_green_and_blue_become_luma_and_chroma():
