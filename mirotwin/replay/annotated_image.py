@@ -62,10 +62,9 @@ class AnnotatedImage:
     def place(self, pc: int, tick: int) -> CodeLocation:
         line = self.debug.line_at(pc)
         text = " ".join(disassemble(self.image.code, pc, self.names).split())
-        location = CodeLocation(tick, pc, self.names.place(pc), None, None, text)
-        if line is None:
-            return location
-        return msgspec.structs.replace(location, line=str(line), source=self.sources.text(line) or None)
+        source = None if line is None else self.sources.text(line) or None
+        where = None if line is None else str(line)
+        return CodeLocation(tick, pc, self.names.place(pc), where, source, text)
 
 
 def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:

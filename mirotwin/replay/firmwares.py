@@ -8,10 +8,10 @@ halves has no name there, and counts as changed where it moved.
 
 from __future__ import annotations
 
-import bisect
 import re
 from collections.abc import Callable, Iterator
 from difflib import SequenceMatcher
+from itertools import pairwise
 
 import msgspec
 
@@ -82,12 +82,10 @@ def _pieces(annotated: AnnotatedImage) -> dict[str, tuple[int, int]]:
             first <= symbol.address < end for first, end in annotated.image.used
         ):
             found.setdefault(symbol.address, name)
-    starts = sorted(found)
     pieces = {}
-    for start in starts:
+    for start, following in pairwise([*sorted(found), 1 << 16]):
         end = next(end for first, end in annotated.image.used if first <= start < end)
-        after = bisect.bisect_right(starts, start)
-        pieces[found[start]] = (start, min([end, *starts[after : after + 1]]))
+        pieces[found[start]] = (start, min(end, following))
     return pieces
 
 

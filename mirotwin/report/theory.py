@@ -195,10 +195,9 @@ def theory_text(theory: Theory) -> str:
     """The same in a line for people: what holds is left out, but for condition (17)."""
     parts = []
     third, f = theory.assumption_3, theory.disturbance
-    if theory.assumption_1.broken_s:
-        parts.append(f"assumption 1 broken for {theory.assumption_1.broken_s:.2f} s")
-    if theory.assumption_2.broken_s:
-        parts.append(f"assumption 2 broken for {theory.assumption_2.broken_s:.2f} s")
+    for number, broken in enumerate((theory.assumption_1, theory.assumption_2), 1):
+        if broken.broken_s:
+            parts.append(f"assumption {number} broken for {broken.broken_s:.2f} s")
     if third.frames or third.crossings:
         crossed = f", crossed {third.crossings} x" if third.crossings else ""
         parts.append(f"assumption 3 within 0.1 rad in {amount(third.frames, 'frame')}{crossed}")

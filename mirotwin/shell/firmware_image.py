@@ -39,12 +39,17 @@ def load_firmware(
     """
     file = Path(path) if path else image_path()
     check_regular(file)
-    image = _loaded(
-        file, limit, tuple(map(_stamp, (file, file.with_suffix(".map"), file.with_suffix(".cdb"))))
-    )
+    beside = file.with_suffix(".map"), file.with_suffix(".cdb")
+    image = _loaded(file, limit, tuple(map(_stamp, (file, *beside))))
     if named:
         _ = image.symbols.names
-    return image if stack_from is None else _with_stack(image, stack_from)
+    if stack_from is None:
+        return image
+    known = image.symbols.find(STACK)
+    if known is not None:
+        what = f"the .map beside the image begins its stack at {known.address:#04x}"
+        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
+    return msgspec.structs.replace(image, symbols=image.symbols.with_stack(stack_from))
 
 
 @lru_cache(maxsize=32)
@@ -58,14 +63,6 @@ def _stamp(file: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return status.st_mtime_ns, status.st_size
-
-
-def _with_stack(image: Image, start: int) -> Image:
-    known = image.symbols.find(STACK)
-    if known is not None:
-        what = f"the .map beside the image begins its stack at {known.address:#04x}"
-        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
-    return msgspec.structs.replace(image, symbols=image.symbols.with_stack(start))
 
 
 BOOT_PERIODS = 8

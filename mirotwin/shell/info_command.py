@@ -60,18 +60,14 @@ def info(options: InfoOptions) -> int:
 
 
 def _engine_line(active: str) -> str:
+    """With whether the build gave the CPU's loop the shape that processors predict well."""
     finder = engines.install()
-    compiled = len(finder.compiled())
-    if active == "compiled":
-        return f"compiled ({compiled} modules), {_dispatch()}"
-    return f"python ({compiled} of {len(finder.sources)} modules have a compiled twin)"
-
-
-def _dispatch() -> str:
-    """Whether the build gave the CPU's loop the shape that processors predict well; the bits do not depend on it."""
-    if hot_modules.dispatch_replicated(engines.install().compiled()):
-        return "dispatch replicated"
-    return f"dispatch plain: slower, the same bits; {PLAIN_REMEDY}"
+    compiled = finder.compiled()
+    if active != "compiled":
+        return f"python ({len(compiled)} of {len(finder.sources)} modules have a compiled twin)"
+    replicated = hot_modules.dispatch_replicated(compiled)
+    dispatch = "replicated" if replicated else f"plain: slower, the same bits; {PLAIN_REMEDY}"
+    return f"compiled ({len(compiled)} modules), dispatch {dispatch}"
 
 
 def _broken_modules(active: str) -> list[str]:
