@@ -57,9 +57,7 @@ def moved(one: AnnotatedImage, other: AnnotatedImage) -> Moved:
     same: list[str] = []
     changed: list[str] = []
     places: dict[int, int] = {}
-    for name in here:
-        if name not in there:
-            continue
+    for name in filter(there.__contains__, here):
         first, second = list(_instructions(one, *here[name])), list(_instructions(other, *there[name]))
         differing = list(_differing(first, second))
         (changed if differing else same).append(name)

@@ -136,23 +136,19 @@ class Stepper:
         self.annotated = annotated
 
     def changed(self, until_tick: int) -> InstructionDifference | None:
-        """The first changed instruction that is executed; both worlds stand before it then."""
+        """The first changed instruction that is executed, and what it does in both."""
         one, other = self.pair.one, self.pair.other
         event = first_reached(one, changed_instructions(one.image, other.image), until_tick)
         if event is None:
             return None
         other.run_to(one.tick)
-        robot, twin = one.robot(event.network, event.slot), other.robot(event.network, event.slot)
-        return self._stepped_once(robot, twin, event.address)
-
-    def _stepped_once(self, robot: Robot, twin: Robot, pc: int) -> InstructionDifference:
-        """What the instruction does that both processors execute next."""
+        robot = one.robot(event.network, event.slot)
         tick = robot.board.cpu.cycles * CYCLE_TICKS
         for here, there in self._pieces(tick + 1, tick + 1):
             if here.robot is robot and here.steps and there.steps:
                 return self._difference(here, there, 0, -1)
-        one, other = (image.place(pc, tick) for image in self.annotated)
-        return InstructionDifference(robot.network, robot.slot, one, other, ())
+        place, other_place = (image.place(event.address, tick) for image in self.annotated)
+        return InstructionDifference(robot.network, robot.slot, place, other_place, ())
 
     def effect(self, until_tick: int) -> InstructionDifference | None:
         """The instruction after which the processors are not in the same state again, from now to `until_tick`."""
@@ -170,15 +166,13 @@ class Stepper:
 
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
-        images = self.pair.one.image, self.pair.other.image
-        robots = zip(self.pair.one.robots, self.pair.other.robots, strict=True)
-        pairs = [
-            (InstructionLog(robot, images[0]), InstructionLog(twin, images[1])) for robot, twin in robots
-        ]
+        one, other = self.pair.one, self.pair.other
+        both = zip(one.robots, other.robots, strict=True)
+        pairs = [(InstructionLog(a, one.image), InstructionLog(b, other.image)) for a, b in both]
         try:
             while True:
                 self.pair.run_to(tick)
-                unlike = [(one, other) for one, other in pairs if one.steps != other.steps]
+                unlike = [(here, there) for here, there in pairs if here.steps != there.steps]
                 if unlike or tick >= end_tick or self.pair.over:
                     yield from unlike or pairs
                     return

@@ -49,9 +49,8 @@ def replay_case(job: Job, quiet: bool) -> int:
     """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
     job.expectations_of_case()
     end_tick = job.case.end_tick or None
-    periods = None if end_tick is None else -(-end_tick // CONTROL_PERIOD_TICKS)
-    with ProgressBar("replaying", periods, quiet) as bar:
-        again = rerun_job(job, end_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS))
+    with ProgressBar("replaying", end_tick, quiet) as bar:
+        again = rerun_job(job, end_tick, bar.to)
     return _told(job.verdict_of_case(again.checks), debug_line(job.file, foreign_path(job.runs_on)), quiet)
 
 
@@ -236,9 +235,9 @@ def _rerun(job: Job, periods: int | None, quiet: bool) -> Rerun:
     """The first `periods` of it, as far as the scenario goes."""
     first = job.recorded[0].index if job.recorded else 0
     last = job.scenario.periods if periods is None else min(first + periods, job.scenario.periods)
-    with ProgressBar("replaying", last - first, quiet) as bar:
-        until_tick = last * CONTROL_PERIOD_TICKS
-        return rerun_job(job, until_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS - first))
+    until_tick = last * CONTROL_PERIOD_TICKS
+    with ProgressBar("replaying", until_tick, quiet) as bar:
+        return rerun_job(job, until_tick, bar.to)
 
 
 def _verdict(
