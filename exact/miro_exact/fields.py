@@ -38,6 +38,7 @@ class Kind:
     """
 
     form = ""
+    bounds: Bounds | None = None
     packed: tuple[int, str, int, Callable[[Any], tuple[Any, ...]] | None] | None = None
 
     def read(self, part: Any, name: str) -> Any:
@@ -231,11 +232,7 @@ class Row(Kind):
         if "s" not in self.form:
             self.layout = struct.Struct(f"<{self.form}")
         self.reals = [index for index, kind in enumerate(kinds) if kind[0] == "d"]
-        self.bounded = [
-            (index, *column.bounds)
-            for index, column in enumerate(self.columns)
-            if isinstance(column, Number) and column.bounds is not None
-        ]
+        self.bounded = [(index, *one.bounds) for index, one in enumerate(self.columns) if one.bounds]
 
     def encode(self, value: Any) -> bytes:
         cells = value if self.split is None else self.split(value)
