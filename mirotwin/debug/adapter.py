@@ -35,7 +35,7 @@ CAPABILITIES = (
 _WITHOUT_A_RUN = ("initialize", "launch", "disconnect", "terminate")
 _WHILE_IT_RUNS = (
     "threads", "setBreakpoints", "setFunctionBreakpoints", "setInstructionBreakpoints", "setDataBreakpoints",
-    "dataBreakpointInfo", "disconnect", "terminate",
+    "setExceptionBreakpoints", "dataBreakpointInfo", "disconnect", "terminate",
 )  # fmt: skip
 _MOVES = {
     "continue": "continue", "reverseContinue": "rcontinue", "next": "next", "stepBack": "rnext", "stepIn": "step",
@@ -173,6 +173,9 @@ class Adapter:
     def on_setDataBreakpoints(self, given: Message) -> Message:
         return self._set("data breakpoint", given, lambda one: one["dataId"])
 
+    def on_setExceptionBreakpoints(self, given: Message) -> Message:
+        return {"breakpoints": []}  # some clients send it, though there is none to choose
+
     def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
         """All breakpoints of a kind, which replace those before."""
         self.its.breakpoints[:] = [one for one in self.its.breakpoints if one.kind != kind]
@@ -305,7 +308,9 @@ class Adapter:
         if not frames[-1].known:
             label = {"id": 0, "name": "the stack cannot be told from here on", "presentationHint": "label"}
             found.append({**label, "line": 0, "column": 0})
-        return {"stackFrames": found, "totalFrames": len(found)}
+        first = given.get("startFrame") or 0
+        last = first + (given.get("levels") or len(found))
+        return {"stackFrames": found[first:last], "totalFrames": len(found)}
 
     def _place(self, address: int, key: str) -> Message:
         """The source and the line of an instruction; nothing where none is known."""

@@ -167,6 +167,27 @@ def test_null_stands_for_arguments_that_are_left_out(adapter):
     assert client.until(type="response")["success"]
 
 
+def test_a_client_gets_the_part_of_the_stack_that_it_asks_for(adapter):
+    _, client = adapter
+    client.begin(subject="fig6", at="0.5s")
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "take_body"}])
+    client.ask("continue", threadId=1)
+    client.until(event="stopped")
+    whole = client.ask("stackTrace", threadId=1)["body"]
+    frames = whole["stackFrames"]
+    assert whole["totalFrames"] == len(frames) > 1
+    for start, levels in ((0, 1), (1, 0), (1, 1), (9, 5)):
+        part = client.ask("stackTrace", threadId=1, startFrame=start, levels=levels)["body"]
+        assert part["stackFrames"] == frames[start : start + levels if levels else None]
+        assert part["totalFrames"] == len(frames)
+
+
+def test_a_client_may_say_that_it_breaks_at_no_exception(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    assert client.ask("setExceptionBreakpoints", filters=[])["success"]
+
+
 def test_breakpoints_that_cannot_be_set_say_why(adapter):
     _, client = adapter
     client.begin(subject="fig6", at="0s")
