@@ -124,7 +124,7 @@ class Way:
         at = pair.sighting
         sine, cosine = sincos(at.theta_rad)
         ends = ((at.x_m, at.y_m), (at.x_m + ARROW_M * cosine, at.y_m + ARROW_M * sine))
-        self.arrow = [tracker.lens.pixel(x_m, y_m, tracker.z_m) for x_m, y_m in ends]
+        self.arrow = [tracker.top.lens.pixel(x_m, y_m, tracker.top.z_m) for x_m, y_m in ends]
 
     def _take_events(self, network: Network) -> None:
         """The frame on the air, its characters in the robot, the LM629's commands, the robot's answer."""

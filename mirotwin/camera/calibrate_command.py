@@ -15,10 +15,9 @@ from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
-from miro_host.eye.colours import classes_of
+from miro_host.eye.colours import classes_of, read_samples
 from miro_host.eye.fit import COLUMNS, ControlPoint, fit, parse_points, read_points
 from miro_host.eye.lens import Lens
-from miro_host.eye.sample_file import read_samples
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load

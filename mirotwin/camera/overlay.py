@@ -166,7 +166,7 @@ def _arrow(tracker: Tracker, pair: Pair) -> tuple[Point, Point, Point, Point] | 
 
 
 def _point(tracker: Tracker, x_m: float, y_m: float) -> Point:
-    u, v = tracker.lens.pixel(x_m, y_m, tracker.z_m)
+    u, v = tracker.top.lens.pixel(x_m, y_m, tracker.top.z_m)
     return SCALE * u, SCALE * v
 
 

@@ -134,15 +134,11 @@ def _grid(true: CameraParameters) -> list[tuple[float, float, float, float]]:
     """x, y, u, v: points of the pitch, and where the true camera draws them."""
     lens = Lens(true)
     found = []
-    for column in range(_steps(RIGHT_M - LEFT_M) + 1):
-        for row in range(_steps(TOP_M - BOTTOM_M) + 1):
+    for column in range(round((RIGHT_M - LEFT_M) / GRID_M) + 1):
+        for row in range(round((TOP_M - BOTTOM_M) / GRID_M) + 1):
             x_m, y_m = LEFT_M + column * GRID_M, BOTTOM_M + row * GRID_M
             found.append((x_m, y_m, *lens.pixel(x_m, y_m, ROBOT_HEIGHT_M)))
     return found
-
-
-def _steps(length_m: float) -> int:
-    return math.floor(length_m / GRID_M + 0.5)
 
 
 def _worst_m(grid: list[tuple[float, float, float, float]], calibration: Calibration) -> float:

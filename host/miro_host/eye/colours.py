@@ -1,4 +1,10 @@
-"""Which colours the tracker knows, as the camera shows them: classes, and the table from a pixel to its class.
+"""Which colours the tracker knows, as the camera shows them: samples, classes, and the table from a pixel to its class.
+
+Samples are pixels that somebody reads off his own pictures, in a CSV file:
+
+    colour,r,g,b            or: colour,y,cb,cr
+    yellow,231,209,40
+    floor,34,78,52
 
 The classes' numbers are fixed: 1 is the first of `patterns.COLOURS`, 0 is none. A pixel belongs to the class with the
 nearest hue (direction of its chroma) if its chroma, projected on the class's mean, has at least `least_chroma` of the
@@ -10,17 +16,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
-from miro_host.eye.eye_file import EyeError, text
+from miro_host.eye.eye_file import EyeError, csv_rows, text, text_of
 from miro_host.eye.patterns import COLOURS
 
 CLASS_OF = {name: number for number, name in enumerate(COLOURS, start=1)}
 """Number of a colour's class."""
 FLOOR = "floor"
+RGB = ("colour", "r", "g", "b")
+YCC = ("colour", "y", "cb", "cr")
 
 SIGMAS = 2.5
 """Two hues overlap if their border is nearer to a mean than this many times the spread of its samples."""
@@ -32,6 +41,40 @@ MOST_FLOOR = 0.45
 
 Level = Annotated[float, Meta(ge=0.0, le=255.0)]
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
+Samples = dict[str, list[tuple[int, int, int]]]
+
+
+def read_samples(path: str | Path) -> Samples:
+    """Pixels (Y, Cb, Cr) by colour name. Raises EyeError."""
+    return parse_samples(text_of(path), f"{path}")
+
+
+def parse_samples(text: str, origin: str) -> Samples:
+    """The same from CSV text. Raises EyeError with the line for wrong columns and for what is no level."""
+    found: Samples = {}
+    for line, cells in csv_rows(text, origin, RGB, YCC):
+        name = cells.pop("colour").strip()
+        columns = RGB if "r" in cells else YCC
+        one, two, three = (_level(cells[column], origin, line) for column in columns[1:])
+        pixel = _of_rgb(one, two, three) if columns is RGB else (one, two, three)
+        found.setdefault(name, []).append(pixel)
+    return found
+
+
+def _level(cell: str, origin: str, line: int) -> int:
+    level = cell.strip()
+    if not (level.isascii() and level.isdigit() and len(level) < 4 and int(level) < 256):
+        raise EyeError(origin, line, f"{cell[:20]!r} is no level", "write whole numbers from 0 to 255")
+    return int(level)
+
+
+def _of_rgb(red: int, green: int, blue: int) -> tuple[int, int, int]:
+    """ITU-R BT.601 in full range (JFIF), rounded."""
+    return (
+        (77 * red + 150 * green + 29 * blue + 128) >> 8,
+        min(128 + ((0 - 43 * red - 85 * green + 128 * blue + 128) >> 8), 255),
+        min(128 + ((128 * red - 107 * green - 21 * blue + 128) >> 8), 255),
+    )
 
 
 class ColourMean(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -125,12 +168,8 @@ def classes_of(
 def _mean(pixels: Sequence[tuple[int, int, int]]) -> ColourMean:
     """Means to 1/16 level, from integer sums."""
     count = len(pixels)
-    y, cb, cr, squares = 0, 0, 0, 0
-    for pixel in pixels:
-        y += pixel[0]
-        cb += pixel[1]
-        cr += pixel[2]
-        squares += pixel[1] * pixel[1] + pixel[2] * pixel[2]
+    y, cb, cr = map(sum, zip(*pixels, strict=True))
+    squares = sum(pixel[1] * pixel[1] + pixel[2] * pixel[2] for pixel in pixels)
     variance = (squares * count - cb * cb - cr * cr) / (count * count)
     means = [(32 * total + count) // (2 * count) / 16.0 for total in (y, cb, cr)]
     spread = _sixteenths(math.sqrt(variance)) / 16.0

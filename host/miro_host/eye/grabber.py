@@ -41,7 +41,7 @@ class Grabber:
             *(1 << 10, "?", _NUMBER, _NUMBER, _NUMBER, _TICK, _NUMBER),
             split=_split,
             make=lambda cells: Sighting(*cells[1:]) if cells[0] else None,
-        ),
+        )
     }
     NOT_STATE = ("robots", "delay_frames")
 

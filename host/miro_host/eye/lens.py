@@ -89,7 +89,4 @@ class Lens:
         if 1.0 + 3.0 * square < 0.1:  # further out it would be drawn further in
             raise ValueError(f"the point ({x_m:.3f}, {y_m:.3f}, {z_m:.3f}) m lies beyond what the lens draws")
         scale = 1.0 + square
-        return (
-            self.centre_u + self.focal_u * right * scale,
-            self.centre_v - self.focal_v * up * scale,
-        )
+        return self.centre_u + self.focal_u * right * scale, self.centre_v - self.focal_v * up * scale

@@ -18,7 +18,8 @@ cdef class Patches:
     cdef double y_m[170]
     cdef double expect_x[4]
     cdef double expect_y[4]
-    cdef readonly int out_pairs, out_team, out_identity, out_contested, out_team_area, out_identity_area
+    cdef readonly int out_pairs, out_team, out_identity
+    cdef readonly bint out_contested
     cdef readonly double out_off_m, out_next_m, out_gap_m
 
     cpdef int look(self, bytearray pixels, int left, int top, int width, int height) except -1

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-from miro_host.eye.lens import Lens
 from miro_host.eye.regions import Regions
+from miro_host.eye.top import Top
 
 _MOST = 170  # patches of a window: 4096 pixels, at least 24 each
 _TEAMS = 2  # classes 1 and 2 are the teams', 3 to 7 the identities'
@@ -26,27 +26,16 @@ class Patches:
 
     `out_pairs`: pairs at the pattern's distance. `out_team`, `out_identity`: regions of the nearest. `out_off_m`: its
     distance from what is expected, `out_next_m`: that of the second. `out_contested`: see above. `out_gap_m`: distance
-    of its two patches; `out_team_area`, `out_identity_area`: their areas in px.
+    of its two patches.
     """
 
     NOT_STATE = ("*",)
 
-    def __init__(
-        self,
-        lens: Lens,
-        regions: Regions,
-        z_m: float,
-        distances_m: tuple[float, float],
-        areas: tuple[int, int],
-    ) -> None:
-        """Patches lie `z_m` above the floor; least and most of a pair's distance in m and of a patch's area in px."""
-        self.lens = lens
+    def __init__(self, regions: Regions, top: Top) -> None:
+        self.lens, self.z_m = top.lens, top.z_m
         self.regions = regions
-        self.z_m = z_m
-        self.least_m = distances_m[0]
-        self.most_m = distances_m[1]
-        self.least_area = areas[0]
-        self.most_area = areas[1]
+        self.least_m, self.most_m = top.distances_m()
+        self.least_area, self.most_area = top.areas()
         self.count = self.left = self.top = self.expected = 0
         self.index = [0] * 170
         self.x_m = [0.0] * 170
@@ -56,7 +45,7 @@ class Patches:
         self.out_pairs = 0
         self.out_team = self.out_identity = -1
         self.out_off_m = self.out_next_m = self.out_gap_m = 0.0
-        self.out_contested = self.out_team_area = self.out_identity_area = 0
+        self.out_contested = False
 
     def __repr__(self) -> str:
         return f"Patches({self.count} in {self.regions!r} at ({self.left}, {self.top}))"
@@ -142,9 +131,7 @@ class Patches:
         dx = self.x_m[one] - self.x_m[other]
         dy = self.y_m[one] - self.y_m[other]
         self.out_gap_m = math.sqrt(dx * dx + dy * dy)
-        self.out_team_area = self.regions.area[self.out_team]
-        self.out_identity_area = self.regions.area[self.out_identity]
-        self.out_contested = 1 if self.partners(one) > 1 or self.partners(other) > 1 else 0
+        self.out_contested = self.partners(one) > 1 or self.partners(other) > 1
 
     def off_m(self, team: int, identity: int) -> float:
         """Distance of a pair from what is expected; 0 if nothing is."""

@@ -104,13 +104,6 @@ class Track:
         dx, dy = self.x_m - self.before_x_m, self.y_m - self.before_y_m
         length_m = math.sqrt(dx * dx + dy * dy)
         most_m = MOST_SPEED_M_S * gap_s
-        if length_m > most_m:
-            ahead_x = ahead * most_m / length_m
-        else:
-            ahead_x = ahead
+        ahead_x = ahead * most_m / length_m if length_m > most_m else ahead
         turn = wrap_pi(self.theta_rad - self.before_theta_rad)
-        return (
-            self.x_m + ahead_x * dx,
-            self.y_m + ahead_x * dy,
-            wrap_pi(self.theta_rad + ahead * turn),
-        )
+        return self.x_m + ahead_x * dx, self.y_m + ahead_x * dy, wrap_pi(self.theta_rad + ahead * turn)

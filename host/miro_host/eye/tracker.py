@@ -42,23 +42,15 @@ CONTESTED_M = 0.025
 """A pair whose patches could be others' must be so near: a wrong one of two touching robots is 53 mm off."""
 
 
-class Pair:
+class Pair(NamedTuple):
     """A robot as found: its sighting, distance from what was expected, the centroids of both patches in the picture."""
 
-    NOT_STATE = ("*",)
-
-    def __init__(
-        self, sighting: Sighting, off_m: float, u: float, v: float, identity_u: float, identity_v: float
-    ) -> None:
-        self.sighting = sighting
-        self.off_m = off_m
-        self.u = u
-        self.v = v
-        self.identity_u = identity_u
-        self.identity_v = identity_v
-
-    def __repr__(self) -> str:
-        return f"Pair({self.sighting!r}, u={self.u:.2f}, v={self.v:.2f})"
+    sighting: Sighting
+    off_m: float
+    u: float
+    v: float
+    identity_u: float
+    identity_v: float
 
 
 class Window(NamedTuple):
@@ -101,7 +93,7 @@ class Tracker:
 
     STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK, "learning": SelfCalibration}
     NOT_STATE = (
-        *("team", "robots", "pattern", "weighted", "window_px", "team_kind", "kinds", "top", "lens", "z_m"),
+        *("team", "robots", "pattern", "weighted", "window_px", "team_kind", "kinds", "top"),
         *("regions", "patches", "weighings", "table", "notes"),
     )
 
@@ -147,9 +139,7 @@ class Tracker:
     def _believe(self, calibration: Calibration) -> None:
         """Reads pixels by this calibration from now on."""
         self.top = Top(self.pattern, calibration)
-        self.lens = self.top.lens
-        self.z_m = self.top.z_m
-        self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
+        self.patches = Patches(self.regions, self.top)
 
     def after_load(self) -> None:
         """The calibration follows from what was learnt."""
@@ -168,8 +158,7 @@ class Tracker:
         if self.notes is not None:
             self.notes.pairs = list(pairs)
         sightings: list[Sighting | None] = []
-        for slot in range(len(pairs)):
-            pair, track = pairs[slot], self.tracks[slot]
+        for pair, track in zip(pairs, self.tracks, strict=True):
             if pair is None:
                 self.lost_frames += 1
                 sightings.append(None)
@@ -189,7 +178,7 @@ class Tracker:
             return None
         x_m, y_m, theta_rad = track.predicted(tick)
         try:
-            u, v = self.lens.pixel(x_m, y_m, self.z_m)
+            u, v = self.top.lens.pixel(x_m, y_m, self.top.z_m)
         except ValueError:
             return None
         self.patches.expect_nothing()
@@ -264,13 +253,14 @@ class Tracker:
 
     def _pair(self, pixels: bytearray, tick: int, slot: int) -> Pair | None:
         """The pair that `patches` chose as a sighting."""
-        patches = self.patches
+        patches, regions = self.patches, self.regions
         try:
             u, v, identity_u, identity_v = self._centroids(pixels, slot)
             x_m, y_m, theta_rad = self.top.posture(u, v, identity_u, identity_v)
         except ValueError:
             return None
-        confidence = self.top.confidence(patches.out_gap_m, patches.out_team_area, patches.out_identity_area)
+        team_area, identity_area = regions.area[patches.out_team], regions.area[patches.out_identity]
+        confidence = self.top.confidence(patches.out_gap_m, team_area, identity_area)
         sighting = Sighting(x_m, y_m, theta_rad, tick, confidence)
         return Pair(sighting, patches.out_off_m, u, v, identity_u, identity_v)
 
@@ -292,10 +282,7 @@ class Tracker:
 
 def _first(middle: float, size: int, whole: int) -> int:
     """The first of `size` pixels around a place, moved so that all of them are among the `whole` picture's."""
-    first = math.floor(middle) - size // 2
-    if first > whole - size:
-        return whole - size
-    return int(first) if first > 0 else 0
+    return int(max(0, min(math.floor(middle) - size // 2, whole - size)))
 
 
 def _same_patch(one: Pair, other: Pair) -> bool:

@@ -16,8 +16,7 @@ cdef class Weighing:
     cdef int rival_v[64]
     cdef int rivals
 
-    cpdef tuple weights(self, int cb, int cr)
-    cdef int weight(self, int which, int cb, int cr) noexcept
+    cpdef int weight(self, int which, int cb, int cr) noexcept
     cpdef centroids(self, bytearray pixels, Regions regions, int team, int identity, int rival_area)
     cdef void place(self, int rival, Regions regions, int index) noexcept
     @cython.locals(data='unsigned char *')

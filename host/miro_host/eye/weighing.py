@@ -56,28 +56,20 @@ class Weighing:
         self.rival_v = [0] * 64
         self.rivals = 0
         for which in range(2):
-            gain = _gain((team, identity)[which], floor or (0, 0))
-            self.gain_cb[which] = gain[0]
-            self.gain_cr[which] = gain[1]
-            self.least[which] = _UNKNOWN
+            cb, cr = _gain((team, identity)[which], floor or (0, 0))
+            self.gain_cb[which], self.gain_cr[which], self.least[which] = cb, cr, _UNKNOWN
             if floor is not None:
-                share = (gain[0] * floor[0] + gain[1] * floor[1]) // (_UNIT << _SHIFT)
+                share = (cb * floor[0] + cr * floor[1]) // (_UNIT << _SHIFT)
                 self.least[which] = max(_LEAST, share + _ABOVE)
 
     def __repr__(self) -> str:
         gains = [(self.gain_cb[which], self.gain_cr[which], self.least[which]) for which in (0, 1)]
         return f"Weighing(gains and least={gains})"
 
-    def weights(self, cb: int, cr: int) -> tuple[int, int]:
-        """(team, identity): weights of a pixel in 1/256."""
-        return self.weight(0, cb - 128, cr - 128), self.weight(1, cb - 128, cr - 128)
-
     def weight(self, which: int, cb: int, cr: int) -> int:
-        """What a chroma's share of the team (0) or the identity (1) has more than the floor's."""
-        weight = ((self.gain_cb[which] * cb + self.gain_cr[which] * cr) >> _SHIFT) - self.least[which]
-        if weight < 0:
-            return 0
-        return weight if weight < _MOST else _MOST
+        """What a pixel's share of the team (0) or the identity (1) has more than the floor's, in 1/256."""
+        share = (self.gain_cb[which] * (cb - 128) + self.gain_cr[which] * (cr - 128)) >> _SHIFT
+        return max(0, min(share - self.least[which], _MOST))
 
     def centroids(
         self, pixels: bytearray, regions: Regions, team: int, identity: int, rival_area: int
@@ -105,9 +97,7 @@ class Weighing:
 
     def weigh(self, which: int, pixels: bytearray, regions: Regions, index: int) -> None:
         """The sums of one region's weights."""
-        total = 0
-        total_u = 0
-        total_v = 0
+        total = total_u = total_v = 0
         own_u = 8 * regions.sum_u[index] // regions.area[index]
         own_v = 8 * regions.sum_v[index] // regions.area[index]
         left = max(0, regions.left[index] - _MARGIN)
@@ -118,7 +108,7 @@ class Weighing:
         for row in range(top, bottom):
             at = 3 * (row * regions.width + left)
             for column in range(left, right):
-                weight = self.weight(which, data[at + 1] - 128, data[at + 2] - 128)
+                weight = self.weight(which, data[at + 1], data[at + 2])
                 at += 3
                 if weight != 0:
                     u = 16 * column + 8
@@ -147,10 +137,8 @@ class Weighing:
         """
         if self.out_weight[which] == 0:
             raise ValueError("no pixel has a weight")
-        return (
-            0.5 * self.out_u[which] / self.out_weight[which],
-            0.5 * self.out_v[which] / self.out_weight[which],
-        )
+        weight = self.out_weight[which]
+        return 0.5 * self.out_u[which] / weight, 0.5 * self.out_v[which] / weight
 
 
 def _gain(own: tuple[int, int], floor: tuple[int, int]) -> tuple[int, int]:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from miro_exact.rng import Stream
 from miro_host.eye.camera_parameters import CameraParameters
-from miro_host.eye.colours import FLOOR, ColourClasses, classes_of
+from miro_host.eye.colours import FLOOR, ColourClasses, Samples, classes_of
 from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import BALL, IDENTITIES, PATTERNS, ROBOT_HEIGHT_M, TEAMS, PatternName
 from miro_sim.pitch.camera import Camera
@@ -16,10 +16,6 @@ from miro_sim.pitch.picture_settings import PictureSettings
 PLACES_M = ((0.55, 0.30), (0.15, 0.05), (0.95, 0.65), (0.15, 0.65), (0.95, 0.05))
 """Spread over the pitch, because the light is not the same everywhere; no white line in the floor's samples."""
 BALL_RADIUS_M = 0.02135
-_HALF_PX = 1
-"""Samples are squares of 3 x 3 pixels."""
-
-Samples = dict[str, list[tuple[int, int, int]]]
 
 
 def samples_of(
@@ -51,9 +47,9 @@ def samples_of(
 
 
 def _pixels(camera: Camera, at: tuple[float, float, float]) -> list[tuple[int, int, int]]:
+    """A square of 3 x 3."""
     u, v = Lens(camera.parameters).pixel(*at)
-    side = 2 * _HALF_PX + 1
-    data = camera.window(math.floor(u) - _HALF_PX, math.floor(v) - _HALF_PX, side, side)
+    data = camera.window(math.floor(u) - 1, math.floor(v) - 1, 3, 3)
     return [(data[at], data[at + 1], data[at + 2]) for at in range(0, len(data), 3)]
 
 

@@ -9,11 +9,10 @@ from miro_host.eye import eye_file
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.calibration_kinds import exact
 from miro_host.eye.camera_parameters import CameraParameters
-from miro_host.eye.colours import ColourClasses, classes_of
+from miro_host.eye.colours import ColourClasses, classes_of, parse_samples
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.fit import fit, parse_points
 from miro_host.eye.patterns import PATTERNS
-from miro_host.eye.sample_file import parse_samples
 from miro_host.eye.tracker import Tracker
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.picture_settings import PictureSettings

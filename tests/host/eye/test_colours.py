@@ -3,10 +3,9 @@
 import pytest
 
 from miro_host.eye import eye_file
-from miro_host.eye.colours import CLASS_OF, ColourClasses, ColourMean, classes_of
+from miro_host.eye.colours import CLASS_OF, ColourClasses, ColourMean, classes_of, parse_samples
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import COLOURS
-from miro_host.eye.sample_file import parse_samples
 from tests.naive.painted_frame import PAINTS, sampled, ycbcr
 
 CLASSES = classes_of(sampled())

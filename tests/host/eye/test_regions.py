@@ -95,8 +95,7 @@ def of(chroma, share=1.0):
 
 def test_a_patch_weighs_what_the_floor_has_less():
     weighing = Weighing(YELLOW, GREEN, FLOOR)
-    team, _ = weighing.weights(*of(YELLOW))
-    _, identity = weighing.weights(*of(GREEN))
+    team, identity = weighing.weight(0, *of(YELLOW)), weighing.weight(1, *of(GREEN))
     assert team == pytest.approx(256 - 40, abs=4)
     assert 150 < identity < 200  # a green floor takes a third
 
@@ -104,15 +103,15 @@ def test_a_patch_weighs_what_the_floor_has_less():
 @pytest.mark.parametrize("identity", [LIME, GREEN])
 def test_floor_and_black_weigh_nothing(identity):
     weighing = Weighing(YELLOW, identity, FLOOR)
-    assert weighing.weights(128, 128) == (0, 0)
-    assert weighing.weights(*of(FLOOR)) == (0, 0)
+    for which in (0, 1):
+        assert weighing.weight(which, 128, 128) == weighing.weight(which, *of(FLOOR)) == 0
 
 
 def test_half_of_a_patch_weighs_less_and_no_pixel_more_than_one_and_a_half():
     weighing = Weighing(YELLOW, LIME)
-    whole, half = weighing.weights(*of(YELLOW))[0], weighing.weights(*of(YELLOW, 0.5))[0]
+    whole, half = weighing.weight(0, *of(YELLOW)), weighing.weight(0, *of(YELLOW, 0.5))
     assert 0 < half < 0.5 * whole
-    assert Weighing((160, 0), LIME).weights(255, 128)[0] == 384
+    assert Weighing((160, 0), LIME).weight(0, 255, 128) == 384
 
 
 def test_a_colour_without_chroma_is_refused():
