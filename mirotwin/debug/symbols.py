@@ -104,7 +104,7 @@ class Symbols:
     @cached_property
     def listing(self) -> list[ListingRow]:
         """The image's instructions and tables in the order of addresses."""
-        return list(rows(self.image, self.debug, self.names, self.unwinder.heights))
+        return list(rows(self.image, self.debug, self.names, self.unwinder.from_reset))
 
 
 class Moment:

@@ -35,7 +35,9 @@ class StackFrame(msgspec.Struct, frozen=True):
 
 
 class Unwinder:
-    """Reads the frames of a CPU that runs `image`. `heights`: instruction -> (bytes above the entry, entry)."""
+    """Reads the frames of a CPU that runs `image`. `heights`: instruction -> (bytes above the entry, entry), of which
+    some are guessed; `from_reset`: instructions that reset leads to.
+    """
 
     def __init__(self, image: Image, names: SymbolNames) -> None:
         self.code = image.code
@@ -43,6 +45,7 @@ class Unwinder:
         self._ways: dict[int, list[tuple[int, int]]] = {}  # instruction -> (height, entry) of each way to it
         self._called: set[int] = set()
         self._enter(0)
+        self.from_reset = set(self._ways)
         self.vectors = set()
         for vector in VECTORS:
             if vector not in self._ways:  # start-up code may lie where no interrupt is used

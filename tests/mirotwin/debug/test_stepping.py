@@ -11,9 +11,12 @@ from hypothesis import strategies as st
 from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import Flat
 from miro_robot.bare.machine import BareMachine
+from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.marks import MarkInspector
+from miro_robot.mcs51.opcodes import disassemble
 from mirotwin.debug import timeline as timelines
 from mirotwin.debug.console import Console
+from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline, Trap
 from mirotwin.shell.progress import ProgressBar
 from tests.mirotwin.debug import proofs
@@ -40,6 +43,18 @@ def debugger():
 def stand(debugger, moment):
     debugger.go_to(moment.cycle * CYCLE_TICKS)
     assert debugger.cpu.pc == moment.pc
+
+
+def test_each_instruction_that_was_executed_is_listed_as_one(moments, debugger):
+    listed = {row.address: row.text for row in debugger.symbols.listing}
+    executed, symbols = {moment.pc for moment in moments}, debugger.symbols
+    texts = {pc: disassemble(symbols.image.code, pc, symbols.names) for pc in executed}
+    assert {pc: listed.get(pc) for pc in executed} == texts
+
+
+def test_an_instruction_over_the_place_of_a_vector_is_listed_whole():
+    over = image("MOV 30h,#1\n" * 5 + "SJMP $")  # timer 0 would go to 0Bh, within the fourth
+    assert [row.address for row in Symbols(over, Sources([])).listing] == [0, 3, 6, 9, 12, 15]
 
 
 def some(moments, count, seed):
