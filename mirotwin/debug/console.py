@@ -6,6 +6,7 @@ What it prints of a moment is a time that `goto` takes, why it stopped, the plac
 from __future__ import annotations
 
 import re
+import shlex
 import signal
 from cmd import Cmd
 from collections.abc import Iterator
@@ -145,7 +146,10 @@ class Console(Cmd):
         self.say(self.debugger.go_to(tick))
 
     def _until(self, rest: str) -> None:
-        name, *keys = rest.split() or [""]
+        try:
+            name, *keys = shlex.split(rest) or [""]
+        except ValueError as error:
+            raise BadInput("", rest, f"{error}") from None
         if name not in CONDITIONS:
             raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
         robot, kind = self.timeline.core.robot, CONDITIONS[name]

@@ -305,9 +305,9 @@ class Debugger:
     # By line
 
     def _line_of(self, cpu: Cpu) -> _Line:
-        entry, _ = self.symbols.names.function(cpu.pc)
         level = cpu.peripherals.interrupts.in_service
-        return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, cpu.pc == entry)
+        begins = cpu.pc == self.symbols.entry(cpu.pc)
+        return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, begins)
 
     def _line(self, over: bool) -> str:
         """On to where another line begins, of this function, of its caller, or (not `over`) of one that it calls.

@@ -73,6 +73,11 @@ class Symbols:
             return f"{address:#06x} in {self.names.place(address)}"
         return f"{AnyPath(line.file).name}:{line.line} in {self.function(address)}"
 
+    def entry(self, address: int) -> int:
+        """Where the function of the instruction begins: one of C may have names within it."""
+        found = self.debug.function_at(address)
+        return self.names.function(address)[0] if found is None else found.first
+
     def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
         """Where the code of a line begins, in each function that has some, or that of the next line that has any.
 
@@ -90,7 +95,7 @@ class Symbols:
             last = max(place.line for place, _ in own)
             raise BadInput("", what, "no line has code from there on", f"the last one is {last}")
         addresses = sorted((address for one, address in own if one.line == place.line), reverse=True)
-        firsts = {self.names.function(address)[0]: address for address in addresses}
+        firsts = {self.entry(address): address for address in addresses}
         return sorted(firsts.values()), place
 
     def at(self, text: str) -> tuple[list[int], SourceLine | None]:

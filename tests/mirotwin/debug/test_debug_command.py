@@ -8,8 +8,9 @@ import pytest
 from miro_robot.firmware import image_path
 from tests import children
 from tests.mirotwin import program
-from tests.mirotwin.conftest import hex_file
+from tests.mirotwin.conftest import hex_file, hex_text
 from tests.mirotwin.debug.runs import ASM, robot_run
+from tests.mirotwin.mutated_files import ECHO, ECHO_CDB, ECHO_MAP
 from tests.mirotwin.verify.bare.firmwares import SLEEPS
 from tests.mirotwin.verify.bare.test_case import CHECK
 from tests.mirotwin.verify.bare.test_case import case as bare_case
@@ -127,6 +128,7 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("goto 12", "it has no unit"),
         ("until spaghetti", "is no condition"),
         ("until edge pin=nowhere", "is not a pin"),
+        ("until edge pin='txd", "No closing quotation"),
         ("until edge pins=txd", "until edge: pins: unknown key; did you mean pin?"),
         ("until answer slot=9", "until answer: slot: is out of range; must be <= 4"),
         ("until answer seq=x", "until answer: seq: expected a whole number, got a string"),
@@ -184,9 +186,17 @@ def test_lines_from_another_firmware_are_refused(mirotwin, finished, bare):
     assert "is not a recorded image" in err
 
 
-def test_until_goes_on_to_an_event(console):
-    out = console("fig6", lines=["until command name=STT side=left", "print lm629.left.mode"])
+@pytest.mark.parametrize("name", ["STT", '"STT"', "'STT' hex=''"])
+def test_until_goes_on_to_an_event(console, name):
+    out = console("fig6", lines=[f"until command name={name} side=left", "print lm629.left.mode"])
     assert "net0/robot0: command left STT" in out
+
+
+def test_a_symbol_within_a_function_begins_no_other_one(console, tmp_path):
+    for suffix, text in (".ihx", hex_text(ECHO)), (".cdb", ECHO_CDB), (".map", ECHO_MAP):
+        (tmp_path / f"named{suffix}").write_text(text)
+    out = console(tmp_path / "named.ihx", lines=["goto 1ms", "rstep"])  # it waits in line 5, at `loop`
+    assert out.splitlines()[-1].startswith("0.0000045s  step: named.c:5")
 
 
 @pytest.mark.parametrize("what", ["fig6", "--dap"])
