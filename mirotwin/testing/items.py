@@ -37,7 +37,7 @@ def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
     try:
         rig = Rig(rig_options(item.iter_markers("mirotwin"), item.path.parent, firmware, seed))
     except ValueError as error:
-        pytest.fail(f"{item.nodeid}: {error}", pytrace=False)
+        raise pytest.fail.Exception(f"{item.nodeid}: {error}", pytrace=False) from None
     item.stash[RIG] = rig
     return rig
 

@@ -70,6 +70,7 @@ def test_each_test_has_its_verdict(mixed):
     assert "6 failed, 2 passed, 2 errors" in out
     assert "INTERNALERROR" not in out
     assert "Traceback" not in out
+    assert "During handling of the above exception" not in out
 
 
 @pytest.mark.parametrize(
