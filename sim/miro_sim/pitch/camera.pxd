@@ -14,7 +14,7 @@ cdef int _rounded(double x) noexcept
 
 @cython.final
 cdef class Camera:
-    cdef readonly object parameters, settings, pattern
+    cdef readonly object parameters, settings
     cdef readonly int width, height, robots
     cdef readonly rays.Rays rays
     cdef scene.Scene scene
@@ -68,15 +68,10 @@ cdef class Camera:
     cdef void _surround(self, int at, long long least, long long most) noexcept
     @cython.locals(reach=int, length='long long', way='long long', turn='long long', drift='long long')
     cdef void _bound(self, int body) noexcept
-    @cython.locals(is_any=bint)
     cpdef bytearray window(self, long long left, long long top, long long width, long long height)
-    @cython.locals(first=int, band=int, above=int, below=int, row=int)
-    cdef _draw(self, int left, int top, int width, int height, bytearray out)
     cdef void _put_robots(self, int row, int at) noexcept
-    @cython.locals(at=int, pixel=int, near=int, place=int, cover=tuple)
     cdef void _cover(self, int top, int bottom, int first, int end) except *
     cdef void _cover_with(self, int body, int top, int bottom, int first, int end) noexcept
-    @cython.locals(step=int, left=int, right=int)
     cdef void _find_span(self, int body, int row, int first, int end) noexcept
     @cython.locals(reach=int, x='long long', y='long long')
     cdef inline long long _beside(self, int body, int pixel) noexcept
@@ -85,20 +80,14 @@ cdef class Camera:
     @cython.locals(x='double[4]', y='double[4]', u='int[4]', v='int[4]', lane='long long')
     cdef void _turn_corners(self, int place, long long corner, long long line, long long bounds, long long left,
                             long long right) noexcept
-    @cython.locals(lane='long long')
     cdef void _bound_pixels(self, long long left, long long right) noexcept
-    @cython.locals(inside_u=bint)
     cdef inline bint _inside(self, int column, int at) noexcept
-    @cython.locals(beside=bint)
     cdef inline bint _outside(self, int column, int at) noexcept
     cdef void _cover_pixel(self, int body, int row, int column, int index) noexcept
-    @cython.locals(whole=int)
     cdef long long _alone(self, int body, int row, int column) noexcept
     @cython.locals(packed='long long *', identity=int)
     cdef long long _paint_top(self, int body, int row, int column, int on_top) noexcept
-    @cython.locals(at=int)
     cdef inline int _within(self, int row, int column, int box) noexcept
-    @cython.locals(across_u=bint, across_v=bint, within=int, first=int, lane='long long')
     cdef int _count_within(self, int row, int column, int at) noexcept
     cdef inline int _count(self, bint across_u, bint across_v) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept
@@ -112,7 +101,6 @@ cdef class Camera:
                    right_v='int[4]', bend_v='int[4]', within='int[4]', lane='long long', low_u=int, high_u=int,
                    low_v=int, high_v=int, above=int, below=int, _=int)
     cdef int _count_both(self) noexcept
-    @cython.locals(entered=int, first=int)
     cdef int _entered(self, int body, int row, int column, int on_top) noexcept
     @cython.locals(least_u='int[4]', most_u='int[4]', least_v='int[4]', most_v='int[4]', outside='int[4]',
                    across_u='int[4]', across_v='int[4]', off='double[4]', over='double[4]', gone=int, crossed_u=int,
@@ -121,7 +109,6 @@ cdef class Camera:
     cdef int _enter(self, int place, int pixel) noexcept
     @cython.locals(above='long long', below='long long', lane='long long')
     cdef inline void _bound_corners(self, int* corners, int* least, int* most) noexcept
-    @cython.locals(lane='long long')
     cdef inline void _fall(self, int place, int pixel) noexcept
     @cython.locals(at_u='int[4]', by_u='int[4]', right_u='int[4]', bend_u='int[4]', at_v='int[4]', by_v='int[4]',
                    right_v='int[4]', bend_v='int[4]', within='int[4]', fall_u='double[4]', fall_v='double[4]',
@@ -130,10 +117,7 @@ cdef class Camera:
     cdef int _count_entering(self) noexcept
     @cython.locals(column=int, p=int, at=int, by=int)
     cdef inline void _spread(self, int* samples, int* corners) noexcept
-    @cython.locals(at=int, first=int, open_paint=int, sample=int, paint=int)
     cdef long long _samples(self, int row, int column) noexcept
-    @cython.locals(fall_u='long long', fall_v='long long', u='long long', v='long long', index=int)
     cdef void _see(self, int body, int at, int pixel) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
-    @cython.locals(at=int)
     cdef inline bint _lies_in(self, int box, long long u, long long v) noexcept

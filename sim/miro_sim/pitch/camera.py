@@ -68,7 +68,6 @@ class Camera:
     ) -> None:
         self.parameters = parameters
         self.settings = settings = checked(settings)
-        self.pattern = pattern
         self.width, self.height = WIDTH, HEIGHT
         self.rays: Rays = rays_of(parameters)
         self.scene: Scene = scene_of(parameters, settings, None)
@@ -242,16 +241,12 @@ class Camera:
 
     def window(self, left: int, top: int, width: int, height: int) -> bytearray:
         """A window's pixels: see `miro_host.eye.grabber`. Raises ValueError for one that is not inside the picture."""
-        is_any = left >= 0 and top >= 0 and width > 0 and height > 0
-        if not is_any or left > _WIDTH - width or top > _HEIGHT - height:  # no sum, which may overflow
+        # no sum, which may overflow
+        if not (width > 0 and height > 0 and 0 <= left <= _WIDTH - width and 0 <= top <= _HEIGHT - height):
             raise ValueError(
                 f"window {width} x {height} at ({left}, {top}) is not inside {_WIDTH} x {_HEIGHT}"
             )
         out = bytearray(3 * width * height)
-        self._draw(left, top, width, height, out)
-        return out
-
-    def _draw(self, left: int, top: int, width: int, height: int, out: bytearray) -> None:
         first = max(0, left - self.sensor.side)
         end = min(_WIDTH, left + width + self.sensor.side)
         band = _BAND // (end - first)
@@ -262,6 +257,7 @@ class Camera:
                 self.scene.show(self.sensor, row, first, end, self.field_sets)
                 self._put_robots(row, self.place * _BAND + (row - above) * (end - first) - first)
                 self.sensor.write(row, left, width, out, 3 * width * (row - top))
+        return out
 
     def _put_robots(self, row: int, at: int) -> None:
         """Those pixels of a line in which a robot may be seen; `at`: where column 0 would be in the bands."""
@@ -422,18 +418,20 @@ class Camera:
 
     def _inside(self, column: int, at: int) -> bool:
         """Whether all samples of a pixel lie in a rectangle at all instants; `at`: where its edges are."""
-        inside_u = self.least_u[column] > self.edges[at] and self.most_u[column] <= self.edges[at + 1]
         return (
-            inside_u
+            self.least_u[column] > self.edges[at]
+            and self.most_u[column] <= self.edges[at + 1]
             and self.least_v[column] > self.edges[at + 2]
             and self.most_v[column] <= self.edges[at + 3]
         )
 
     def _outside(self, column: int, at: int) -> bool:
         """Whether all lie beyond the same side of it."""
-        beside = self.most_u[column] <= self.edges[at] or self.least_u[column] > self.edges[at + 1]
         return (
-            beside or self.most_v[column] <= self.edges[at + 2] or self.least_v[column] > self.edges[at + 3]
+            self.most_u[column] <= self.edges[at]
+            or self.least_u[column] > self.edges[at + 1]
+            or self.most_v[column] <= self.edges[at + 2]
+            or self.least_v[column] > self.edges[at + 3]
         )
 
     def _cover_pixel(self, body: int, row: int, column: int, index: int) -> None:
@@ -444,11 +442,10 @@ class Camera:
         if self.covered[index] or self.drift_um[body] > _FAST_UM:
             self.covered[index] = _UNSURE
             return
-        total = (
-            self._paint_top(body, row, column, 16 * self.field_sets)
-            if whole
-            else self._alone(body, row, column)
-        )
+        if whole:
+            total = self._paint_top(body, row, column, 16 * self.field_sets)
+        else:
+            total = self._alone(body, row, column)
         if total != 0:
             self.covered[index] = _SURE if total > 0 else _UNSURE
             self.total[index] = total
@@ -696,7 +693,7 @@ class Camera:
         return self._add(within)
 
     def _spread(self, samples: list[int], corners: list[int]) -> None:
-        """How far samples lie from a pixel's first corner: as `rays.between`; those of the other field lie far away."""
+        """How far samples lie from a pixel's first corner: as in the scene; those of the other field lie far away."""
         a = corners[self.above]
         b, c, d = corners[self.above + 4] - a, corners[self.below] - a, corners[self.below + 4] - a
         for column in range(4):
@@ -777,10 +774,7 @@ class Camera:
 
 def _um(metres: float) -> int:
     """A place in um, no further away than what is further than anything that may be seen."""
-    place = metres * 1e6
-    if not place < _FAR_UM:
-        return _FAR_UM
-    return _rounded(place) if place > -_FAR_UM else -_FAR_UM
+    return _rounded(max(-_FAR_UM, min(_FAR_UM, metres * 1e6)))
 
 
 def _rounded(x: float) -> int:

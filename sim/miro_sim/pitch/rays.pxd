@@ -5,8 +5,6 @@ cdef int _WIDTH, _HEIGHT, _CORNERS, _MARGIN_SPARE_UM
 cdef long long _TOP_UM, _HALF_UM, _MOST
 
 
-@cython.locals(p=int, q=int)
-cpdef long long between(long long a, long long b, long long c, long long d, int sample) noexcept
 cpdef bint enters(long long u, long long v, long long fall_u, long long fall_v) noexcept
 cpdef long long entry(long long u, long long v, long long fall_u, long long fall_v) noexcept
 
@@ -16,11 +14,7 @@ cdef class Rays:
     cdef int[::1] slope_x, slope_y, top_x, top_y, middle_x, middle_y, fall_x, fall_y
     cdef readonly long long x_um, y_um, height_um, spread_um, stride_um
 
-    @cython.locals(x='long long', y='long long', i=int, j=int, corner=int)
-    cdef _cast(self, lens.Lens lens)
     @cython.locals(x='long long', y='long long')
+    cdef _cast(self, lens.Lens lens)
+    @cython.locals(x='long long', y='long long', spread='long long', stride='long long')
     cdef _gather(self)
-    @cython.locals(corner=int, at=int)
-    cdef long long _spread(self) noexcept
-    @cython.locals(widest='long long', x='long long', y='long long', other=int)
-    cdef long long _stride(self) noexcept

@@ -51,8 +51,6 @@ class Rays:
         self.fall_y = array("i", bytes(4 * 76800))
         self._cast(lens)
         self._gather()
-        self.spread_um = self._spread()
-        self.stride_um = self._stride()
 
     def __repr__(self) -> str:
         return f"Rays(({self.x_um}, {self.y_um}, {self.height_um}) um, spread {self.spread_um} um)"
@@ -65,12 +63,7 @@ class Rays:
                 exact_y = lens.out_y * 4194304.0 + 0.5
                 if not (-_MOST < exact_x < _MOST and -_MOST < exact_y < _MOST):
                     raise ValueError(f"pixel ({i}, {j}) looks too near to the horizon")
-                x = int(exact_x)
-                if x > exact_x:
-                    x -= 1  # rounded down
-                y = int(exact_y)
-                if y > exact_y:
-                    y -= 1
+                x, y = int(exact_x // 1.0), int(exact_y // 1.0)
                 corner = j * _CORNERS + i
                 self.slope_x[corner] = x
                 self.slope_y[corner] = y
@@ -78,55 +71,34 @@ class Rays:
                 self.top_y[corner] = self.y_um + ((self.height_um - _TOP_UM) * y >> 22)
 
     def _gather(self) -> None:
-        """The means of each pixel's corners."""
-        for j in range(_HEIGHT):
-            for i in range(_WIDTH):
-                a = j * _CORNERS + i
-                c = a + _CORNERS
-                pixel = j * _WIDTH + i
-                x = self.slope_x[a] + self.slope_x[a + 1] + self.slope_x[c] + self.slope_x[c + 1]
-                y = self.slope_y[a] + self.slope_y[a + 1] + self.slope_y[c] + self.slope_y[c + 1]
-                self.fall_x[pixel] = _TOP_UM * x >> 24
-                self.fall_y[pixel] = _TOP_UM * y >> 24
-                x = self.top_x[a] + self.top_x[a + 1] + self.top_x[c] + self.top_x[c + 1]
-                y = self.top_y[a] + self.top_y[a + 1] + self.top_y[c] + self.top_y[c + 1]
-                self.middle_x[pixel] = (x + 2) >> 2
-                self.middle_y[pixel] = (y + 2) >> 2
-
-    def _spread(self) -> int:
-        """The longest way from a pixel's middle to one of its corners, both on the floor."""
-        widest = 0
-        for j in range(_HEIGHT):
-            for i in range(_WIDTH):
-                pixel = j * _WIDTH + i
-                for corner in range(4):
-                    at = (j + (corner >> 1)) * _CORNERS + i + (corner & 1)
-                    x = self.top_x[at] + (_TOP_UM * self.slope_x[at] >> 22)
-                    y = self.top_y[at] + (_TOP_UM * self.slope_y[at] >> 22)
-                    x -= self.middle_x[pixel] + self.fall_x[pixel]
-                    y -= self.middle_y[pixel] + self.fall_y[pixel]
-                    widest = max(widest, x * x + y * y)
-        return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
-
-    def _stride(self) -> int:
-        """The longest way from the middle of a pixel to that of a neighbour, both at the height of the tops."""
-        widest = 0
+        """The means of each pixel's corners, and how far from them corners and neighbours are."""
+        spread = stride = 0
         for pixel in range(_WIDTH * _HEIGHT):
-            for other in (
-                pixel - 1 if pixel % _WIDTH else pixel,
-                pixel - _WIDTH if pixel >= _WIDTH else pixel,
-            ):
-                x = self.middle_x[pixel] - self.middle_x[other]
-                y = self.middle_y[pixel] - self.middle_y[other]
-                widest = max(widest, x * x + y * y)
-        return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
-
-
-def between(a: int, b: int, c: int, d: int, sample: int) -> int:
-    """Sample 0 to 15, row by row, between the corners of a pixel: a b above, c d below."""
-    p = 2 * (sample & 3) + 1
-    q = 2 * (sample >> 2) + 1
-    return ((a * (8 - q) + c * q) * (8 - p) + (b * (8 - q) + d * q) * p) >> 6
+            a = pixel + pixel // _WIDTH
+            c = a + _CORNERS
+            x = self.slope_x[a] + self.slope_x[a + 1] + self.slope_x[c] + self.slope_x[c + 1]
+            y = self.slope_y[a] + self.slope_y[a + 1] + self.slope_y[c] + self.slope_y[c + 1]
+            self.fall_x[pixel] = _TOP_UM * x >> 24
+            self.fall_y[pixel] = _TOP_UM * y >> 24
+            x = self.top_x[a] + self.top_x[a + 1] + self.top_x[c] + self.top_x[c + 1]
+            y = self.top_y[a] + self.top_y[a + 1] + self.top_y[c] + self.top_y[c + 1]
+            self.middle_x[pixel] = (x + 2) >> 2
+            self.middle_y[pixel] = (y + 2) >> 2
+            for corner in range(4):  # on the floor
+                at = a + (corner >> 1) * _CORNERS + (corner & 1)
+                x = self.top_x[at] + (_TOP_UM * self.slope_x[at] >> 22)
+                y = self.top_y[at] + (_TOP_UM * self.slope_y[at] >> 22)
+                x -= self.middle_x[pixel] + self.fall_x[pixel]
+                y -= self.middle_y[pixel] + self.fall_y[pixel]
+                spread = max(spread, x * x + y * y)
+            for step in range(2):  # to the left and above, at the height of the tops
+                other = pixel - (1 if step else _WIDTH)
+                if pixel % _WIDTH if step else other >= 0:
+                    x = self.middle_x[pixel] - self.middle_x[other]
+                    y = self.middle_y[pixel] - self.middle_y[other]
+                    stride = max(stride, x * x + y * y)
+        self.spread_um = math.isqrt(spread) + 1 + _MARGIN_SPARE_UM
+        self.stride_um = math.isqrt(stride) + 1 + _MARGIN_SPARE_UM
 
 
 def enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:

@@ -1,6 +1,5 @@
 cimport cython
 from miro_sim.pitch cimport rays, sensor
-from miro_sim.pitch.rays cimport between
 
 cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH, _PAD
 cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
@@ -13,7 +12,7 @@ cdef void _copy(short[::1] kept, long long pixel, short* line, long long column,
 @cython.final
 cdef class Scene:
     cdef readonly rays.Rays rays
-    cdef long long packed[32]
+    cdef long long packed[18]
     cdef unsigned char[::1] paint
     cdef long long[::1] total
     cdef int[::1] lit, lit_first, lit_end
@@ -29,17 +28,12 @@ cdef class Scene:
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef void _light_up(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef inline int behind(self, int pixel) noexcept
-    @cython.locals(first=int, sample=int)
     cdef void look(self, int pixel) noexcept
     cdef int sample(self, int pixel, int sample) noexcept
-    cdef int ball_above(self, int pixel, int sample, long long height) noexcept
-    @cython.locals(slopes='int[::1]')
-    cdef long long _slope_x(self, int pixel, int sample) noexcept
-    @cython.locals(slopes='int[::1]')
-    cdef long long _slope_y(self, int pixel, int sample) noexcept
-    cdef int _ring(self, long long slope_x, long long slope_y, long long above) noexcept
-    @cython.locals(on_wall=bint)
-    cdef int paint_of(self, long long slope_x, long long slope_y) noexcept
+    cdef int ball_above(self, int pixel, int sample, long long above) noexcept
+    @cython.locals(above='long long', below='long long')
+    cdef long long _slope(self, int[::1] slopes, int pixel, int sample) noexcept
+    cdef int _paint_of(self, int pixel, int sample) noexcept
     cdef int _sure(self, int pixel) noexcept
     cdef bint _inside(self, long long x, long long y, long long more) noexcept
     cdef bint _on_line(self, long long x, long long y, long long more) noexcept

@@ -28,7 +28,7 @@ from miro_host.eye.camera_parameters import CameraParameters
 from miro_sim.pitch.ground import INSET_M, LENGTH_M, WIDTH_M
 from miro_sim.pitch.paints import NUMBERS, packed
 from miro_sim.pitch.picture_settings import PictureSettings
-from miro_sim.pitch.rays import Rays, between, rays_of
+from miro_sim.pitch.rays import Rays, rays_of
 from miro_sim.pitch.sensor import Sensor
 
 _MIXED = 255
@@ -60,9 +60,7 @@ class Scene:
 
     def __init__(self, rays: Rays, picture: PictureSettings, ball: tuple[int, int] | None) -> None:
         self.rays = rays
-        self.packed = [0] * 32
-        for number, paint in enumerate(packed(picture.black_floor)):
-            self.packed[number] = paint
+        self.packed = packed(picture.black_floor)
         self.falloff = math.floor(picture.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
         self.paint = bytearray([_UNKNOWN]) * 76800
         self.total = array("q", bytes(8 * 76800))
@@ -98,13 +96,10 @@ class Scene:
         """Whether the ball may be seen in a pixel: looked at along each axis alone."""
         rays = self.rays
         far = _BALL_UM + rays.spread_um
-        top = rays.middle_x[pixel] - self.ball_x
-        end = top + rays.fall_x[pixel]
-        if (top > far and end > far) or (top < 0 - far and end < 0 - far):
-            return False
-        top = rays.middle_y[pixel] - self.ball_y
-        end = top + rays.fall_y[pixel]
-        return not ((top > far and end > far) or (top < 0 - far and end < 0 - far))
+        x, y = rays.middle_x[pixel] - self.ball_x, rays.middle_y[pixel] - self.ball_y
+        end_x, end_y = x + rays.fall_x[pixel], y + rays.fall_y[pixel]
+        least, most = max(min(x, end_x), min(y, end_y)), min(max(x, end_x), max(y, end_y))
+        return least <= far and most >= 0 - far
 
     def _light(self, pixel: int) -> int:
         """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
@@ -151,54 +146,38 @@ class Scene:
             self.paint[pixel] = paint
             self.total[pixel] = 16 * self.packed[paint]
             return
-        first = -1
-        total = 0
-        plain = True
-        for sample in range(16):
+        first = self.sample(pixel, 0)
+        self.paint[pixel] = first
+        self.total[pixel] = self.packed[first]
+        for sample in range(1, 16):
             paint = self.sample(pixel, sample)
-            if first < 0:
-                first = paint
-            elif paint != first:
-                plain = False
-            total += self.packed[paint]
-        self.total[pixel] = total
-        self.paint[pixel] = first if plain else _MIXED
+            self.total[pixel] += self.packed[paint]
+            if paint != first:
+                self.paint[pixel] = _MIXED
 
     def sample(self, pixel: int, sample: int) -> int:
         """The paint that sample 0 to 15 of a pixel hits, row by row."""
-        x = self._slope_x(pixel, sample)
-        y = self._slope_y(pixel, sample)
-        if self.has_ball:
-            ring = self._ring(x, y, 0)
-            if ring >= 0:
-                return self.ball_rim + ring
-        return self.paint_of(x, y)
+        paint = self.ball_above(pixel, sample, 0) if self.has_ball else -1
+        return paint if paint >= 0 else self._paint_of(pixel, sample)
 
-    def ball_above(self, pixel: int, sample: int, height: int) -> int:
-        """The paint of the ball if that sample sees it at this height or above, or -1."""
-        ring = self._ring(self._slope_x(pixel, sample), self._slope_y(pixel, sample), height)
-        return self.ball_rim + ring if ring >= 0 else -1
-
-    def _slope_x(self, pixel: int, sample: int) -> int:
-        """Between the corners of a pixel, at a sample."""
-        slopes = self.rays.slope_x
-        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+    def _slope(self, slopes: array[int], pixel: int, sample: int) -> int:
+        """Between the corners of a pixel, at sample 0 to 15, row by row."""
+        a = pixel + pixel // _WIDTH
         c = a + _CORNERS
-        return between(slopes[a], slopes[a + 1], slopes[c], slopes[c + 1], sample)
+        p, q = 2 * (sample & 3) + 1, 2 * (sample >> 2) + 1
+        above = slopes[a] * (8 - p) + slopes[a + 1] * p
+        below = slopes[c] * (8 - p) + slopes[c + 1] * p
+        return (above * (8 - q) + below * q) >> 6
 
-    def _slope_y(self, pixel: int, sample: int) -> int:
-        slopes = self.rays.slope_y
-        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
-        c = a + _CORNERS
-        return between(slopes[a], slopes[a + 1], slopes[c], slopes[c + 1], sample)
-
-    def _ring(self, slope_x: int, slope_y: int, above: int) -> int:
-        """The ring of the ball, 0 to 3 from the rim, that a ray sees; -1 if it misses it or passes it below `above`.
+    def ball_above(self, pixel: int, sample: int, above: int) -> int:
+        """The paint of the ball's ring that a sample sees; -1 if it misses the ball or passes it below `above`.
 
         With e from the centre to the ray in the plane of the centre, and s the slopes: the ray passes the centre at the
         distance d, d^2 (1 + s^2) = e^2 (1 + s^2) - (e s)^2; it is nearest to it e s / (1 + s^2) below that plane.
         """
         rays = self.rays
+        slope_x = self._slope(rays.slope_x, pixel, sample)
+        slope_y = self._slope(rays.slope_y, pixel, sample)
         drop = rays.height_um - _BALL_UM
         x = rays.x_um + (drop * slope_x >> 22) - self.ball_x
         y = rays.y_um + (drop * slope_y >> 22) - self.ball_y
@@ -212,7 +191,7 @@ class Scene:
         rim = _BALL_UM * _BALL_UM * stretch
         if distance > rim or _BALL_UM - along * 4096 // stretch < above:
             return -1
-        return 3 - 4 * (distance - 1) // rim if distance > 0 else 3
+        return self.ball_rim + (3 - 4 * (distance - 1) // rim if distance > 0 else 3)
 
     def _sure(self, pixel: int) -> int:
         """The floor or the outside if all of a pixel is sure to see it, else -1."""
@@ -229,9 +208,11 @@ class Scene:
         y = abs(rays.middle_y[pixel] + rays.fall_y[pixel] - self.middle_y)
         return self.floor if self._inside(x, y, 0 - spread) and not self._on_line(x, y, spread) else -1
 
-    def paint_of(self, slope_x: int, slope_y: int) -> int:
-        """The paint that the ray of these slopes hits."""
+    def _paint_of(self, pixel: int, sample: int) -> int:
+        """The paint that a sample hits where there is no ball."""
         rays = self.rays
+        slope_x = self._slope(rays.slope_x, pixel, sample)
+        slope_y = self._slope(rays.slope_y, pixel, sample)
         drop = rays.height_um - _WALL_HEIGHT_UM
         x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
         y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)

@@ -25,13 +25,10 @@ cdef class Sensor:
     cdef short soft_cr[352]
     cdef unsigned int words[448]
 
-    @cython.locals(light=double)
     cpdef begin(self, long long frame, long long tick, int samples)
-    @cython.locals(twice_hz='long long', turns=double, mean=double)
     cdef double _lamps(self, long long tick) except? -1.0
     cdef void put(self, int column, long long total, long long light) noexcept
     cdef int _shown(self, long long total, long long light) noexcept
-    @cython.locals(blocks=int)
     cdef void write(self, int row, int left, int width, bytearray out, int at) except *
     @cython.locals(levels='const unsigned char *', words='unsigned int *', part=int)
     cdef void _quantise(self, long long first, long long end, long long blocks, unsigned char* out,
@@ -42,5 +39,4 @@ cdef class Sensor:
     cdef void _soften(self, short* values, short* soft, long long left, long long width) noexcept
     @cython.locals(word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept
-    @cython.locals(column=int, after=int, before=int)
     cdef void _move(self, short* values, int first, int last, long long by) noexcept

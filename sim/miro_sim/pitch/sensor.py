@@ -72,8 +72,8 @@ def _tables(gamma: float, luma_noise: float, chroma_noise: float) -> tuple[list[
     """By brightness what is shown, and by draw the noise of Y and of Cb and Cr; all with four fraction bits."""
     shown = [0] + [math.floor(4080.0 * exp(gamma * log(value / 4095.0)) + 0.5) for value in range(1, 4096)]
     normals = _normals()
-    luma = [math.floor(normal * luma_noise / 4096.0 + 0.5) for normal in normals]
-    return shown, luma, [math.floor(normal * chroma_noise / 4096.0 + 0.5) for normal in normals]
+    luma = [math.floor(normal * luma_noise / 4096.0 + 0.5) + _ABOVE for normal in normals]
+    return shown, luma, [math.floor(normal * chroma_noise / 4096.0 + 0.5) + _ABOVE for normal in normals]
 
 
 @lru_cache(maxsize=8)
@@ -97,20 +97,12 @@ class Sensor:
         self.offset = math.floor(settings.offset * 4095.0 + 0.5)
         taps = _taps(settings.chroma_bandwidth_hz)
         self.reach = len(taps) - 1
-        self.taps = [0] * 72  # each for 8 pixels
-        for place in range(8, 8 * len(taps)):
-            self.taps[place] = taps[place // 8]
+        self.taps = [tap for tap in [0, *taps[1:], *[0] * 8][:9] for _ in range(8)]  # each for 8 pixels
         self.jitter = math.floor(settings.line_jitter_px * 256.0 + 0.5)
         self.side = self.reach + (1 if self.jitter else 0)
         self.levels = _levels(settings.bits)
-        self.gamma = [0] * 4096
-        self.luma_noise = [0] * 4096
-        self.chroma_noise = [0] * 4096
-        shown, luma, chroma = _tables(settings.gamma, settings.luma_noise, settings.chroma_noise)
-        for value in range(4096):
-            self.gamma[value] = shown[value]
-            self.luma_noise[value] = luma[value] + _ABOVE
-            self.chroma_noise[value] = chroma[value] + _ABOVE
+        shown, luma_noise, chroma_noise = _tables(settings.gamma, settings.luma_noise, settings.chroma_noise)
+        self.gamma, self.luma_noise, self.chroma_noise = shown, luma_noise, chroma_noise
         self.y = [0] * 352
         self.cb = [0] * 352
         self.cr = [0] * 352
@@ -124,8 +116,7 @@ class Sensor:
     def begin(self, frame: int, tick: int, samples: int) -> None:
         """A new frame, whose exposure has its middle at `tick`; a pixel is a sum of so many samples."""
         self.frame = frame
-        light = self.settings.gain * self._lamps(tick) / samples
-        self.scale = math.floor(light * 16777216.0 + 0.5)
+        self.scale = math.floor(self.settings.gain * self._lamps(tick) / samples * 16777216.0 + 0.5)
 
     def _lamps(self, tick: int) -> float:
         """The mean light of the lamps during the exposure; 1 on average over time."""
