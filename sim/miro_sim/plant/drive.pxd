@@ -84,6 +84,4 @@ cdef class DifferentialDrive(Plant):
     @cython.locals(still=cython.bint)
     cdef inline bint _stands(self) noexcept
     @cython.final
-    cdef inline void _stand(self, long long until, long long last) noexcept
-    @cython.final
     cdef int _move(self, int steps) except -1

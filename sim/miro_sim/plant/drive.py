@@ -46,10 +46,8 @@ class Decay:
         self.share = [dmath.exp(-ticks / tau) for tau in taus for ticks in range(LONGEST_STEP + 1)]
 
 
-@lru_cache(_KEPT)
-def _decay(taus: tuple[float, float]) -> Decay:
-    """One for all windings with these time constants (in ticks): it takes longer to make than all else of a robot."""
-    return Decay(taus)
+_decay = lru_cache(_KEPT)(Decay)
+"""One for all windings with these time constants (in ticks): it takes longer to make than all else of a robot."""
 
 
 class Winding:
@@ -211,10 +209,7 @@ class Quadrature:
     Inside a step the shaft turns evenly; an edge falls on the first integer tick at which p has the new count.
     """
 
-    STATE = {
-        "position": ("d", -_MOST_COUNTS, _MOST_COUNTS),
-        "count": ("q", -_MOST_COUNTS, _MOST_COUNTS),
-    }
+    STATE = {"position": ("d", -_MOST_COUNTS, _MOST_COUNTS), "count": ("q", -_MOST_COUNTS, _MOST_COUNTS)}
     NOT_STATE = ("counts_per_radian", "counts_per_turn", "chip", "positions", "counts")
 
     def __init__(self, counts_per_radian: float, counts_per_turn: int = 0) -> None:
@@ -412,7 +407,9 @@ class DifferentialDrive(Plant):
     def _run(self, until: int, last: int, left_tick: int, right_tick: int) -> None:
         """Steps that end by `until`, until one has ended at `last`; edges of PWM from these two ticks on."""
         if last <= left_tick and last <= right_tick and self._stands():
-            self._stand(until, last)
+            end = last if last <= until else until - (until - self.tick) % LONGEST_STEP
+            self.tick = max(self.tick, end)
+            self.next_tick = self.tick + LONGEST_STEP
             return
         left = self.left
         right = self.right
@@ -450,12 +447,6 @@ class DifferentialDrive(Plant):
         """Whether all steps up to the next edge of PWM change nothing."""
         still = self.body.left_rad_s == 0.0 and self.body.right_rad_s == 0.0 and self.rough is None
         return still and self.left_winding.rests() and self.right_winding.rests()
-
-    def _stand(self, until: int, last: int) -> None:
-        """The time of such steps."""
-        end = last if last <= until else until - (until - self.tick) % LONGEST_STEP
-        self.tick = max(self.tick, end)
-        self.next_tick = self.tick + LONGEST_STEP
 
     def _move(self, steps: int) -> None:
         """Posture and encoders follow what the shafts turned in these steps."""

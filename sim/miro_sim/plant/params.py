@@ -22,9 +22,7 @@ class Motor(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     inductance_h: Annotated[float, Within(1e-9, 1.0)] = 45e-6
     torque_constant_nm_a: Annotated[float, Within(1e-5, 10.0)] = 6.92e-3  # also V s / rad
     rotor_inertia_kg_m2: Annotated[float, Within(1e-13, 1e-2)] = 2.7e-7
-    friction_nm: Annotated[float, Within(0.0, 1.0)] = (
-        0.2e-3  # Coulomb, at the shaft: torque constant times 29 mA
-    )
+    friction_nm: Annotated[float, Within(0.0, 1.0)] = 0.2e-3  # Coulomb, at the shaft: that of 29 mA
 
 
 class Bridge(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -59,22 +57,14 @@ class Chassis(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     yaw_inertia_kg_m2: Annotated[float, Within(1e-6, 1e3)] = 4.7e-4  # 0.5 kg * (0.075**2 + 0.075**2) / 12
     track_m: Annotated[float, Within(1e-3, 10.0)] = 0.068
     wheel_radius_m: Annotated[float, Within(1e-3, 1.0)] = 0.020
-    left_radius_factor: Annotated[float, Within(0.1, 10.0)] = (
-        1.0  # real radius of this wheel / wheel_radius_m
-    )
+    left_radius_factor: Annotated[float, Within(0.1, 10.0)] = 1.0  # real radius / wheel_radius_m
     right_radius_factor: Annotated[float, Within(0.1, 10.0)] = 1.0
     gear_ratio: Annotated[float, Within(0.1, 1e3)] = 8.0
     gear_efficiency: Annotated[float, Within(0.01, 1.0)] = 0.8  # acts on the rolling resistance only
     rolling_resistance: Annotated[float, Within(0.0, 10.0)] = 0.03  # force / weight
-    stiction_ratio: Annotated[float, Within(1.0, 10.0)] = (
-        1.0  # friction of a shaft that stands / of one that turns
-    )
-    gear_backlash_rad: Annotated[float, Within(0.0, 0.2)] = (
-        0.0  # how far a wheel turns while its motor shaft is held
-    )
-    gear_load_friction: Annotated[float, Within(0.0, 0.5)] = (
-        0.0  # friction / torque in the gear, at the motor shaft
-    )
+    stiction_ratio: Annotated[float, Within(1.0, 10.0)] = 1.0  # friction of a standing / a turning shaft
+    gear_backlash_rad: Annotated[float, Within(0.0, 0.2)] = 0.0  # of a wheel while its motor shaft is held
+    gear_load_friction: Annotated[float, Within(0.0, 0.5)] = 0.0  # friction / torque, at the motor shaft
 
 
 class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -90,9 +80,7 @@ class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class Tyre(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
 
-    grip: Annotated[float | None, Within(0.01, 10.0)] = (
-        None  # of friction; rubber on a painted board about 0.8
-    )
+    grip: Annotated[float | None, Within(0.01, 10.0)] = None  # rubber on a painted board about 0.8
 
 
 class RollingBall(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -103,9 +91,7 @@ class RollingBall(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
     friction: Annotated[float, Within(0.0, 10.0)] = 0.0  # force / load of the ball, whichever way it goes
     load_share: Annotated[float, Within(0.0, 0.9)] = 0.2
-    behind_m: Annotated[float, Within(-0.1, 0.1)] = (
-        0.03  # behind the axle, on the middle line; negative: in front
-    )
+    behind_m: Annotated[float, Within(-0.1, 0.1)] = 0.03  # behind the axle's middle; negative: in front
 
 
 class Disturbance(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -2,10 +2,20 @@ cimport cython
 from miro_exact cimport dmath
 from miro_exact.rng cimport Stream
 from miro_sim.plant.chassis cimport Body
-from miro_sim.plant.disturbance cimport DisturbingForce
 
-cdef double TICK_S, PWM_TICKS, ALL_GRIP_N, NEAR
+cdef double TURN, TICKS_PER_S, TICK_S, PWM_TICKS, ALL_GRIP_N, NEAR
 cdef int SWEEPS, NEWTON_STEPS
+
+@cython.final
+cdef class DisturbingForce:
+    cdef readonly Stream stream
+    cdef readonly long long period_ticks
+    cdef readonly double constant_n, constant_nm, sine_n, sine_nm, noise_n, noise_nm
+    cdef readonly bint is_on, varies
+    cdef readonly double force_n, torque_nm
+
+    cpdef void at(self, long long tick) except *
+
 
 cdef class RoughBody(Body):
     cdef readonly DisturbingForce forces
