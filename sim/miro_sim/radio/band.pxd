@@ -32,7 +32,6 @@ cdef class Band:
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
     cdef int level(self, long long tick) except -1
-    cdef int _follow(self, long long sent) except -1
     @cython.locals(transmitter=Transmitter, line=Line, level=int, wrong=cython.bint, change='long long',
                    own_edge='long long', one_alone=cython.bint)
     cdef int _look(self, long long sent) except -1

@@ -85,20 +85,14 @@ class Band:
         """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error. It stays up to `change_tick`."""
         if tick >= self.change_tick:
             sent = tick - self.latency
-            if sent < self.alone_until:
-                self._follow(sent)
+            alone = self.alone
+            if sent < self.alone_until and alone is not None:  # its wire has an edge after the last query
+                alone.last_edge = alone.line.edge_at(sent)
+                self.known = alone.line.level_at(sent)
+                self.change_tick = min(alone.line.next_edge(sent), self.alone_until) + self.latency
             else:
                 self._look(sent)
         return self.known
-
-    def _follow(self, sent: int) -> None:
-        """One robot is alone on the air, and its wire has an edge after the last query."""
-        alone = self.alone
-        assert alone is not None
-        line = alone.line
-        alone.last_edge = line.edge_at(sent)
-        self.known = line.level_at(sent)
-        self.change_tick = min(line.next_edge(sent), self.alone_until) + self.latency
 
     def _look(self, sent: int) -> None:
         """Mixes all wires, and finds up to when what was found holds."""
@@ -153,7 +147,10 @@ class Band:
             transmitter.line.hear(tick)
 
     def full_tick(self) -> int:
-        """The first tick at which 2048 edges of one robot wait to be heard, NEVER_TICK if there is none."""
+        """The first tick at which 2048 edges of one robot wait to be heard, NEVER_TICK if there is none.
+
+        A robot whose wire is full stops; it goes on when this tick was received.
+        """
         tick = _NEVER
         for transmitter in self.transmitters:
             tick = min(tick, transmitter.line.full_tick())

@@ -10,10 +10,9 @@ cdef class Downlink:
     cdef readonly object params, seed, name
     cdef readonly Stream jitter, lost
     cdef readonly long long jitter_ticks, lost_threshold
-    cdef readonly bint punctual
     cdef readonly dict listeners
     cdef readonly Sender sender
-    cdef readonly list everyone, overheard, audience
+    cdef readonly list overheard, audience
     cdef readonly long long settled_tick, free_tick, busy_tick
 
     @cython.locals(late='long long', arrival='long long', link=Downlink, sender=Sender)

@@ -48,8 +48,8 @@ class Downlink:
         "overheard": [Sender],
     }
     NOT_STATE = (
-        *("audience", "everyone", "jitter", "jitter_ticks", "lost", "lost_threshold"),
-        *("name", "params", "punctual", "seed"),
+        *("audience", "jitter", "jitter_ticks", "lost", "lost_threshold"),
+        *("name", "params", "seed"),
     )
 
     def __init__(self, params: Radio, seed: int, name: str) -> None:
@@ -60,9 +60,7 @@ class Downlink:
         self.lost = Stream(seed, f"{name}/lost_frames")
         self.jitter_ticks = params.jitter_ticks
         self.lost_threshold = params.lost_frame_threshold
-        self.punctual = self.jitter_ticks == 0 and params.bit_ticks == HOST_BIT_TICKS
         self.listeners: dict[int, Listener] = {}
-        self.everyone: list[Listener] = []  # of them, in the order in which they were connected
         self.sender = Sender(params, params.crystal_offset_ppm)
         self.overheard: list[Sender] = []
         self.audience: list[tuple[Downlink, Sender]] = []
@@ -81,7 +79,6 @@ class Downlink:
             raise ValueError(f"{self.name}: robot {robot} is connected twice, or after tick 0")
         listener = Listener(line, self.params, self.seed, f"{self.name}/robot{robot}")
         self.listeners[robot] = listener
-        self.everyone.append(listener)
         line.settled_tick = 0  # an open wire stays at mark
         return listener
 
@@ -143,7 +140,7 @@ class Downlink:
         if until_tick <= self.settled_tick:
             return
         senders = [self.sender, *self.overheard]
-        for listener in self.everyone:
+        for listener in self.listeners.values():
             listener.fill(self.settled_tick, until_tick, senders, 0)
             listener.line.settled_tick = until_tick
         self.settled_tick = until_tick

@@ -170,14 +170,7 @@ class Listener:
         return level
 
     def hear_data(
-        self,
-        tick: int,
-        until: int,
-        start: int,
-        data: bytes,
-        stops: bytes,
-        senders: list[Sender],
-        rank: int,
+        self, tick: int, until: int, start: int, data: bytes, stops: bytes, senders: list[Sender], rank: int
     ) -> None:
         """Part of a transmission whose first start bit arrives at `start`."""
         sender = senders[rank]

@@ -11,6 +11,5 @@ cdef class Uplink:
     cdef int before, bit, shift
 
     cpdef list receive(self, long long until_tick)
-    cpdef long long full_tick(self) except? -1
     cdef void hunt(self, long long until) except *
     cdef void sample(self, long long until, list symbols) except *

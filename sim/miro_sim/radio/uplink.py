@@ -77,14 +77,6 @@ class Uplink:
         self.band.hear(self.now)
         return symbols
 
-    def full_tick(self) -> int:
-        """The first tick at which 2048 edges of one robot wait to be received, NEVER_TICK if there is none.
-
-        It depends on the wires' content and on `now` alone. A robot whose wire is full stops; it goes on when this
-        tick was received.
-        """
-        return self.band.full_tick()
-
     def known_tick(self, start_tick: int) -> int:
         """The first tick at which a symbol is known whose start bit began at `start_tick`."""
         return start_tick + (2 * _STOP + 1) * self.numerator // self.denominator + 1

@@ -180,7 +180,7 @@ class Network:
                 stopped = robot.run(tick) == STOPPED or stopped
             if stopped:
                 return True
-            full_tick = self.uplink.full_tick()
+            full_tick = self.uplink.band.full_tick()
             if full_tick >= tick:
                 return False
             self.hear(full_tick)
