@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar
 
+NOTHING: Mapping[str, float] = {}
 LARGEST = (1 << 63) - 1
 TYPES = {"d": "a finite float", "q": "an int of 64 bits", "?": "True or False"}
 LONGEST = 65536

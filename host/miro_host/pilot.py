@@ -16,7 +16,8 @@ from miro_exact.state import Items
 from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, EstimatorInput
 from miro_host.estimators.predict import NoEstimator
 from miro_host.integrator import Integrator
-from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
+from miro_host.laws.interface import Accelerations, Answer, Law, LawInput, Velocities
+from miro_host.memory import NOTHING
 from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at

@@ -59,7 +59,9 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
 
         entries = list(entry_points(group=self.group, name=name))
         if not entries:
-            raise PluginError(f"{name!r} is not one of the choices", self._choices(name))
+            names = self.names()
+            remedy = did_you_mean(name, names, use_one_of(names))
+            raise PluginError(f"{name!r} is not one of the choices", remedy)
         sources = [_source(entry) for entry in entries]
         if len(entries) > 1:
             raise PluginError(
@@ -72,10 +74,6 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
             what = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
             raise PluginError(what, f"repair or uninstall {sources[0]}") from error
         return self._checked(found, name, entry_point)
-
-    def _choices(self, name: str) -> str:
-        names = self.names()
-        return did_you_mean(name, names, use_one_of(names))
 
     def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
         """`found` if it is a struct of parameters as this kind of plug-in needs it."""

@@ -142,15 +142,10 @@ class Ekf(Estimator[EkfParameters]):
         posture = Posture(motion.x_m, motion.y_m, motion.theta_rad)
         return Estimate(effect_s, posture, state[3], state[4], self._named(posture, state))
 
-    def _named(self, posture: Posture, state: list[float]) -> dict[str, float]:
+    def _named(self, posture: Posture, state: list[float], *more: float) -> dict[str, float]:
         """The values in `INNER`."""
-        return {
-            "x_m": posture.x_m,
-            "y_m": posture.y_m,
-            "theta_rad": posture.theta_rad,
-            "left_factor": state[3],
-            "right_factor": state[4],
-        }
+        values = posture.x_m, posture.y_m, posture.theta_rad, state[3], state[4], *more
+        return dict(zip(self.INNER, values, strict=True))
 
     def _measure(self, given: EstimatorInput) -> None:
         """Takes what has arrived."""

@@ -98,13 +98,8 @@ class EkfTelemetry(Ekf):
         self.surprise = 0.0
         self.slip_m_s = 0.0
 
-    def _named(self, posture: Posture, state: list[float]) -> dict[str, float]:
-        return {
-            **super()._named(posture, state),
-            "slip_m_s": self.slip_m_s,
-            "warp_x_m": state[7],
-            "warp_y_m": state[8],
-        }
+    def _named(self, posture: Posture, state: list[float], *more: float) -> dict[str, float]:
+        return super()._named(posture, state, self.slip_m_s, state[7], state[8])
 
     def _measure(self, given: EstimatorInput) -> None:
         """The camera's measurement and a new answer, in the order of the instants that they tell of."""

@@ -19,32 +19,25 @@ cdef class Filter:
     cdef double column[9]
     cdef double lower[25]
 
-    @cython.locals(lower='double *')
     cdef int factorise(self, int size) except -1
     @cython.locals(total=double)
     cpdef bint finite(self)
     cpdef command(self, double left_m_s, double right_m_s, double effect_s, double period_s)
     cpdef start(self, double x_m, double y_m, double theta_rad, double at_s, double position_m2, double heading_rad2)
-    cpdef forget(self, int index, double variance)
+    cdef int forget(self, int index) except -1
     cpdef run(self, double to_s)
-    @cython.locals(p='double *')
     cpdef predict(self, double to_s)
+    cdef int move(self, int state, int other) except -1
     cpdef loosen(self, double position_m2, double heading_rad2)
-    @cython.locals(p='double *', column='double *')
     cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
-    @cython.locals(p='double *')
     cdef int warp_on(self, double way_m) noexcept
-    @cython.locals(p='double *', lower='double *')
-    cpdef decompose(self, double position_m2, double heading_rad2)
-    @cython.locals(lower='double *')
+    cdef int decompose(self, double position_m2, double heading_rad2) except -1
     cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,
                            double heading_rad2) except? -7.5
-    @cython.locals(p='double *')
     cpdef double along_m2(self, double cos, double sin, double position_m2) except? -7.5
     @cython.locals(warp=cython.bint)
     cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
     @cython.locals(believed=cython.bint)
     cpdef bint count(self, int extra, double extra_m, double variance, double gate)
-    @cython.locals(p='double *', column='double *')
     cdef int correct(self, int one, int other, double innovation, double variance) except -1
     cdef int tidy(self) except -1

@@ -139,7 +139,7 @@ class Filter:
         """Posture as measured, with the variances of the measurement; the wheel factors as they are."""
         for index in range(_N):
             if index != 3 and index != 4:
-                self.forget(index, 0.0)
+                self.forget(index)
         self.covariance[0] = position_m2
         self.covariance[_N + 1] = position_m2
         self.covariance[2 * _N + 2] = heading_rad2
@@ -152,13 +152,12 @@ class Filter:
         self.at_s = at_s
         self.known = 1
 
-    def forget(self, index: int, variance: float) -> None:
-        """A state that is 0 with this variance, and has to do with no other."""
+    def forget(self, index: int) -> None:
+        """A state that is 0 for certain, and has to do with no other."""
         self.state[index] = 0.0
         for other in range(_N):
             self.covariance[index * _N + other] = 0.0
             self.covariance[other * _N + index] = 0.0
-        self.covariance[index * _N + index] = variance
 
     def run(self, to_s: float) -> None:
         """Moves a copy of the posture on; the result stands in `motion`."""
@@ -174,30 +173,8 @@ class Filter:
         middle = self.state[2] + 0.5 * dmath.wrap_pi(motion.theta_rad - self.state[2])
         p = self.covariance
         n = self.size
-        for j in range(n):  # F P, the rows of x, y and theta in this order
-            p[j] += (
-                motion.x_by_theta * p[2 * _N + j]
-                + motion.x_by_left * p[3 * _N + j]
-                + motion.x_by_right * p[4 * _N + j]
-            )
-            p[_N + j] += (
-                motion.y_by_theta * p[2 * _N + j]
-                + motion.y_by_left * p[3 * _N + j]
-                + motion.y_by_right * p[4 * _N + j]
-            )
-            p[2 * _N + j] += motion.theta_by_left * p[3 * _N + j] + motion.theta_by_right * p[4 * _N + j]
-        for i in range(n):  # (F P) F^T, the columns
-            p[i * _N] += (
-                motion.x_by_theta * p[i * _N + 2]
-                + motion.x_by_left * p[i * _N + 3]
-                + motion.x_by_right * p[i * _N + 4]
-            )
-            p[i * _N + 1] += (
-                motion.y_by_theta * p[i * _N + 2]
-                + motion.y_by_left * p[i * _N + 3]
-                + motion.y_by_right * p[i * _N + 4]
-            )
-            p[i * _N + 2] += motion.theta_by_left * p[i * _N + 3] + motion.theta_by_right * p[i * _N + 4]
+        self.move(_N, 1)  # F P
+        self.move(1, _N)  # (F P) F^T
         p[0] += self.position_m * self.position_m * time_s
         p[_N + 1] += self.position_m * self.position_m * time_s
         p[2 * _N + 2] += self.heading_rad * self.heading_rad * time_s
@@ -219,6 +196,20 @@ class Filter:
         self.left_m += motion.left_m
         self.right_m += motion.right_m
         self.at_s = to_s
+
+    def move(self, state: int, other: int) -> None:
+        """Multiplies the covariance by F, whose rows (or columns) of x, y and theta change in this order.
+
+        Numbers of two neighbouring states are `state` apart, those of one state with two others `other`.
+        """
+        p = self.covariance
+        motion = self.motion
+        for index in range(self.size):
+            x = index * other
+            y, theta, left, right = x + state, x + 2 * state, x + 3 * state, x + 4 * state
+            p[x] += motion.x_by_theta * p[theta] + motion.x_by_left * p[left] + motion.x_by_right * p[right]
+            p[y] += motion.y_by_theta * p[theta] + motion.y_by_left * p[left] + motion.y_by_right * p[right]
+            p[theta] += motion.theta_by_left * p[left] + motion.theta_by_right * p[right]
 
     def loosen(self, position_m2: float, heading_rad2: float) -> None:
         """Adds variances to the posture: something unknown moved the robot."""
@@ -307,7 +298,7 @@ class Filter:
         if believed:
             self.correct(extra, NONE, innovation, variance)
             self.tidy()
-        self.forget(extra, 0.0)
+        self.forget(extra)
         if extra == 5:
             self.left_m = 0.0
         else:

@@ -12,12 +12,11 @@ from typing import Any, ClassVar, Generic, TypeVar, get_args
 import msgspec
 from msgspec import Meta
 
-from miro_host.memory import Remembering
+from miro_host.memory import NOTHING, Remembering
 from miro_host.posture import Posture
 from miro_host.registries import AnyEstimator
 from miro_host.telemetry_receiver import LastTelemetry
 
-NOTHING: Mapping[str, float] = {}
 DEAD_S = 0.028
 """3 ms of computing, 1 ms of key-up, 24 ms on the air in a network of three robots."""
 

@@ -83,18 +83,10 @@ class Motion:
         self.x_m = x_m
         self.y_m = y_m
         self.theta_rad = theta_rad
-        self.left_m = 0.0
-        self.right_m = 0.0
-        self.left_m2 = 0.0
-        self.right_m2 = 0.0
-        self.x_by_theta = 0.0
-        self.x_by_left = 0.0
-        self.x_by_right = 0.0
-        self.y_by_theta = 0.0
-        self.y_by_left = 0.0
-        self.y_by_right = 0.0
-        self.theta_by_left = 0.0
-        self.theta_by_right = 0.0
+        self.left_m = self.right_m = self.left_m2 = self.right_m2 = 0.0
+        self.x_by_theta = self.x_by_left = self.x_by_right = 0.0
+        self.y_by_theta = self.y_by_left = self.y_by_right = 0.0
+        self.theta_by_left = self.theta_by_right = 0.0
 
     def run(
         self,
@@ -112,12 +104,8 @@ class Motion:
             index = int(oldest)
         while index >= 0:
             since_s = effect_s - (index + 1) * period_s
-            begin_s = from_s - since_s
-            if begin_s < 0.0:
-                begin_s = 0.0
-            end_s = to_s - since_s
-            if end_s > period_s:
-                end_s = period_s
+            begin_s = max(from_s - since_s, 0.0)
+            end_s = min(to_s - since_s, period_s)
             if begin_s < end_s:
                 self.hold(index, begin_s, end_s, left_factor, right_factor)
             index -= 1
@@ -130,11 +118,8 @@ class Motion:
         right_to = self.right_to_m_s[index]
         left_s = abs(left_to - left_start) / self.slope_m_s2
         right_s = abs(right_to - right_start) / self.slope_m_s2
-        first_s = left_s
-        second_s = right_s
-        if right_s < left_s:
-            first_s = right_s
-            second_s = left_s
+        first_s = min(left_s, right_s)
+        second_s = max(left_s, right_s)
         from_s = begin_s
         for cut in range(3):
             to_s = end_s

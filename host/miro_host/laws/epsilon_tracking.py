@@ -139,12 +139,7 @@ class EpsilonTracking(Law[EpsilonTrackingParameters]):
 
 
 THEORY = EpsilonTrackingParameters(
-    epsilon_rad=0.2,
-    alpha_per_s=3.0,
-    beta_per_s=22.0,
-    length_m=0.1,
-    switching="sign",
-    max_v_m_s=0.95,
+    epsilon_rad=0.2, alpha_per_s=3.0, beta_per_s=22.0, length_m=0.1, switching="sign", max_v_m_s=0.95
 )
 ILLUSTRATIVE = EpsilonTrackingParameters(
     epsilon_rad=0.06,

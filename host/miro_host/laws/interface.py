@@ -21,13 +21,11 @@ import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.integrator import Limits
-from miro_host.memory import Remembering
+from miro_host.memory import NOTHING, Remembering
 from miro_host.posture import Posture
 from miro_host.references.interface import Reference, Trajectory
 from miro_host.registries import Controller
 from miro_host.telemetry_receiver import LastTelemetry
-
-NOTHING: Mapping[str, float] = {}
 
 
 class LawInput(msgspec.Struct, frozen=True, gc=False):

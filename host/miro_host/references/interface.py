@@ -5,7 +5,6 @@ scenario's `reference` table, and the trajectory that it makes, a function of ti
 """
 
 import math
-from collections.abc import Iterator
 from typing import Annotated, Protocol, runtime_checkable
 
 import msgspec
@@ -106,7 +105,7 @@ class CheckedReference:
                 raise ValueError(f"`at` returned {found!r:.40}, which is no Reference")
             if not isinstance(found.posture, Posture):
                 raise ValueError(f"its posture is {found.posture!r:.60}, which is no Posture")
-            for value in _numbers(found):
+            for value in (*msgspec.structs.astuple(found.posture), *msgspec.structs.astuple(found)[1:]):
                 if type(value) is not float or not math.isfinite(value):
                     raise ValueError(f"it returned {found!r}; all must be finite floats")
         except (Exception, SystemExit) as error:
@@ -115,12 +114,6 @@ class CheckedReference:
             what = f"reference {self.name!r} failed at {t_s:.6f} s: {at_place(reason, place)}"
             raise PluginError(what, "mend the reference or its parameters") from error
         return found
-
-
-def _numbers(found: Reference) -> Iterator[object]:
-    posture, *rates = msgspec.structs.astuple(found)
-    yield from msgspec.structs.astuple(posture)
-    yield from rates
 
 
 ORIGIN_M = 1e-8

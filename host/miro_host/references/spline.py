@@ -94,15 +94,9 @@ def spline(
     """The pieces between points in m with these headings in rad; `closed`: with one from the last to the first."""
     count = len(points)
     ends = [(i, (i + 1) % count) for i in range(count if closed else count - 1)]
-    tangents = []
-    for heading in headings:
-        sin, cos = sincos(heading)
-        tangents.append((cos, sin))
-    lengths, bends = [], []
-    for i, j in ends:
-        length, bend = _arc_like(points[i], points[j], headings[i], headings[j])
-        lengths.append(length)
-        bends.append(bend)
+    tangents = [(cos, sin) for sin, cos in map(sincos, headings)]
+    arcs = (_arc_like(points[i], points[j], headings[i], headings[j]) for i, j in ends)
+    lengths, bends = zip(*arcs, strict=True)
     curvatures = []
     for i in range(count):
         before = i - 1 if i > 0 or closed else None

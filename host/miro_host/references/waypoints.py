@@ -174,12 +174,8 @@ class WaypointsRef(ReferenceParameters, frozen=True, kw_only=True, tag="waypoint
         if not 2 <= count <= MOST_POINTS:
             raise ValueError(f"points: there are {count}; give 2 to {MOST_POINTS}")
         for number, point in enumerate(self.points):
-            for key, value in (
-                ("x_cm", point.x_cm),
-                ("y_cm", point.y_cm),
-                ("heading_deg", point.heading_deg or 0.0),
-            ):
-                if not math.isfinite(value):
+            for key, value in msgspec.structs.asdict(point).items():
+                if value is not None and not math.isfinite(value):
                     raise ValueError(f"points[{number}].{key}: {value} is not a number that can be used")
         for number in range(count if self.closed else count - 1):
             here, there = self.points[number], self.points[(number + 1) % count]
