@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 
@@ -65,11 +65,6 @@ def parse(text: str, kind: type[T], origin: str) -> T:
         table = tables(text)
     except TomlError as error:
         raise EyeError(origin, error.place, error.what, error.remedy or "mend the text") from None
-    return of_table(table, kind, origin)
-
-
-def of_table(table: dict[str, Any], kind: type[T], origin: str) -> T:
-    """The struct in a table that TOML text gave. Raises EyeError as `parse` does."""
     try:
         check_numbers(table)
         return struct_of(table, kind)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from miro_exact.state import Rows
+from miro_exact.state import TICK, Rows
 from miro_host.eye.track import Sighting
 
 
@@ -24,7 +24,6 @@ class Pixels(Protocol):
 
 Sightings = tuple[Sighting | None, ...]
 _NUMBER = ("d", -1e6, 1e6)
-_TICK = ("q", 0, 1 << 62)
 
 
 def _split(sighting: Sighting | None) -> tuple[bool, float, float, float, int, float]:
@@ -38,7 +37,7 @@ class Grabber:
 
     STATE = {
         "under_way": Rows(
-            *(1 << 10, "?", _NUMBER, _NUMBER, _NUMBER, _TICK, _NUMBER),
+            *(1 << 10, "?", _NUMBER, _NUMBER, _NUMBER, TICK, _NUMBER),
             split=_split,
             make=lambda cells: Sighting(*cells[1:]) if cells[0] else None,
         )

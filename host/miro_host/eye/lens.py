@@ -23,13 +23,10 @@ class Lens:
 
     def __init__(self, parameters: CameraParameters) -> None:
         self.parameters = parameters
-        self.x_m = parameters.x_m
-        self.y_m = parameters.y_m
-        self.height_m = parameters.height_m
+        self.x_m, self.y_m, self.height_m = parameters.x_m, parameters.y_m, parameters.height_m
         self.focal_u = parameters.focal_px
         self.focal_v = parameters.focal_px * parameters.pixel_aspect
-        self.centre_u = parameters.centre_u_px
-        self.centre_v = parameters.centre_v_px
+        self.centre_u, self.centre_v = parameters.centre_u_px, parameters.centre_v_px
         self.k1 = parameters.k1
         sx, cx = sincos(parameters.tilt_x_rad)
         sy, cy = sincos(parameters.tilt_y_rad)
@@ -38,8 +35,7 @@ class Lens:
         self.xa, self.xb, self.xc = cy * cz, 0.0 - cy * sz, sy
         self.ya, self.yb, self.yc = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, 0.0 - sx * cy
         self.za, self.zb, self.zc = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
-        self.out_x = 0.0
-        self.out_y = 0.0
+        self.out_x = self.out_y = 0.0
 
     def __repr__(self) -> str:
         return f"Lens({self.parameters!r})"

@@ -1,6 +1,6 @@
 cimport cython
-from miro_host.eye.lens cimport Lens
 from miro_host.eye.regions cimport Regions
+from miro_host.eye.top cimport Top
 
 cdef int _MOST, _TEAMS, _IDENTITIES
 cdef double _FAR
@@ -8,10 +8,8 @@ cdef double _FAR
 
 @cython.final
 cdef class Patches:
-    cdef readonly Lens lens
     cdef readonly Regions regions
-    cdef double z_m, least_m, most_m
-    cdef readonly int least_area, most_area
+    cdef Top robot_top
     cdef readonly int count, left, top, expected
     cdef int index[170]
     cdef double x_m[170]
@@ -31,7 +29,5 @@ cdef class Patches:
     cdef bint is_whole(self, int patch, int kind) noexcept
     cdef bint fits(self, int one, int other) noexcept
     cdef void take(self, int one, int other) noexcept
-    @cython.locals(least=double, off=double)
     cdef double off_m(self, int team, int identity) noexcept
-    @cython.locals(of_team=bint)
     cdef int partners(self, int patch) noexcept

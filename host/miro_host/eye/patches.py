@@ -1,7 +1,7 @@
 """Pairs of patches in one window: which regions can be the top of a robot.
 
-A region is a patch if its area is between `least_area` and `most_area`. It is whole if it does not touch the border of
-the window; only whole patches make a pair. A pair is contested if one of its patches could also belong to a patch of
+A region is a patch if its area is within the bounds of `Top`. It is whole if it does not touch the border of the
+window; only whole patches make a pair. A pair is contested if one of its patches could also belong to a patch of
 another robot: any team's or identity's colour at the pattern's distance, whole or not.
 
 How far a pair is from an expected posture is the root mean square of the distances of its two patches from their
@@ -32,10 +32,8 @@ class Patches:
     NOT_STATE = ("*",)
 
     def __init__(self, regions: Regions, top: Top) -> None:
-        self.lens, self.z_m = top.lens, top.z_m
         self.regions = regions
-        self.least_m, self.most_m = top.distances_m()
-        self.least_area, self.most_area = top.areas()
+        self.robot_top = top
         self.count = self.left = self.top = self.expected = 0
         self.index = [0] * 170
         self.x_m = [0.0] * 170
@@ -65,7 +63,7 @@ class Patches:
         """Adds a patch, unless the lens could not draw it where it is."""
         u, v = self.regions.centroid(region)
         try:
-            x_m, y_m = self.lens.ground(self.left + u, self.top + v, self.z_m)
+            x_m, y_m = self.robot_top.lens.ground(self.left + u, self.top + v, self.robot_top.z_m)
         except ValueError:
             return
         self.index[self.count] = region
@@ -78,7 +76,8 @@ class Patches:
         area = self.regions.area[region]
         if self.regions.touches[region]:
             area += area
-        return self.least_area <= area and self.regions.area[region] <= self.most_area
+        top = self.robot_top
+        return top.least_area <= area and self.regions.area[region] <= top.most_area
 
     def expect_nothing(self) -> None:
         """Any pair is as good as any other."""
@@ -114,8 +113,8 @@ class Patches:
         """Whether two patches are as far from each other as those of a robot."""
         dx = self.x_m[one] - self.x_m[other]
         dy = self.y_m[one] - self.y_m[other]
-        square = dx * dx + dy * dy
-        return self.least_m * self.least_m <= square and square <= self.most_m * self.most_m
+        least_m, most_m = self.robot_top.least_m, self.robot_top.most_m
+        return least_m * least_m <= dx * dx + dy * dy <= most_m * most_m
 
     def take(self, one: int, other: int) -> None:
         """A pair was found: it is the nearest so far, or it may be the second."""

@@ -33,5 +33,4 @@ cdef class Regions:
     cdef void join(self, int one, int other) noexcept
     cdef int root(self, int run) noexcept
     cdef void collect(self) noexcept
-    cdef void begin(self, int run) noexcept
     cdef void add(self, int index, int run) noexcept

@@ -83,15 +83,8 @@ class Regions:
         if not 0 <= index < self.count:
             raise IndexError(f"region {index} of {self.count}")
         return Region(
-            self.kind[index],
-            self.area[index],
-            self.left[index],
-            self.top[index],
-            self.right[index],
-            self.bottom[index],
-            self.sum_u[index],
-            self.sum_v[index],
-            bool(self.touches[index]),
+            *(self.kind[index], self.area[index], self.left[index], self.top[index], self.right[index]),
+            *(self.bottom[index], self.sum_u[index], self.sum_v[index], bool(self.touches[index])),
         )
 
     def centroid(self, index: int) -> tuple[float, float]:
@@ -148,12 +141,8 @@ class Regions:
 
     def join(self, one: int, other: int) -> None:
         """Makes one tree of both; its root is the earliest run."""
-        one = self.root(one)
-        other = self.root(other)
-        if one < other:
-            self.parent[other] = one
-        else:
-            self.parent[one] = other
+        one, other = self.root(one), self.root(other)
+        self.parent[max(one, other)] = min(one, other)
 
     def root(self, run: int) -> int:
         """The root of a run's tree; halves the way to it (Tarjan and van Leeuwen 1984)."""
@@ -167,20 +156,15 @@ class Regions:
         self.count = 0
         for run in range(self.runs):
             root = self.root(run)
-            if root == run:
-                self.begin(run)
+            if root == run:  # a new, empty region
+                index = self.count
+                self.count += 1
+                self.label[run] = index
+                self.kind[index] = self.run_kind[run]
+                self.area[index] = self.sum_u[index] = self.sum_v[index] = self.touches[index] = 0
+                self.left[index], self.right[index] = self.width, 0
+                self.top[index] = self.run_row[run]
             self.add(self.label[root], run)
-
-    def begin(self, run: int) -> None:
-        """A new, empty region of this run's class."""
-        index = self.count
-        self.count += 1
-        self.label[run] = index
-        self.kind[index] = self.run_kind[run]
-        self.area[index] = self.sum_u[index] = self.sum_v[index] = self.touches[index] = 0
-        self.left[index] = self.width
-        self.right[index] = 0
-        self.top[index] = self.run_row[run]
 
     def add(self, index: int, run: int) -> None:
         """A run becomes part of a region."""
@@ -190,10 +174,8 @@ class Regions:
         self.area[index] += end - start
         self.sum_u[index] += (end - start) * (end + start)  # of 2 i + 1 for i from start to end - 1
         self.sum_v[index] += (end - start) * (2 * row + 1)
-        if start < self.left[index]:
-            self.left[index] = start
-        if end > self.right[index]:
-            self.right[index] = end
+        self.left[index] = min(self.left[index], start)
+        self.right[index] = max(self.right[index], end)
         self.bottom[index] = row + 1
         if start == 0 or end == self.width or row == 0 or row == self.height - 1:
             self.touches[index] = 1

@@ -18,7 +18,8 @@ class Top:
     """A pattern under a calibration. Constant.
 
     `angle_rad`: of the vector from identity patch to team patch in robot axes, `distance_m` its length. `z_m`: height
-    at which pixels are evaluated. `area_px`, `side_px`: of a patch under the camera.
+    at which pixels are evaluated. `area_px`, `side_px`: of a patch under the camera. `least_m`, `most_m`: distance of
+    two patches that are a pair; `least_area`, `most_area`: of a patch in px.
     """
 
     NOT_STATE = ("*",)
@@ -35,18 +36,12 @@ class Top:
         fall_m = self.lens.height_m - self.z_m
         self.area_px = self.lens.focal_u * self.lens.focal_v * patch_m * patch_m / (fall_m * fall_m)
         self.side_px = math.sqrt(self.area_px)
+        reach_m = _DISTANCE * self.distance_m
+        self.least_m, self.most_m = self.distance_m - reach_m, self.distance_m + reach_m
+        self.least_area, self.most_area = math.ceil(_LEAST * self.area_px), math.floor(_MOST * self.area_px)
 
     def __repr__(self) -> str:
         return f"Top({self.pattern!r}, {self.distance_m * 1000.0:.1f} mm, {self.area_px:.1f} px)"
-
-    def distances_m(self) -> tuple[float, float]:
-        """Least and most distance of two patches that are a pair."""
-        reach = _DISTANCE * self.distance_m
-        return self.distance_m - reach, self.distance_m + reach
-
-    def areas(self) -> tuple[int, int]:
-        """Least and most area of a patch in px."""
-        return math.ceil(_LEAST * self.area_px), math.floor(_MOST * self.area_px)
 
     def places(self, x_m: float, y_m: float, theta_rad: float) -> tuple[float, float, float, float]:
         """x, y of the team patch and of the identity patch of a robot, in m."""

@@ -10,7 +10,6 @@ cdef class Track:
     cdef public long long seen, tick, before_tick
     cdef public double x_m, y_m, theta_rad, before_x_m, before_y_m, before_theta_rad
 
-    cpdef (double, double, double) last(self) noexcept
     @cython.locals(tick='long long')
     cpdef remember(self, sighting)
     cdef double unseen_s(self, long long tick) noexcept

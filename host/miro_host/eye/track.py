@@ -49,27 +49,17 @@ class Track:
     }
 
     def __init__(self) -> None:
-        self.seen = 0
-        self.tick = 0
-        self.x_m = 0.0
-        self.y_m = 0.0
-        self.theta_rad = 0.0
-        self.before_tick = 0
-        self.before_x_m = 0.0
-        self.before_y_m = 0.0
-        self.before_theta_rad = 0.0
+        self.seen = self.tick = self.before_tick = 0
+        self.x_m = self.y_m = self.theta_rad = 0.0
+        self.before_x_m = self.before_y_m = self.before_theta_rad = 0.0
 
     def __repr__(self) -> str:
-        return f"Track(seen={self.seen}, tick={self.tick}, {self.last()!r})"
+        return f"Track(seen={self.seen}, tick={self.tick}, {(self.x_m, self.y_m, self.theta_rad)})"
 
     def after_load(self) -> None:
         """Raises ValueError for two sightings in the wrong order."""
         if self.seen == 2 and self.before_tick >= self.tick:
             raise ValueError(f"the sighting before tick {self.tick} has tick {self.before_tick}")
-
-    def last(self) -> tuple[float, float, float]:
-        """x, y and heading when it was seen last; zeros if it never was."""
-        return self.x_m, self.y_m, self.theta_rad
 
     def remember(self, sighting: Sighting) -> None:
         """Takes the next sighting; one of the same tick replaces the last, an older one starts again."""
@@ -99,7 +89,7 @@ class Track:
         """x, y and heading at a tick if it goes and turns on as between its last two sightings."""
         gap_s = (self.tick - self.before_tick) / TICKS_PER_SECOND
         if self.seen < 2 or gap_s > LONGEST_GAP_S:
-            return self.last()
+            return self.x_m, self.y_m, self.theta_rad
         ahead = max(0.0, min(self.unseen_s(tick), LONGEST_AHEAD_S)) / gap_s
         dx, dy = self.x_m - self.before_x_m, self.y_m - self.before_y_m
         length_m = math.sqrt(dx * dx + dy * dy)

@@ -270,7 +270,7 @@ class Tracker:
         team, identity = patches.out_team, patches.out_identity
         if self.weighted:
             weighing = self.weighings[slot]
-            weighing.centroids(pixels, regions, team, identity, patches.least_area)
+            weighing.centroids(pixels, regions, team, identity, self.top.least_area)
             team_u, team_v = weighing.centroid(0)
             identity_u, identity_v = weighing.centroid(1)
         else:

@@ -24,7 +24,6 @@ cdef class Scene:
     cdef bint _near_ball(self, int pixel) noexcept
     @cython.locals(paint=int)
     cdef bint shows_ball(self, int pixel) noexcept
-    cdef inline long long _light(self, int pixel) noexcept
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef void _light_up(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef inline int behind(self, int pixel) noexcept

@@ -101,13 +101,6 @@ class Scene:
         least, most = max(min(x, end_x), min(y, end_y)), min(max(x, end_x), max(y, end_y))
         return least <= far and most >= 0 - far
 
-    def _light(self, pixel: int) -> int:
-        """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
-        x = self.rays.middle_x[pixel] - self.middle_x
-        y = self.rays.middle_y[pixel] - self.middle_y
-        lost = (x * x + y * y >> 20) * self.falloff >> 32
-        return 4096 - lost if lost < 4096 else 0
-
     def show(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
         """Puts the pixels of a line into the sensor's; `instants`: how many times their samples are added."""
         known_first, known_end = self.lit_first[row], self.lit_end[row]
@@ -123,11 +116,13 @@ class Scene:
         _copy(self.cr, pixel, sensor.cr, first + _PAD, end - first)
 
     def _light_up(self, sensor: Sensor, row: int, first: int, end: int, instants: int) -> None:
-        """Keeps what the sensor makes of pixels."""
+        """Keeps what the sensor makes of pixels, with less light further from the middle: by the square."""
         for column in range(first, end):
             pixel = row * _WIDTH + column
             self.behind(pixel)
-            self.light[pixel] = self._light(pixel)
+            x = self.rays.middle_x[pixel] - self.middle_x
+            y = self.rays.middle_y[pixel] - self.middle_y
+            self.light[pixel] = 4096 - min((x * x + y * y >> 20) * self.falloff >> 32, 4096)
             sensor.put(column, self.total[pixel] * instants, self.light[pixel])
             self.y[pixel] = sensor.y[column + _PAD]
             self.cb[pixel] = sensor.cb[column + _PAD]

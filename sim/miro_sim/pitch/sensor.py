@@ -92,8 +92,7 @@ class Sensor:
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
         self.settings = settings
         self.stream = stream
-        self.frame = 0
-        self.scale = 0
+        self.frame = self.scale = 0
         self.offset = math.floor(settings.offset * 4095.0 + 0.5)
         taps = _taps(settings.chroma_bandwidth_hz)
         self.reach = len(taps) - 1
@@ -103,11 +102,8 @@ class Sensor:
         self.levels = _levels(settings.bits)
         shown, luma_noise, chroma_noise = _tables(settings.gamma, settings.luma_noise, settings.chroma_noise)
         self.gamma, self.luma_noise, self.chroma_noise = shown, luma_noise, chroma_noise
-        self.y = [0] * 352
-        self.cb = [0] * 352
-        self.cr = [0] * 352
-        self.soft_cb = [0] * 352
-        self.soft_cr = [0] * 352
+        self.y, self.cb, self.cr = [0] * 352, [0] * 352, [0] * 352
+        self.soft_cb, self.soft_cr = [0] * 352, [0] * 352
         self.words = [0] * 448
 
     def __repr__(self) -> str:
@@ -212,12 +208,10 @@ class Sensor:
 
     def _move(self, values: list[int], first: int, last: int, by: int) -> None:
         """Each value becomes that `by`/256 pixels to its right; beyond the picture it is as at its border."""
-        first, last = first + _PAD, last + _PAD
-        if by >= 0:
-            for column in range(first, last + 1):
-                after = values[column + 1 if column + 1 < _PAD + _WIDTH else column]
-                values[column] += (after - values[column]) * by >> 8
-        else:
-            for column in range(last, first - 1, -1):
-                before = values[column - 1 if column > _PAD else column]
-                values[column] += (before - values[column]) * (0 - by) >> 8
+        step = 1 if by >= 0 else -1
+        column = _PAD + (first if by >= 0 else last)
+        border = _PAD + (_WIDTH - 1 if by >= 0 else 0)
+        for _ in range(first, last + 1):
+            beside = values[column if column == border else column + step]
+            values[column] += (beside - values[column]) * step * by >> 8
+            column += step

@@ -222,11 +222,11 @@ def test_a_sighting_older_than_the_last_one_begins_anew():
     for tick in (800_800, 1_601_600, 100):
         track.remember(Sighting(0.3, 0.2, 0.1, tick, 1.0))
     assert track.seen == 1
-    assert track.predicted(800_900) == track.last()
+    assert track.predicted(800_900) == (track.x_m, track.y_m, track.theta_rad)
 
 
 def test_a_prediction_for_a_time_before_the_last_sighting_is_the_sighting():
     track = Track()
     track.remember(Sighting(0.3, 0.2, 0.1, 1 << 60, 1.0))
     track.remember(Sighting(0.4, 0.2, 0.2, (1 << 60) + 1, 1.0))
-    assert track.predicted(800_800) == track.last()
+    assert track.predicted(800_800) == (track.x_m, track.y_m, track.theta_rad)
