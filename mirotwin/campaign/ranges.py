@@ -42,7 +42,9 @@ def is_range(value: Any) -> bool:
 
 def draw_of(key: str, value: Any) -> Draw:
     """The draw of the scenario's `key`. Raises TomlError."""
-    if isinstance(value, dict) and CHOOSE in value:
+    if not isinstance(value, dict):
+        raise TomlError(f"expected a range, got {value!r}", "write { from = .., to = .. }")
+    if CHOOSE in value:
         return Draw(key, choices=struct_of(value, Choice).choose)
     found = struct_of(value, Range)
     low, high, scale, whole = msgspec.structs.astuple(found)

@@ -168,6 +168,13 @@ def test_what_is_no_range_is_refused_with_its_place(text):
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize("text", ["3", "[0.001, 0.02]", "{ low = 0.001, high = 0.02 }"])
+def test_how_a_range_is_written_is_told_where_there_is_none(text):
+    document = f'scenario = "fig6"\n[random]\ncount = 1\n[random.range]\nhost.compute_s = {text}\n'
+    with pytest.raises(BadInput, match=r"expected a range, got .*; write { from = .., to = .. }$"):
+        parse(document, "c.toml")
+
+
 @given(st.text(max_size=80) | st.lists(st.sampled_from(SHORT.split()), max_size=30).map("\n".join))
 def test_any_other_text_is_a_campaign_or_is_refused(text):
     with contextlib.suppress(BadInput):
