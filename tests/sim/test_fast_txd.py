@@ -84,7 +84,6 @@ def test_what_the_pc_hears_of_it_is_what_it_would_hear_of_one_endless_line():
     network = Unheard(whole.scenario.networks[0], whole.scenario, 0, whole.seed, whole.image, None)
     whole.networks[:] = [network]
     whole.bodies = Bodies(network.robots)
-    network.show(network.robots)
     for _ in range(2):
         assert piecewise.step() == whole.step()
 
