@@ -79,7 +79,9 @@ def report(options: ReportOptions) -> int:
         remedy = f"`mirotwin campaign page {subject}` makes its page"
         raise BadInput(subject, "", "holds the results of a campaign", remedy)
     checked_sources(options.sources)
-    return write_page(place, page_of(options), options.quiet)
+    made = page_of(options)
+    check_size(made, subject, SMALLER)
+    return write_page(place, made, options.quiet)
 
 
 def is_campaign(subject: str) -> bool:
@@ -101,11 +103,8 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
     job = load_job(file, wanted.firmware)
     if job.origin:
-        page = port_page(job, wanted.quiet)
-    else:
-        page = run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name))
-    check_size(page, wanted.subject, SMALLER)
-    return page
+        return port_page(job, wanted.quiet)
+    return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name))
 
 
 def leave_page(folder: Path, name: str = "") -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from mirotwin.fuzz.oracle import RobotOracle
 from mirotwin.fuzz.target import RobotTarget
+from mirotwin.report.page import document
 from mirotwin.verify.steps.running import collect
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
@@ -192,7 +193,8 @@ def test_the_examples_pass_from_a_user_s_folder(mirotwin, folder):
     assert out.splitlines()[-1] == "3 passed"
 
 
-def test_pages_are_made_when_they_are_asked_for(mirotwin, folder):
+def test_pages_are_made_when_they_are_asked_for_however_large_they_are(mirotwin, folder, monkeypatch):
+    monkeypatch.setattr(document, "MOST_BYTES", 1000)
     for more, pages in (((), 0), (("--pages",), 1)):
         assert mirotwin("test", "hil/sub/d.scenario.toml", "--artifacts", "left", *more)[0] == 1
         found = [path.read_bytes() for path in (folder / "left").rglob("report.html")]
