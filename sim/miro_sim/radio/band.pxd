@@ -28,7 +28,6 @@ cdef class Band:
     cdef long long alone_until, change_tick
     cdef readonly list transmitters
 
-    cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
     cdef int level(self, long long tick) except -1

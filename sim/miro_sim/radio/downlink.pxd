@@ -17,6 +17,5 @@ cdef class Downlink:
 
     @cython.locals(late='long long', arrival='long long', link=Downlink, sender=Sender)
     cpdef long long send(self, long long start_tick, data, tuple bad_stop=*) except? -1
-    cdef int _check_settled(self, long long start_tick, long long key_tick, long long settled_tick) except -1
     @cython.locals(listener=Listener, sender=Sender)
     cpdef settle(self, long long until_tick)

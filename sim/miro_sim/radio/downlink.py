@@ -108,9 +108,14 @@ class Downlink:
             )
         lead = 0 if self.sender.always_on else self.sender.keyup
         key_tick = max(start_tick - lead, 0) + self.sender.latency
-        self._check_settled(start_tick, key_tick, self.settled_tick)
+        settled_tick = self.settled_tick
         for link, _ in self.audience:
-            self._check_settled(start_tick, key_tick, link.settled_tick)
+            settled_tick = max(settled_tick, link.settled_tick)
+        if key_tick < settled_tick:
+            raise TransmissionError(
+                f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
+                f" but they are settled up to {settled_tick}"
+            )
         stops = b""
         if bad_stop:
             check_bad_stop(bad_stop, len(data))
@@ -121,19 +126,12 @@ class Downlink:
         on_air = arrival, bytes(data), stops
         air_ticks = len(data) * _CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
-        self.busy_tick = max(arrival + air_ticks, self.sender.end_of(arrival, len(data)))
+        self.busy_tick = max(arrival + air_ticks, self.sender.end(arrival, len(data)))
         if not self.lost_threshold or not self.lost.below(slot, self.lost_threshold):
             self.sender.transmissions.append(on_air)
             for _, sender in self.audience:
                 sender.transmissions.append(on_air)
         return self.free_tick
-
-    def _check_settled(self, start_tick: int, key_tick: int, settled_tick: int) -> None:
-        if key_tick < settled_tick:
-            raise TransmissionError(
-                f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
-                f" but they are settled up to {settled_tick}"
-            )
 
     def settle(self, until_tick: int) -> None:
         """Makes every listener's line final for ticks below `until_tick`; no effect if it is already."""

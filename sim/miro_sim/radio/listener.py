@@ -90,7 +90,7 @@ class Listener:
             if tick < stop:
                 self.hear_idle(tick, stop, senders, rank)
                 tick = stop
-            stop = min(until, sender.end(index))
+            stop = min(until, sender.end(start, len(data)))
             if tick < stop:
                 self.hear_data(tick, stop, start, data, stops, senders, rank)
                 tick = stop

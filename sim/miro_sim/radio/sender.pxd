@@ -11,9 +11,7 @@ cdef class Sender:
     cdef long long begin(self, long long start, long long number) except? -1
     cdef long long back(self, long long start, long long number) except? -1
     cdef long long number(self, long long since) except? -1
-    cdef long long end_of(self, long long start, long long count) except? -1
-    @cython.locals(start='long long')
-    cpdef long long end(self, Py_ssize_t index) except? -1
+    cdef long long end(self, long long start, long long count) except? -1
     cdef int levels(self, bytes data, bytes stops, long long number) except -1
     cdef bint bad_stop(self, bytes stops, long long number) except -1
     @cython.locals(start='long long')

@@ -59,13 +59,8 @@ class Sender:
         """Number of the bit that is on the air `since` ticks after the start."""
         return ((since + 1) * self.denominator - 1) // self.numerator
 
-    def end(self, index: int) -> int:
-        """Tick at which the last stop bit of a waiting transmission is over."""
-        start, data, _ = self.transmissions[index]
-        return self.end_of(start, len(data))
-
-    def end_of(self, start: int, count: int) -> int:
-        """The same of `count` characters from `start` on."""
+    def end(self, start: int, count: int) -> int:
+        """Tick at which the last stop bit of `count` characters from `start` on is over."""
         return self.begin(start, _CHARACTER * count)
 
     def levels(self, data: bytes, stops: bytes, number: int) -> int:
@@ -84,7 +79,7 @@ class Sender:
         """What is on the air at `tick`: 0 space, 1 mark, -1 no carrier."""
         for index in range(len(self.transmissions)):
             start, data, stops = self.transmissions[index]
-            if start <= tick < self.end(index):
+            if start <= tick < self.end(start, len(data)):
                 number = self.number(tick - start)
                 if self.bad_stop(stops, number) and tick >= self.back(start, number):
                     return 1
@@ -95,7 +90,10 @@ class Sender:
 
     def forget(self, until: int) -> None:
         """Drops the transmissions that are over by then."""
-        while self.transmissions and self.end(0) <= until:
+        while self.transmissions:
+            start, data, _ = self.transmissions[0]
+            if self.end(start, len(data)) > until:
+                break
             del self.transmissions[0]
 
     def after_load(self) -> None:

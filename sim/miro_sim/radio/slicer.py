@@ -31,9 +31,7 @@ class Slicer:
     def __init__(self, params: SlicerParams, eb_n0_db: float) -> None:
         self.gain = params.gain
         self.offset = params.offset_units
-        self.table = [0] * 513
-        for index, chance in enumerate(margin_table(eb_n0_db)):
-            self.table[index] = chance
+        self.table = list(margin_table(eb_n0_db))
         self.tick = 0
         self.signal = 0
         self.mean = 0
@@ -43,9 +41,7 @@ class Slicer:
 
     def hear(self, tick: int, signal: int) -> None:
         """From `tick` on, not before the last one, the input is `signal`."""
-        target = 0
-        if self.signal:
-            target = self.signal * _ONE + self.offset
+        target = self.signal * _ONE + self.offset if self.signal else 0
         left = tick - self.tick
         while left > 0:
             step = min(left, _BIT)
@@ -63,8 +59,4 @@ class Slicer:
         if level:
             margin = -margin
         index = (margin + 2 * _ONE) >> _STEP  # the table begins at a margin of -1, which is 1 + margin here
-        if index < 0:
-            index = 0
-        elif index >= _TABLE:
-            index = _TABLE - 1
-        return self.table[index]
+        return self.table[min(max(index, 0), _TABLE - 1)]
