@@ -17,15 +17,12 @@ cdef class Decay:
 cdef class Winding:
     cdef public double current_a
     cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
-    cdef double volt[6]
-    cdef double ohm[6]
-    cdef double tau[6]
+    cdef double volt[6], ohm[6], tau[6]
     cdef long long row[6]
     cdef readonly Decay decay
 
     cdef inline bint rests(self) noexcept
-    cpdef void set_bridge(self, int enable, int forward) noexcept
-    cdef inline void _ask(self, int wanted) noexcept
+    cpdef inline void ask(self, int wanted) noexcept
     cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5
     cdef inline double _pass(self, int ticks, double emf_v) noexcept
@@ -56,7 +53,6 @@ cdef class Quadrature:
     cdef void _tell_each(self, Lm629 chip, double *radians, long long *ticks, int steps) noexcept
     @cython.locals(forward=cython.bint, after=cython.longlong)
     cdef long long _edge_tick(self, double *radians, long long *ticks, int step, long long count) noexcept
-    cpdef void attach(self, long long tick, Lm629 chip) noexcept
     cdef void _show(self, long long tick, Lm629 chip) noexcept
     cpdef inline int a(self) noexcept
     cpdef inline int b(self) noexcept

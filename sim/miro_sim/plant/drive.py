@@ -100,11 +100,7 @@ class Winding:
         self.wanted = 0  # by the inputs
         self.wait_ticks = 0  # until the bridge does it; 0: it does
 
-    def set_bridge(self, enable: int, forward: int) -> None:
-        """Inputs of the L298 half: enable pin and direction (1 forward, 0 backward), from now on."""
-        self._ask((1 if forward else -1) if enable else 0)
-
-    def _ask(self, wanted: int) -> None:
+    def ask(self, wanted: int) -> None:
         """The inputs ask the transistors to drive forward (1), backward (-1) or not (0)."""
         if wanted == self.wanted:
             return
@@ -120,12 +116,12 @@ class Winding:
         if chip.pwm:
             chip.pwm = 0
             chip.next_tick = chip.period_tick + LONGEST_STEP
-            self._ask(0)
+            self.ask(0)
         else:
             chip.pwm = 1
             chip.period_tick = chip.next_tick
             chip.next_tick += 16 * chip.pwm_magnitude
-            self._ask(-1 if chip.sign else 1)
+            self.ask(-1 if chip.sign else 1)
         return chip.next_tick
 
     def step(self, ticks: int, emf_v: float) -> float:
@@ -426,7 +422,7 @@ class DifferentialDrive(Plant):
                     self._move(steps)
                     steps = 0
                 if self.rough is not None:
-                    self.rough.feel(begin + (ticks >> 1))
+                    self.rough.forces.at(begin + (ticks >> 1))
                 left_charge = self.left_winding._pass(ticks, constant * self.body.left_rad_s)
                 right_charge = self.right_winding._pass(ticks, constant * self.body.right_rad_s)
                 self.body._push(impulse * left_charge, impulse * right_charge, ticks, steps)
@@ -461,10 +457,8 @@ class DifferentialDrive(Plant):
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
         if self.tick < tick:
             self.advance(tick)
-        if side == 0:
-            self.left_winding.set_bridge(enable, forward)
-        else:
-            self.right_winding.set_bridge(enable, forward)
+        winding = self.right_winding if side else self.left_winding
+        winding.ask((1 if forward else -1) if enable else 0)
 
     def pose_at(self, tick: int) -> tuple[float, float, float]:
         """(x m, y m, unwrapped heading rad) at `tick`, at constant speed since the last step; pure."""

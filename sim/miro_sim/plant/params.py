@@ -134,9 +134,10 @@ class DriveParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
                 f"{voltage_v} V, {constant} Nm/A and {self.encoder.lines} lines make {counts_per_s:.3g} counts/s"
                 f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
             )
-        motor_s = self.motor_s()
+        # The shortest that it has, of a motor alone: shorted through battery and diodes.
+        ohm = motor.resistance_ohm + self.battery.resistance_ohm
+        motor_s = motor.rotor_inertia_kg_m2 * ohm / (constant * constant)
         if motor_s < MIN_MOTOR_S:
-            ohm = motor.resistance_ohm + self.battery.resistance_ohm
             raise ValueError(
                 f"motor: {motor.rotor_inertia_kg_m2:g} kg m2, {ohm:g} ohm with the battery and {constant:g} Nm/A make"
                 f" a time constant of {motor_s:.3g} s; at least {MIN_MOTOR_S:g} s (real motors: 0.001 to 0.1 s)"
@@ -168,11 +169,6 @@ class DriveParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
         """No-load speed of the faster wheel at full battery: no robot drives faster by itself."""
         motor_rad_s = self.battery.voltage_v / self.motor.torque_constant_nm_a
         return motor_rad_s / self.chassis.gear_ratio * max(self.radius_m(0), self.radius_m(1))
-
-    def motor_s(self) -> float:
-        """Mechanical time constant of a motor alone, shorted through battery and diodes: the shortest it has."""
-        motor, ohm = self.motor, self.motor.resistance_ohm + self.battery.resistance_ohm
-        return motor.rotor_inertia_kg_m2 * ohm / (motor.torque_constant_nm_a * motor.torque_constant_nm_a)
 
     def counts_per_radian(self) -> float:
         """Encoder counts per radian of the motor shaft."""

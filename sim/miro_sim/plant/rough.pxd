@@ -26,7 +26,6 @@ cdef class RoughBody(Body):
     cdef readonly double left_play_m, right_play_m
     cdef double _rub_nms, _push_ns, _ball_x_ns, _ball_y_ns, _ball_z
 
-    cpdef int feel(self, long long tick) except -1
     @cython.locals(old_left_slip=double, old_right_slip=double, left_slip=double, right_slip=double)
     cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
     cdef int _resist(self, double lever_m, double step_s) except -1

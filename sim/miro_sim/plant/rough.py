@@ -151,10 +151,6 @@ class RoughBody(Body):
         self._ball_y_ns = 0.0
         self._ball_z = 0.0
 
-    def feel(self, tick: int) -> None:
-        """The next push is at this tick: the disturbing force is that of then."""
-        self.forces.at(tick)
-
     def _push(self, left_nms: float, right_nms: float, ticks: int, step: int) -> None:
         """Applies motor impulses, disturbance and friction over `ticks`; moves on at the mean of old and new speed."""
         step_s = TICK_S * ticks

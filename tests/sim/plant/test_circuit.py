@@ -11,7 +11,6 @@ from tests.naive.plant import NaiveBridge, winding_run
 
 PARAMS = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))
 LATE = DriveParams()
-BRIDGES = {1: (1, 1), -1: (1, 0), 0: (0, 1)}
 DRIVES = st.sampled_from((-1, 0, 1))
 CURRENTS = st.one_of(st.just(0.0), st.floats(-2.5, 2.5))
 EMFS = st.floats(-12.0, 12.0)
@@ -20,7 +19,7 @@ TICKS = st.integers(1, 2048)
 
 def winding(drive, current):
     made = Winding(PARAMS)
-    made.set_bridge(*BRIDGES[drive])
+    made.ask(drive)
     made.current_a = current
     return made
 
@@ -86,7 +85,7 @@ def on_intervals(params, pulses):
     one, found = Winding(params), []
     for tick in range(2048):
         if tick in pulses:
-            one.set_bridge(pulses[tick], 1)
+            one.ask(pulses[tick])
         if one.drive == 1 and found and found[-1][1] == tick - 1:
             found[-1] = (found[-1][0], tick)
         elif one.drive == 1:
@@ -106,7 +105,7 @@ def test_intervals_cut_anywhere_see_the_bridge_switch_as_the_slow_twin_does(chan
     one, naive = Winding(LATE), NaiveBridge(LATE)
     tick, current, charge, naive_charge = 0, 0.0, 0.0, 0.0
     for drive, ticks in changes:
-        one.set_bridge(*BRIDGES[drive])
+        one.ask(drive)
         naive.ask(tick, drive)
         charge += one.step(ticks, emf)
         for at in range(tick, tick + ticks):
@@ -137,9 +136,9 @@ def test_at_12_of_128_the_delays_carry_half_as_much_charge_again():
     for params in (PARAMS, LATE):
         one = Winding(params)
         for _ in range(2):
-            one.set_bridge(1, 1)
+            one.ask(1)
             charge = one.step(192, 2.0)
-            one.set_bridge(0, 1)
+            one.ask(0)
             charge += one.step(1856, 2.0)
         charges.append(charge)
     assert charges[1] / charges[0] == pytest.approx(1.54, abs=0.01)
@@ -155,7 +154,7 @@ def test_the_drop_is_that_of_st_s_typical_saturations():
 )
 def test_a_saved_bridge_that_waits_longer_than_its_delay_is_refused(late, known):
     waiting, other = Winding(late), Winding(known)
-    waiting.set_bridge(1, 1)
+    waiting.ask(1)
     with pytest.raises(ValueError, match="waits"):
         restore(other, snapshot(waiting))
 
@@ -163,9 +162,9 @@ def test_a_saved_bridge_that_waits_longer_than_its_delay_is_refused(late, known)
 @given(DRIVES, DRIVES, st.integers(1, 70))
 def test_a_bridge_saved_while_it_waits_switches_on_the_same_tick(first, then, ticks):
     one, other = Winding(LATE), Winding(LATE)
-    one.set_bridge(*BRIDGES[first])
+    one.ask(first)
     one.step(200, 0.0)
-    one.set_bridge(*BRIDGES[then])
+    one.ask(then)
     one.step(ticks, 0.0)
     restore(other, snapshot(one))
     for each in (one, other):

@@ -377,7 +377,7 @@ def test_a_force_and_a_torque_accelerate_mass_and_inertia():
     drive.body.push(0.0, 0.0, 1)  # before the first look at the force there is none
     assert drive.velocity_at(0) == (0.0, 0.0)
     for _ in range(100):
-        drive.rough.feel(0)
+        drive.rough.forces.at(0)
         drive.body.push(0.0, 0.0, 2048)
     time_s = 100 * 2048 / 24e6
     v, w = drive.velocity_at(0)
