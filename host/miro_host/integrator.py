@@ -43,11 +43,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
 
 def clamp(x: float, limit: float) -> float:
     """x limited to -limit..limit."""
-    if x > limit:
-        return limit
-    if x < -limit:
-        return -limit
-    return x
+    return min(max(x, -limit), limit)
 
 
 class Integrator:

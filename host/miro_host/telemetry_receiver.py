@@ -15,9 +15,8 @@ from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
 from miro_protocol.events import Event
 from miro_protocol.frames import ContentError, TelemetryFrame
 
-HALF_TURN = 1 << 15
-TURN = 1 << 16
-_HALF_TURN, _TURN = HALF_TURN, TURN
+_HALF_TURN = 1 << 15
+_TURN = 1 << 16
 
 _COUNT = ("q", -NEVER_TICK, NEVER_TICK)
 _NO_TELEMETRY = (-1, 0, 0, 0, 0, 0, 0, 0, 0)

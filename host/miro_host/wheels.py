@@ -7,9 +7,9 @@ own limit.
 
 import msgspec
 
+from miro_exact.dmath import PI
 from miro_exact.domain import DomainError
 
-PI = 3.141592653589793
 TICKS_PER_S = 24_000_000
 TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
 COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1

@@ -23,7 +23,7 @@ from miro_host.estimators.predict import PredictParameters
 from miro_host.eye.track import Sighting
 from miro_host.pilot import PERIOD_S
 from miro_host.posture import Posture
-from miro_host.telemetry_receiver import TURN, LastTelemetry
+from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels
 
 TRACK_M = Wheels().track_m
@@ -440,7 +440,7 @@ def test_an_answer_from_the_future_changes_nothing():
 @pytest.mark.parametrize("turns", [-2, 1, 7])
 def test_counts_that_are_off_by_whole_turns_of_the_counter_tell_the_same(turns):
     def change(telemetry):
-        left, right = telemetry.position_left + turns * TURN, telemetry.position_right - turns * TURN
+        left, right = telemetry.position_left + 65_536 * turns, telemetry.position_right - 65_536 * turns
         return telemetry._replace(position_left=left, position_right=right)
 
     loop, same = told_before(change)

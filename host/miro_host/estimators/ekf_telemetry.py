@@ -31,13 +31,13 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta
 
 from miro_exact.clock import TICKS_PER_SECOND
-from miro_exact.dmath import sincos
+from miro_exact.dmath import PI, sincos
 from miro_host.estimators.ekf import WHEELS, Ekf, EkfParameters
 from miro_host.estimators.filter import Filter
 from miro_host.estimators.interface import EstimatorInput
 from miro_host.posture import Posture
-from miro_host.telemetry_receiver import HALF_TURN, TURN, LastTelemetry
-from miro_host.wheels import COUNTS_PER_WHEEL_TURN, PI, nearest
+from miro_host.telemetry_receiver import LastTelemetry, unwrapped
+from miro_host.wheels import COUNTS_PER_WHEEL_TURN, nearest
 
 METRES_PER_COUNT = 2.0 * PI * WHEELS.radius_m / COUNTS_PER_WHEEL_TURN
 KEPT = 0.7
@@ -137,7 +137,7 @@ class EkfTelemetry(Ekf):
         """What a rim went beyond what was commanded, of all that fit its counter the least."""
         commanded = commanded_m / METRES_PER_COUNT
         whole = nearest(commanded)
-        return (((counts - whole + HALF_TURN) % TURN - HALF_TURN) + (whole - commanded)) * METRES_PER_COUNT
+        return ((unwrapped(counts, whole) - whole) + (whole - commanded)) * METRES_PER_COUNT
 
     def _begin(self) -> None:
         super()._begin()

@@ -13,17 +13,13 @@ cdef class Filter:
     cdef readonly double position_m, heading_rad, wheel, rim_m_s, warp_m, warp_length_m, effect_s, period_s
     cdef public int known
     cdef public double at_s
-    cdef public double state[9]
-    cdef public double covariance[81]
+    cdef public double state[9], covariance[81]
     cdef readonly double left_m, right_m
-    cdef double column[9]
-    cdef double lower[25]
+    cdef double column[9], lower[25]
 
     cdef int factorise(self, int size) except -1
     @cython.locals(total=double)
     cpdef bint finite(self)
-    cpdef command(self, double left_m_s, double right_m_s, double effect_s, double period_s)
-    cpdef start(self, double x_m, double y_m, double theta_rad, double at_s, double position_m2, double heading_rad2)
     cdef int forget(self, int index) except -1
     cpdef run(self, double to_s)
     cpdef predict(self, double to_s)

@@ -74,12 +74,10 @@ class Filter:
         self.at_s = 0.0
         self.left_m = 0.0  # commanded way of the rim since its last count
         self.right_m = 0.0
-        self.state = [0.0] * 9
+        self.state = [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
         self.covariance = [0.0] * 81
         self.column = [0.0] * 9
         self.lower = [0.0] * 25
-        self.state[3] = 1.0
-        self.state[4] = 1.0
         self.covariance[3 * _N + 3] = wheel_spread * wheel_spread
         self.covariance[4 * _N + 4] = wheel_spread * wheel_spread
 
@@ -235,9 +233,7 @@ class Filter:
 
     def warp_on(self, way_m: float) -> None:
         """The warp after a way: it forgets a share of itself and varies as much as before."""
-        kept = 1.0 - way_m / self.warp_length_m
-        if kept < 0.0:
-            kept = 0.0
+        kept = max(1.0 - way_m / self.warp_length_m, 0.0)
         p = self.covariance
         for index in range(7, 9):
             self.state[index] *= kept
@@ -329,7 +325,4 @@ class Filter:
         """Heading and wheel factors in their ranges."""
         self.state[2] = dmath.wrap_pi(self.state[2])
         for index in range(3, 5):
-            if self.state[index] > _LARGEST:
-                self.state[index] = _LARGEST
-            elif self.state[index] < 1.0 / _LARGEST:
-                self.state[index] = 1.0 / _LARGEST
+            self.state[index] = min(max(self.state[index], 1.0 / _LARGEST), _LARGEST)

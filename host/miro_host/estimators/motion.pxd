@@ -6,10 +6,7 @@ cdef int _KEPT
 
 @cython.final
 cdef class Motion:
-    cdef public double left_start_m_s[16]
-    cdef public double left_to_m_s[16]
-    cdef public double right_start_m_s[16]
-    cdef public double right_to_m_s[16]
+    cdef public double left_start_m_s[16], left_to_m_s[16], right_start_m_s[16], right_to_m_s[16]
     cdef readonly double track_m, slope_m_s2, doubt
     cdef readonly double x_m, y_m, theta_rad, left_m, right_m, left_m2, right_m2
     cdef readonly double x_by_theta, x_by_left, x_by_right, y_by_theta, y_by_left, y_by_right

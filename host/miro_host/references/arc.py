@@ -11,12 +11,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from miro_exact.dmath import sincos, wrap_pi
+from miro_exact.dmath import PI, sincos, wrap_pi
 from miro_host.posture import Posture
 from miro_host.references.interface import DEGREE, Reference, SamplingPace, TurnDeg, with_polar_form
 from miro_host.references.ramp import Ramp, RampedReference
-
-PI = 3.141592653589793
 
 
 class Arc(msgspec.Struct, frozen=True):
@@ -43,22 +41,14 @@ class Arc(msgspec.Struct, frozen=True):
         rho = s if kappa == 0.0 else 2.0 * sin_h / kappa
         phi = wrap_pi(self.heading_rad + half_turn)
         sin_phi, cos_phi = sincos(phi)
+        theta = wrap_pi(self.heading_rad + kappa * s)
         if self.start_x_m != 0.0 or self.start_y_m != 0.0 or abs(half_turn) >= PI:
-            x, y = self.start_x_m + rho * cos_phi, self.start_y_m + rho * sin_phi
-            at = Posture(x, y, wrap_pi(self.heading_rad + kappa * s))
+            at = Posture(self.start_x_m + rho * cos_phi, self.start_y_m + rho * sin_phi, theta)
             return with_polar_form(at, v, kappa * v, v_dot, w_dot)
-        return Reference(
-            posture=Posture(rho * cos_phi, rho * sin_phi, wrap_pi(self.heading_rad + kappa * s)),
-            v_m_s=v,
-            w_rad_s=kappa * v,
-            v_dot_m_s2=v_dot,
-            w_dot_rad_s2=w_dot,
-            rho_m=rho,
-            phi_rad=phi,
-            rho_rate_m_s=v * cos_h,
-            phi_rate_rad_s=0.5 * kappa * v,
-            rho_accel_m_s2=v_dot * cos_h - v * v * (0.5 * kappa) * sin_h,
-        )
+        at = Posture(rho * cos_phi, rho * sin_phi, theta)
+        rho_accel = v_dot * cos_h - v * v * (0.5 * kappa) * sin_h
+        polar = rho, phi, v * cos_h, 0.5 * kappa * v, rho_accel
+        return Reference(at, v, kappa * v, v_dot, w_dot, *polar)
 
     def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """After one whole turn the circle is closed."""

@@ -51,10 +51,7 @@ class Ramp(msgspec.Struct, frozen=True):
         return SamplingPace(step_m / self.speed_m_s, until_s, steady_s)
 
     def _whole_length(self) -> float:
-        if not self.ramp_down:
-            return self._length(self.duration_s)
-        half_s = 0.5 * self.duration_s
-        return 2.0 * self._length(half_s)
+        return 2.0 * self._length(0.5 * self.duration_s) if self.ramp_down else self._length(self.duration_s)
 
     def _length(self, t_s: float) -> float:
         if t_s < self.ramp_s:

@@ -99,15 +99,11 @@ def spline(
     lengths, bends = zip(*arcs, strict=True)
     curvatures = []
     for i in range(count):
-        before = i - 1 if i > 0 or closed else None
-        after = i if i < len(ends) else None
-        if before is None:
-            curvatures.append(bends[0][0])
-        elif after is None:
-            curvatures.append(bends[before][1])
+        if not closed and i in (0, count - 1):
+            curvatures.append(bends[-1][1] if i else bends[0][0])
         else:
-            arriving, leaving = lengths[before], lengths[after]
-            mean = (bends[before][1] * leaving + bends[after][0] * arriving) / (arriving + leaving)
+            arriving, leaving = lengths[i - 1], lengths[i]
+            mean = (bends[i - 1][1] * leaving + bends[i][0] * arriving) / (arriving + leaving)
             curvatures.append(mean)
     return [
         _quintic(points[i], points[j], tangents[i], tangents[j], curvatures[i], curvatures[j], length)

@@ -79,9 +79,7 @@ class Waypoints:
         A peak between two of the places that are looked at is higher than the higher one by an eighth of the difference
         between them and their neighbour, if it is a parabola: half of it is added.
         """
-        chord_rate = 0.0
-        for weight_at, weight in GAUSS:
-            chord_rate += weight * piece.rate(weight_at)
+        chord_rate = _way(piece, 0.0, 1.0)
         bends = []
         for half in range(2 * CELLS + 1):
             shape = piece.shape(half / (2.0 * CELLS))
