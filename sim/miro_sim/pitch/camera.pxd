@@ -88,6 +88,7 @@ cdef class Camera:
     @cython.locals(packed='long long *', identity=int)
     cdef long long _paint_top(self, int body, int row, int column, int on_top) noexcept
     cdef inline int _within(self, int row, int column, int box) noexcept
+    @cython.locals(across_u=bint, across_v=bint, within=int, first=int, lane='long long')
     cdef int _count_within(self, int row, int column, int at) noexcept
     cdef inline int _count(self, bint across_u, bint across_v) noexcept
     cdef inline void _turn(self, int row, int column, int at) noexcept

@@ -30,9 +30,10 @@ cdef class Scene:
     cdef void look(self, int pixel) noexcept
     cdef int sample(self, int pixel, int sample) noexcept
     cdef int ball_above(self, int pixel, int sample, long long above) noexcept
-    @cython.locals(above='long long', below='long long')
-    cdef long long _slope(self, int[::1] slopes, int pixel, int sample) noexcept
-    cdef int _paint_of(self, int pixel, int sample) noexcept
+    @cython.locals(slopes='int[::1]', above='long long', below='long long')
+    cdef long long _slope(self, bint along_x, int pixel, int sample) noexcept
+    cdef int _ball(self, long long slope_x, long long slope_y, long long above) noexcept
+    cdef int _paint_of(self, long long slope_x, long long slope_y) noexcept
     cdef int _sure(self, int pixel) noexcept
     cdef bint _inside(self, long long x, long long y, long long more) noexcept
     cdef bint _on_line(self, long long x, long long y, long long more) noexcept

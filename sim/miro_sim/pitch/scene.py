@@ -152,11 +152,13 @@ class Scene:
 
     def sample(self, pixel: int, sample: int) -> int:
         """The paint that sample 0 to 15 of a pixel hits, row by row."""
-        paint = self.ball_above(pixel, sample, 0) if self.has_ball else -1
-        return paint if paint >= 0 else self._paint_of(pixel, sample)
+        x, y = self._slope(True, pixel, sample), self._slope(False, pixel, sample)
+        paint = self._ball(x, y, 0) if self.has_ball else -1
+        return paint if paint >= 0 else self._paint_of(x, y)
 
-    def _slope(self, slopes: array[int], pixel: int, sample: int) -> int:
+    def _slope(self, along_x: bool, pixel: int, sample: int) -> int:
         """Between the corners of a pixel, at sample 0 to 15, row by row."""
+        slopes = self.rays.slope_x if along_x else self.rays.slope_y
         a = pixel + pixel // _WIDTH
         c = a + _CORNERS
         p, q = 2 * (sample & 3) + 1, 2 * (sample >> 2) + 1
@@ -165,14 +167,16 @@ class Scene:
         return (above * (8 - q) + below * q) >> 6
 
     def ball_above(self, pixel: int, sample: int, above: int) -> int:
-        """The paint of the ball's ring that a sample sees; -1 if it misses the ball or passes it below `above`.
+        """The paint of the ball if that sample sees it at this height or above, or -1."""
+        return self._ball(self._slope(True, pixel, sample), self._slope(False, pixel, sample), above)
+
+    def _ball(self, slope_x: int, slope_y: int, above: int) -> int:
+        """The paint of the ball's ring that a ray sees; -1 if it misses the ball or passes it below `above`.
 
         With e from the centre to the ray in the plane of the centre, and s the slopes: the ray passes the centre at the
         distance d, d^2 (1 + s^2) = e^2 (1 + s^2) - (e s)^2; it is nearest to it e s / (1 + s^2) below that plane.
         """
         rays = self.rays
-        slope_x = self._slope(rays.slope_x, pixel, sample)
-        slope_y = self._slope(rays.slope_y, pixel, sample)
         drop = rays.height_um - _BALL_UM
         x = rays.x_um + (drop * slope_x >> 22) - self.ball_x
         y = rays.y_um + (drop * slope_y >> 22) - self.ball_y
@@ -203,11 +207,9 @@ class Scene:
         y = abs(rays.middle_y[pixel] + rays.fall_y[pixel] - self.middle_y)
         return self.floor if self._inside(x, y, 0 - spread) and not self._on_line(x, y, spread) else -1
 
-    def _paint_of(self, pixel: int, sample: int) -> int:
-        """The paint that a sample hits where there is no ball."""
+    def _paint_of(self, slope_x: int, slope_y: int) -> int:
+        """The paint that a ray of these slopes hits where there is no ball."""
         rays = self.rays
-        slope_x = self._slope(rays.slope_x, pixel, sample)
-        slope_y = self._slope(rays.slope_y, pixel, sample)
         drop = rays.height_um - _WALL_HEIGHT_UM
         x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
         y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)
