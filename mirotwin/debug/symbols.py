@@ -232,6 +232,8 @@ class Moment:
     def read(self, space: str, address: int, count: int) -> bytes:
         """Bytes of a memory. Raises BadInput for one that is not there."""
         cpu = self.core.cpu
+        if space == "sfr" and address < 0x80:
+            raise NoValue(f"{address:#04x} is no special function register", "they begin at sfr[0x80]")
         if space == "xram" and self.core.board is None:
             return bytes(cpu.bus.movx_read((address + at) & 0xFFFF, 0) for at in range(count))
         return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
