@@ -169,7 +169,9 @@ def _mean(pixels: Sequence[tuple[int, int, int]]) -> ColourMean:
     """Means to 1/16 level, from integer sums."""
     count = len(pixels)
     y, cb, cr = map(sum, zip(*pixels, strict=True))
-    squares = sum(pixel[1] * pixel[1] + pixel[2] * pixel[2] for pixel in pixels)
+    squares = 0
+    for _, blue, red in pixels:
+        squares += blue * blue + red * red
     variance = (squares * count - cb * cb - cr * cr) / (count * count)
     means = [(32 * total + count) // (2 * count) / 16.0 for total in (y, cb, cr)]
     spread = _sixteenths(math.sqrt(variance)) / 16.0
