@@ -158,7 +158,8 @@ class Tracker:
         if self.notes is not None:
             self.notes.pairs = list(pairs)
         sightings: list[Sighting | None] = []
-        for pair, track in zip(pairs, self.tracks, strict=True):
+        for slot in range(len(pairs)):
+            pair, track = pairs[slot], self.tracks[slot]
             if pair is None:
                 self.lost_frames += 1
                 sightings.append(None)

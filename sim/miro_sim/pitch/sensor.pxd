@@ -26,6 +26,7 @@ cdef class Sensor:
     cdef unsigned int words[448]
 
     cpdef begin(self, long long frame, long long tick, int samples)
+    @cython.locals(twice_hz='long long', turns=double, mean=double)
     cdef double _lamps(self, long long tick) except? -1.0
     cdef void put(self, int column, long long total, long long light) noexcept
     cdef int _shown(self, long long total, long long light) noexcept
