@@ -222,8 +222,9 @@ class Timeline:
         """To before the last instruction or interrupt entry, or to the start of sleep; False where there is none."""
         cpu, cycle = self.core.cpu, self.core.cpu.cycles
         self._look_closely(self.tick)
-        self._load(self._before(self.tick))
-        self._run_to((cycle - _LONGEST_CYCLES) * CYCLE_TICKS)
+        begin_tick = (cycle - _LONGEST_CYCLES) * CYCLE_TICKS  # where no checkpoint is past the instruction
+        self._load(self._before(begin_tick + 1))
+        self._run_to(begin_tick)
         before = -1
         while cpu.cycles < cycle:
             before, asleep = cpu.cycles, cpu.idle or cpu.powered_down

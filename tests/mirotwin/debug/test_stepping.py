@@ -115,6 +115,18 @@ def test_an_instruction_forward_and_back_are_neighbours(moments, debugger):
         assert slept or (debugger.cpu.cycles, debugger.cpu.pc) == moments[at + 1][:2]
 
 
+def test_a_step_back_takes_no_checkpoint_that_lies_within_the_instruction(moments, debugger):
+    timeline = debugger.timeline
+    pairs = [(one, other) for one, other in pairwise(moments) if other.cycle - one.cycle <= 4]
+    for before, after in pairs[100:110]:
+        stand(debugger, before)
+        timeline._run_to(before.cycle * CYCLE_TICKS + 3)
+        timeline._save()
+        stand(debugger, after)
+        assert timeline.step_back()
+        assert (debugger.cpu.cycles, debugger.cpu.pc) == (before.cycle, before.pc)
+
+
 def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
     age = debugger.bytes_of("ticks")
     changes = [
