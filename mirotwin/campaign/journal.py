@@ -35,11 +35,11 @@ def journal_path(results: Path) -> Path:
 class Journal:
     """The outcomes of a campaign, to be added to. `done[run]` is 1 for each run that has one.
 
-    `begin_anew`: what is there is discarded. Raises BadInput for a file of another campaign, or one that is no such
+    `discard`: empties the file first. Raises BadInput for a file of another campaign, or one that is no such
     file, and if another process writes to it.
     """
 
-    def __init__(self, path: Path, head: Head, begin_anew: bool = False) -> None:
+    def __init__(self, path: Path, head: Head, discard: bool = False) -> None:
         self.path = path
         self.head = head
         self.count = 0
@@ -51,7 +51,7 @@ class Journal:
             if locked_elsewhere(self._stream.fileno()):
                 remedy = "wait, or choose another file with --out"
                 raise BadInput(path, "", "another process is writing to it", remedy)
-            if begin_anew:
+            if discard:
                 self._stream.truncate(0)
             self._take_up()
         except BaseException:

@@ -23,7 +23,7 @@ CHOOSE = "choose"
 
 
 class Range(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}):
-    """See above."""
+    """Numbers between two ends, drawn as the head of this file says."""
 
     low: float
     high: float

@@ -61,7 +61,7 @@ def run(
         return Tally(plan.runs, plan.runs)
     workers = executor if isinstance(executor, Workers) else Workers(executor) if executor else Processes()
     check_file(path, "--out")
-    with Journal(journal_path(path), plan.head, begin_anew=force) as journal:
+    with Journal(journal_path(path), plan.head, discard=force) as journal:
         tally = Tally(journal.count, plan.runs)
         with closing(Drive(plan.work, workers).outcomes(journal.missing())) as outcomes:
             for outcome in outcomes:

@@ -126,7 +126,7 @@ class OutputFolder:
 def locked_elsewhere(descriptor: int) -> bool:
     """Locks a file or folder until it is closed or this process is gone; True where another process has it.
 
-    Where there are no such locks (Windows, some network disks), nobody has.
+    False where there are no such locks (Windows, some network disks).
     """
     try:
         import fcntl

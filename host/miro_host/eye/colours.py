@@ -1,6 +1,6 @@
 """Which colours the tracker knows, as the camera shows them: samples, classes, and the table from a pixel to its class.
 
-Samples are pixels that somebody reads off his own pictures, in a CSV file:
+Samples are pixels read off pictures, in a CSV file:
 
     colour,r,g,b            or: colour,y,cb,cr
     yellow,231,209,40

@@ -117,7 +117,7 @@ def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
 
 
 def _widen(made: Any, number: int, tracks: PageTracks, least: float, *columns: Any) -> None:
-    """Makes the axis of one robot span `least` where its numbers vary by less: by two points that nobody sees."""
+    """Makes the axis of one robot span `least` where its numbers vary by less: by two invisible points."""
     if (ends := at_least(least, *columns)) is not None:
         source = ColumnDataSource({"t": [tracks.times_s[0]] * 2, "value": list(ends)})
         points = made.scatter("t", "value", source=source, size=0, line_color=None, fill_alpha=0.0)

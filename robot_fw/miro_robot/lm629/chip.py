@@ -146,7 +146,7 @@ class Lm629:
         self.encoder_edges: list[tuple[int, int, int]] | None = None
         self.log: EventLog | None = None
         self.side = 0
-        self.pulses = 1  # 0: nobody sees the magnitude pin, which stays low
+        self.pulses = 1  # 0: no wire is at the magnitude pin, which stays low
         self.writes_while_busy = 0
         self.reset_level = 1
         self.reset_tick = 0

@@ -174,7 +174,7 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
     run.stop()
 
 
-def test_a_process_on_the_engine_that_is_asked_for_that_somebody_kills_is_told(tmp_path, seeds):
+def test_a_process_that_is_killed_is_told_on_the_engine_that_is_asked_for(tmp_path, seeds):
     spec = TargetSpec(input="bytes", maker=TOY.maker, engine="python")
     with HypothesisRun(EngineInput(spec.text(), seeds, tmp_path / "out", seed=5), Toy()) as run:
         for _ in waited(run):

@@ -125,7 +125,7 @@ def addressed(script: TrialScript) -> None:
     script.obeyed(script.team())
     absent = script.n - 2
     if absent not in script.topology.slots:
-        script.untouched(script.filter(words, "service frame to nobody", slot=absent))
+        script.untouched(script.filter(words, "service frame to a slot without a robot", slot=absent))
 
 
 @CHAPTER.rule("P39", VERSIONS, presupposes="P31")
