@@ -14,6 +14,7 @@ from __future__ import annotations
 import errno
 import os
 import select
+import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -402,7 +403,13 @@ def _opened(url: str) -> Any:
         address += "&ign_set_control" if "?" in url else "?ign_set_control"
         realtime_priority()  # of the thread that reads there, too
     try:
-        return serial.serial_for_url(address, BAUD, timeout=0, **more)
+        port = serial.serial_for_url(address, BAUD, timeout=0, **more)
+        if url.lower().startswith(
+            "socket:"
+        ):  # or a frame waits until the one before is acknowledged, up to 40 ms
+            with socket.socket(fileno=os.dup(port.fileno())) as same:
+                same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return port
     except (OSError, ValueError) as error:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import signal
+import socket
 import subprocess
 import threading
 import tty
@@ -123,6 +124,13 @@ def test_characters_come_with_the_time_at_which_they_were_there(pty):
         before = port.tick
     assert [one.data for one in port.wire] == [b"abc"]
     assert port.wire[0].end_tick <= before
+
+
+def test_a_frame_over_tcp_does_not_wait_until_the_one_before_is_acknowledged():
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        url = f"socket://127.0.0.1:{listening.getsockname()[1]}"
+        with robots_at(url) as port, socket.socket(fileno=os.dup(port._serial.fileno())) as same:
+            assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_a_port_that_vanishes_is_told_in_one_line(pty):
