@@ -1,9 +1,9 @@
 """A live session: a world that the wall clock drives, and the ports through which programs talk to its robots.
 
 The world goes on in slices, so that a robot's byte is some milliseconds on its way to a program. When a program's bytes
-arrive it is moved on to that very moment first, and they go on the air there. A world that cannot keep pace stays
-behind, catches up as fast as it can, and says so: it never skips. The tick at which bytes went on the air is what the
-recording keeps; how they came to arrive then is not needed to run it again.
+arrive it is moved on to that very moment first, and they go on the air there. A world that is behind catches up as fast
+as it can, and says so: it never skips. One that does not catch up takes bytes where a control period ends. The tick at
+which bytes went on the air is what the recording keeps; how they came to arrive then is not needed to run it again.
 """
 
 from __future__ import annotations
@@ -113,8 +113,9 @@ class Session:
             self.selector.select(self.pace.wait_s(next_tick))
             due = self.pace.tick()
             self._advance(min(due, tick, next_tick), due)
-            for endpoint in self.endpoints:
-                endpoint.exchange()
+            if world.tick >= min(due, tick):
+                for endpoint in self.endpoints:
+                    endpoint.exchange()
 
     def _advance(self, tick: int, due_tick: int) -> None:
         before = self.world.tick

@@ -72,6 +72,31 @@ def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
     assert ticks(0.101) <= sent.tick < ticks(0.101 + 0.002) + 121 + 1  # at most a slice later, and the key-up
 
 
+def test_what_arrives_while_the_world_is_behind_goes_on_the_air_when_it_has_caught_up():
+    session, (client,), _ = session_of()
+    session.pace.per_look = ticks(0.0003)
+    session.run_to(ticks(0.105))
+    arrived = session.pace.now = ticks(0.120)
+    client.sends = [(0, question(0))]
+    periods = []
+    session.world.observers.append(periods.append)
+    session.run()
+    (sent,) = script_of(periods)
+    assert arrived <= sent.tick < arrived + ticks(0.010)  # each slice of 2 ms takes 0.6 ms
+
+
+def test_a_world_that_never_catches_up_takes_what_arrives_where_a_control_period_ends():
+    session, (client,), _ = session_of()
+    session.pace.per_look = ticks(0.1)
+    session.run_to(ticks(0.105))
+    client.sends = [(0, question(0))]
+    periods = []
+    session.world.observers.append(periods.append)
+    session.run()
+    (sent,) = script_of(periods)
+    assert 0 <= sent.tick - 4 * CONTROL_PERIOD_TICKS < ticks(0.002)
+
+
 def test_all_ports_of_a_network_hear_its_robots():
     session, clients, _ = session_of((0, question(0)), ports=3)
     session.pace.per_look = ticks(0.001)
