@@ -1,9 +1,13 @@
 """Streams for a robot at a port, and a port of a world that is the robot: `miro://` in virtual time is the hardware."""
 
 import os
+from bisect import bisect_left
 from contextlib import suppress
 
 from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.transmission import Transmission
+from mirotwin.recording import reader
+from mirotwin.rerun.job import script_of
 
 PERIOD = 800_800
 CLEAN = "set=network.radio.bit_error_rate=0"
@@ -36,3 +40,24 @@ def stream_text(frames, first_tick=1_000_000, change=lambda number, data: data):
         if data:
             lines.append(f"{first_tick + number * PERIOD} > {data.hex(' ')}")
     return "\n".join(lines) + "\n"
+
+
+NEAR = 4
+"""Frames before and after an answer."""
+
+
+def moved_at(ticks, desk, session):
+    """How far from each other frames around each of these ticks came too early or too late to a served robot.
+
+    A process that does not run for some milliseconds does that, and no real robot. `desk`, `session`: the recordings of
+    the PC and of the robot's process.
+    """
+    sent, came = ([one.tick for one in frames(recording)] for recording in (desk, session))
+    apart = [theirs - mine for mine, theirs in zip(sent, came, strict=False)]
+    near = [apart[max(0, at - NEAR) : at + NEAR] for at in (bisect_left(sent, tick) for tick in ticks)]
+    return [max(some) - min(some) for some in near]
+
+
+def frames(recording):
+    script = script_of(reader.read(recording).periods)
+    return [one for one in script if isinstance(one, Transmission)]
