@@ -87,12 +87,12 @@ class Endpoint:
         """Takes the port away."""
         raise NotImplementedError
 
-    def exchange(self) -> None:
-        """The client's bytes to the radio."""
+    def exchange(self, at_tick: int) -> None:
+        """The client's bytes to the radio, at this tick or as soon as they can be."""
         data = self.receive()
         if data:
             self.bytes_in += len(data)
-            self.port.send(data)
+            self.port.send(data, at_tick)
 
     def deliver(self, data: bytes) -> None:
         """What the PC has heard, to the client if one is there."""

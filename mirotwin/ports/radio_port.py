@@ -44,15 +44,16 @@ class RadioPort:
         """Characters that the transmit buffer takes now."""
         return max(0, TRANSMIT_CHARACTERS - self.waiting)
 
-    def send(self, data: bytes) -> int:
+    def send(self, data: bytes, at_tick: int = 0) -> int:
         """Puts at least one character into the transmit buffer; returns the tick of the first start bit.
 
-        The carrier comes up at the next tick that is settled on no wire: 120 ticks from now. `World.inject` would take
-        the radio's latency off, which is before now for the PC; what it puts on the air before the start of the control
-        period would, replayed, belong to the period before, and the digests would differ.
+        The carrier comes up at the next tick that is settled on no wire: 120 ticks from now, or from `at_tick`.
+        `World.inject` would take the radio's latency off, which is before now for the PC; what it puts on the air
+        before the start of the control period would, replayed, belong to the period before, and the digests would
+        differ.
         """
         outbox = self._parts.outbox
-        earliest = self.world.tick + SETTLE_TICKS + outbox.lead_ticks
+        earliest = max(self.world.tick, at_tick) + SETTLE_TICKS + outbox.lead_ticks
         return self.world.inject(data, self.network, max(earliest, self.free_tick))
 
     def purge(self) -> None:

@@ -1,9 +1,9 @@
 """A live session: a world that the wall clock drives, and the ports through which programs talk to its robots.
 
-The world goes on in slices, so that a robot's byte is some milliseconds on its way to a program. When a program's bytes
-arrive it is moved on to that very moment first, and they go on the air there. A world that is behind catches up as fast
-as it can, and says so: it never skips. One that does not catch up takes bytes where a control period ends. The tick at
-which bytes went on the air is what the recording keeps; how they came to arrive then is not needed to run it again.
+The world goes on in slices, so that a robot's byte is some milliseconds on its way to a program. A program's bytes go
+on the air at the very moment at which they arrive, or, in a world that is behind, where its control period ends at the
+latest. Such a world catches up as fast as it can, and says so: it never skips. The tick at which bytes went on the air
+is what the recording keeps; how they came to arrive then is not needed to run it again.
 """
 
 from __future__ import annotations
@@ -113,9 +113,9 @@ class Session:
             self.selector.select(self.pace.wait_s(next_tick))
             due = self.pace.tick()
             self._advance(min(due, tick, next_tick), due)
-            if world.tick >= min(due, tick):
-                for endpoint in self.endpoints:
-                    endpoint.exchange()
+            for endpoint in self.endpoints:
+                endpoint.exchange(min(due, tick))
+                endpoint.push()
 
     def _advance(self, tick: int, due_tick: int) -> None:
         before = self.world.tick
@@ -130,7 +130,6 @@ class Session:
             if port.network not in received:
                 received[port.network] = port.received()
             endpoint.deliver(received[port.network])
-            endpoint.push()
 
     def _all_gone(self) -> bool:
         """Clients were there, none is, and what they sent has been sent: a port is drained when it is closed."""

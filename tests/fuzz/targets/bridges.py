@@ -88,7 +88,7 @@ def _client(draw, radio, port, connect, told):
         elif action == 8:
             radio.room = draw.below(4097)
         if action != 9:
-            port.exchange()
+            port.exchange(0)
         port.push()
         if not draw.left:
             break
