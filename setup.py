@@ -13,6 +13,7 @@ import platform
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -122,6 +123,81 @@ def remove_orphans():
                 built.unlink()
 
 
+INTERPRETER_ARMS = 64  # a loop around a choice of at least so many executes a program
+SWITCH_OF_A_LOOP = re.compile(
+    r"^(?P<indent> +)switch \((?P<value>\w+)\) {\n(?P<arms>(?:(?!}).*\n)*?)(?P=indent)  default: break;\n(?P=indent)}\n"
+    r"(?P=indent)(?P<again>__pyx_L\w+):;\n",
+    re.M,
+)
+"""Within one function: none of its lines begins with a brace."""
+
+
+def threaded(c):
+    """C in which every arm of an interpreter's loop fetches the next instruction and jumps to its arm by itself.
+
+    Processors predict an indirect jump from where it is and what was jumped before: one jump for the whole loop mixes
+    all instructions up. Compilers do not copy it, so the loop's head, from `while` to `switch`, is copied to the end of
+    each arm (labels as values: GCC and Clang); what the head asks before each instruction is taken to be rare.
+    Text that is not as Cython 3 writes it stays as it is: slower, the same bits. What was reshaped carries a mark, by
+    which `mirotwin info` says so.
+    """
+    for switch in SWITCH_OF_A_LOOP.finditer(c):
+        indent, value, arms, again = switch["indent"], switch["value"], switch["arms"], switch["again"]
+        numbers = {int(number, 0) for number in re.findall(rf"^{indent}  case (\w+):", arms, re.M)}
+        before, loop, head = c[: switch.start()].rpartition(f"{indent[2:]}while (1) {{\n")
+        if len(numbers) < INTERPRETER_ARMS or max(numbers) > 0xFF or not loop or "\n}\n" in head:
+            continue
+        targets = (f"&&arm_{number}" if number in numbers else f"&&{again}" for number in range(0x100))
+        table = f"static void *const arm_of[0x100] = {{{', '.join(targets)}}};\n"
+        head = re.sub(r"/\*.*?\*/", "", head, flags=re.S)
+        head = re.sub(r"if \((__pyx_t_\w+)\) {", r"if (unlikely(\1)) {", head)
+        step = f"{head}if ({value} < 0 || {value} > 0xFF) goto {again};\ngoto *arm_of[{value}];\n"
+        arms = re.sub(
+            rf"^{indent}  case (\w+):", lambda case: f"{case[0]} arm_{int(case[1], 0)}:;", arms, flags=re.M
+        )
+        arms = re.sub(rf"^{indent}  break;\n", step.replace("\\", r"\\"), arms, flags=re.M)
+        first, last = switch.span("arms")
+        sign = f'static const char dispatch[] __attribute__((used)) = "{hot_modules().DISPATCH_MARK.decode()}";\n'
+        return before + table + loop + head + c[switch.start() : first] + arms + c[last:] + sign
+    return c
+
+
+NUMBER = r"-?(?:0x[0-9A-Fa-f]+|\d+|\d*\.?\d+(?:e[+-]?\d+)?)"
+SET = re.compile(r"\b(__pyx_v_\d\w+) = ")
+SETTING = re.compile(rf"^  (__pyx_v_\d\w+) = ({NUMBER}|__pyx_t_\d+);\n", re.M)
+DECLARED = re.compile(r"^static (int|PY_LONG_LONG|double|[\w ]*__pyx_t_\w+) (__pyx_v_\d\w+);\n", re.M)
+
+
+def constants(c):
+    """C in which a `static int NAME;` that is set once, to a number, is `static int const NAME = NUMBER;`.
+
+    Cython makes variables of a module's typed names, which a compiler must load again and again. Those that are set
+    together (`A, B = 1, 2`) go through temporaries. Text that is not as Cython 3 writes it stays as it is: slower, the
+    same bits.
+    """
+    declared = {name for _, name in DECLARED.findall(c)}
+    times = Counter(SET.findall(c))
+    numbers = {}
+    for setting in SETTING.finditer(c):
+        name, value = setting.groups()
+        if name in declared and times[name] == 1 and (found := number(c, setting.start(), value)):
+            numbers[name] = found
+    c = SETTING.sub(lambda setting: "" if setting[1] in numbers else setting[0], c)
+    return DECLARED.sub(
+        lambda one: f"static {one[1]} const {one[2]} = {numbers[one[2]]};\n" if one[2] in numbers else one[0],
+        c,
+    )
+
+
+def number(c, end, value):
+    """The number that `value` is; that of a temporary was set last before `end`. "" if it is none."""
+    if value.startswith("__pyx_t_"):
+        setting = f"  {value} = "
+        place = c.rfind(setting, 0, end)
+        value = c[place + len(setting) : c.find(";", place)] if place >= 0 else ""
+    return value if re.fullmatch(NUMBER, value) else ""
+
+
 class BuildHot(build_ext):
     """Translates stamped copies, so that the hash stands in the module and not in the source."""
 
@@ -158,7 +234,7 @@ class BuildHot(build_ext):
         for extension in self.extensions:
             extension.sources = sources[extension.name]
             for source in map(Path, extension.sources):
-                self._write(source, from_file("threaded").constants(source.read_text(encoding="utf-8")))
+                self._write(source, constants(source.read_text(encoding="utf-8")))
             if self.compiler.compiler_type == "unix":
                 extension.sources = [self._thread(Path(source)) for source in extension.sources]
             hottest = HOTTEST.fullmatch(extension.name)
@@ -180,11 +256,10 @@ class BuildHot(build_ext):
 
     def _thread(self, source):
         c = source.read_text(encoding="utf-8")
-        shaped = from_file("threaded").threaded(c, hot_modules().DISPATCH_MARK)
-        if shaped == c:
-            return str(source)
-        target = source.with_suffix(".threaded.c")
-        self._write(target, shaped)
+        target = source
+        if (shaped := threaded(c)) != c:
+            target = source.with_suffix(".threaded.c")
+            self._write(target, shaped)
         return str(target)
 
     def _write(self, target, text):

@@ -13,7 +13,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 DISPATCH_MARK = b"mirotwin: dispatch replicated"
-"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`threaded`)."""
+"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`threaded` in setup.py)."""
 SHARED = "miro_exact.cython_shared"
 """A compiled module without source of ours: Cython's own code that all the others import."""
 _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)

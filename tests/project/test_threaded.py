@@ -6,16 +6,17 @@ that `mirotwin info` says whether it was done.
 
 import importlib
 import os
+import runpy
 import shutil
 from pathlib import Path
 
 import pytest
 
 from miro_exact import engine, hot_modules
-from miro_exact.threaded import constants, threaded
 from tests import children
 
-ROOT = Path(__file__).parents[2]
+SETUP = runpy.run_path(str(Path(__file__).parents[2] / "setup.py"))
+constants, threaded = SETUP["constants"], SETUP["threaded"]
 info = importlib.import_module("mirotwin.shell.info_command")  # the package has the command under this name
 PROGRAM = """
 #include <stdio.h>
@@ -55,9 +56,9 @@ def program(arms):
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(tmp_path):
     plain = program(range(100))  # rows 100 to 127 have no arm
-    assert threaded(plain, hot_modules.DISPATCH_MARK).count("goto *arm_of[") == 100
+    assert threaded(plain).count("goto *arm_of[") == 100
     said = []
-    for name, text in (("plain", plain), ("threaded", threaded(plain, hot_modules.DISPATCH_MARK))):
+    for name, text in (("plain", plain), ("threaded", threaded(plain))):
         (tmp_path / f"{name}.c").write_text(text)
         children.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
         said.append(children.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
@@ -68,7 +69,7 @@ def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(tmp_path):
 
 def test_a_choice_in_a_function_before_does_not_hide_the_loop():
     other = "int other(int a) {\n    switch (a) {\n      case 1:\n      return 2;\n    }\n    return a;\n}\n"
-    assert threaded(other + program(range(100)), hot_modules.DISPATCH_MARK).count("goto *arm_of[") == 100
+    assert threaded(other + program(range(100))).count("goto *arm_of[") == 100
 
 
 @pytest.mark.parametrize(
@@ -83,7 +84,7 @@ def test_a_choice_in_a_function_before_does_not_hide_the_loop():
     ids=["few arms", "rows above a byte", "an else", "no loop", "something after the choice"],
 )
 def test_anything_else_stays_as_it_is(text):
-    assert threaded(text, hot_modules.DISPATCH_MARK) == text
+    assert threaded(text) == text
 
 
 @pytest.mark.skipif(engine.active() != "compiled", reason="nothing is compiled")

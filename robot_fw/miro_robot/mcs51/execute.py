@@ -8,7 +8,7 @@ instruction's first cycle, `start`; results are written at the end of its last, 
 with `limit` once per instruction and knows nothing else about time.
 
 The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
-(`miro_exact.threaded`); what the head asks has to be rare. Operands are read where they are needed: `rom[at + 1]` and
+(`threaded` in setup.py); what the head asks has to be rare. Operands are read where they are needed: `rom[at + 1]` and
 `rom[at + 2]`.
 """
 
