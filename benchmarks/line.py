@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from miro_protocol import crc, whitening
-from miro_protocol.decoder import Received
-from miro_protocol.scan import Scanner
+from miro_protocol.decoder import Received, Scanner
 from miro_protocol.table import BITS_PER_CHARACTER, HOST_BIT_TICKS, Format
 
 WHITE = np.frombuffer(whitening.STRING, np.uint8)

@@ -19,8 +19,7 @@ import numpy as np
 from benchmarks.interval import clopper_pearson
 from benchmarks.line import Verdict, compare, decode_lines, flip, line_bits, random_frames, receive, rows
 from benchmarks.weights import undetected_probability
-from miro_protocol.decoder import Received
-from miro_protocol.scan import Scanner
+from miro_protocol.decoder import Received, Scanner
 from miro_protocol.table import BITS_PER_CHARACTER, DOWNLINK, HOST_BIT_TICKS, TELEMETRY, Format
 
 RATES = (1e-2, 1e-3, 1e-4)

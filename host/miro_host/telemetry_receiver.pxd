@@ -1,5 +1,5 @@
 cimport cython
-from miro_protocol.scan cimport Scanner
+from miro_protocol.decoder cimport Scanner
 
 
 cdef long long _TURN, _HALF_TURN

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from miro_exact.state import FLAG, TICK, Rows
-from miro_protocol.scan import Symbol
+from miro_protocol.decoder import Symbol
 from miro_protocol.table import BITS_PER_CHARACTER, HOST_BIT_TICKS, ROBOT_BIT_TICKS
 
 Edge = tuple[int, int]

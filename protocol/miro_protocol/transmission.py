@@ -16,7 +16,7 @@ from miro_protocol.table import (
 )
 
 if TYPE_CHECKING:
-    from miro_protocol.scan import Symbol
+    from miro_protocol.decoder import Symbol
 
 DOWN = ">"
 UP = "<"

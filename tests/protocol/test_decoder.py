@@ -13,16 +13,15 @@ from benchmarks.codec import best_time, own_jobs
 from miro_exact import engine
 from miro_exact.state import restore, snapshot, values
 from miro_protocol import decoder as module
-from miro_protocol import scan, table
-from miro_protocol.decoder import Damaged, Decoder, Reason, Received
+from miro_protocol import table
+from miro_protocol.decoder import TICK_LIMIT, Damaged, Decoder, Reason, Received, Scanner
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.hypothesis_frames import damaged_streams, team_frames, valid_streams
-from miro_protocol.scan import TICK_LIMIT, Scanner
 from miro_protocol.whitening import whiten
 from tests.exact.uncompiled import uncompiled
 from tests.naive.decoder import NaiveDecoder
 
-Twin = uncompiled(scan).Scanner
+Twin = uncompiled(module).Scanner
 FORMATS = (*table.DOWNLINK.values(), table.TELEMETRY)
 FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
 LEAD = b"\x55" * 5 + b"\xff"

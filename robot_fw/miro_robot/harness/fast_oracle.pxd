@@ -1,7 +1,7 @@
 cimport cython
 
 from miro_protocol.robot_rules cimport AnswerRule, DrivingRule, OriginRule, SilenceRule
-from miro_protocol.scan cimport Scanner
+from miro_protocol.decoder cimport Scanner
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
 from miro_robot.harness.harness cimport LiveOracle

@@ -13,6 +13,7 @@ sent.
 from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
+from miro_protocol.decoder import Scanner
 from miro_protocol.robot_receiver import Freshness
 from miro_protocol.robot_rules import (
     ACTING_TICKS,
@@ -23,7 +24,6 @@ from miro_protocol.robot_rules import (
     OriginRule,
     SilenceRule,
 )
-from miro_protocol.scan import Scanner
 from miro_protocol.table import (
     FAILSAFE_OFF_TICKS,
     FAILSAFE_STOP_TICKS,

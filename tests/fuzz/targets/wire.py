@@ -2,9 +2,9 @@
 
 from miro_exact.state import snapshot
 from miro_host.telemetry_receiver import TelemetryReceiver
-from miro_protocol import scan
+from miro_protocol import decoder
+from miro_protocol.decoder import Scanner
 from miro_protocol.frames import ContentError, describe, encode, format_of, seal
-from miro_protocol.scan import Scanner
 from miro_protocol.table import TELEMETRY, downlink
 from tests.exact.uncompiled import uncompiled
 from tests.fuzz.target import Draws, Target, always, pieces, refused
@@ -74,7 +74,7 @@ def _feed():
 
 def _columns():
     forms = (downlink(3), downlink(5), TELEMETRY)
-    Twin = uncompiled(scan).Scanner
+    Twin = uncompiled(decoder).Scanner
 
     def rows(draw, form):
         found, tick = [], 0
