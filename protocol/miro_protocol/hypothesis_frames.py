@@ -12,13 +12,13 @@ of any sender or receiver of this wire. What does not: assertions, the radio and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hypothesis import strategies as st
 
 from miro_protocol.decoder import Symbol
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.line import LineReceiver, bits_of, edges_of
 from miro_protocol.table import (
     BITS_PER_CHARACTER,
     FLAG_MEANINGS,
@@ -126,16 +126,32 @@ def _damaged(draw: st.DrawFn, wire: bytes) -> _Piece:
     return _Piece(bytes(data), tuple(stop_bits), tuple(pauses))
 
 
+def uart(bits: Sequence[int]) -> list[Symbol]:
+    """What a UART hears on a line that is mark, carries these bits of a host from tick 0 on, and is mark again.
+
+    Each bit is taken in its middle; the next fall is looked for from the end of the stop bit on.
+    """
+    line, place = [1, *bits, *[1] * 10], 1
+    symbols: list[Symbol] = []
+    while place <= len(bits):
+        if line[place - 1] == 1 and line[place] == 0:
+            byte = sum(level << bit for bit, level in enumerate(line[place + 1 : place + 9]))
+            symbols.append((byte, line[place + 9] == 1, (place - 1) * HOST_BIT_TICKS))
+            place += 9
+        place += 1
+    return symbols
+
+
 @st.composite
 def _slipped(draw: st.DrawFn, wire: bytes) -> _Piece:
     """The frame with bits of the line turned over, start and stop bits among them, as a UART hears it.
 
     Pauses are counted in characters of the host, as those of the other pieces are.
     """
-    bits = bits_of(wire)
+    bits = [bit for byte in wire for bit in (0, *(byte >> place & 1 for place in range(8)), 1)]
     for place in draw(st.lists(st.integers(0, len(bits) - 1), min_size=1, max_size=4, unique=True)):
         bits[place] ^= 1
-    symbols = LineReceiver().feed(edges_of(bits, 0), (len(bits) + 20) * HOST_BIT_TICKS)
+    symbols = uart(bits)
     data, stop_bits = bytes(byte for byte, _, _ in symbols), tuple(good for _, good, _ in symbols)
     free, pauses = 0, []
     for _, _, tick in symbols:

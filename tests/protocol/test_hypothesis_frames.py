@@ -14,7 +14,10 @@ from miro_protocol.hypothesis_frames import (
     damaged_streams,
     robot_counts,
     transmissions,
+    uart,
 )
+from miro_protocol.table import HOST_BIT_TICKS
+from tests.naive.mcs51_uart import NaiveUart
 
 ANY = settings(
     phases=[Phase.generate], max_examples=2000, deadline=None, database=None
@@ -51,6 +54,30 @@ def test_slips_are_drawn():
         return any(gap and gap % 2500 == 0 for gap in gaps) and any(not good for _, good, _ in heard.symbols)
 
     find(damaged_streams(), shows, settings=ANY)
+
+
+@given(st.binary(max_size=20))
+def test_a_uart_hears_characters_as_they_went_in(data):
+    bits = [level for byte in data for level in (0, *(byte >> place & 1 for place in range(8)), 1)]
+    assert uart(bits) == [(byte, True, place * 25_000) for place, byte in enumerate(data)]
+
+
+@settings(max_examples=60)
+@given(st.lists(st.integers(0, 1), max_size=80), st.integers(0, 155))
+def test_a_uart_hears_what_the_chip_does(bits, phase):
+    """Against the naive twin of the 8051's receiver, 16 samples a bit at 156 ticks."""
+    chip, found = NaiveUart(), []
+    chip.scon = 0x50
+    levels = [1, 1, *bits, *[1] * 12]
+    for tick in range(0, len(levels) * HOST_BIT_TICKS, 12):  # RI shows on machine cycles
+        for now in range(tick, tick + 12):
+            chip.tick(now)
+            if now % 156 == 0:
+                chip.clock_rx(now, levels[max(now - phase, 0) // HOST_BIT_TICKS])
+        if chip.scon & 1:
+            found.append((chip.sbuf, bool(chip.scon & 4)))
+            chip.scon &= 0xFE
+    assert [(byte, good) for byte, good, _ in uart(bits)] == found
 
 
 @pytest.mark.slow
