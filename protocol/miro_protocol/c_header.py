@@ -22,42 +22,85 @@ BANNER = """\
 
 def render() -> str:
     """The whole header, ending in a newline."""
-    parts = [BANNER, "#ifndef PROTOCOL_H\n#define PROTOCOL_H\n"]
-    for title, lines in _sections():
-        parts.append(f"/* {title} */\n" + "".join(f"{line}\n" for line in lines))
-    parts.append("#endif\n")
-    return "\n".join(parts)
+    return BANNER + "".join(f"{line}\n" for line in _lines())
 
 
-def _sections() -> Iterator[tuple[str, Iterator[str]]]:
-    yield "Networks", _networks()
-    for n in ROBOT_COUNTS:
-        yield f"Host to robot, N = {n}", _format(f"RX{n}", DOWNLINK[n])
-    yield "Robot to host", _format("TX", TELEMETRY)
-    yield "HDR = type << 6 | seq", _header()
-    yield "Offsets inside the payload, whose first byte follows HDR", _payloads()
-    yield "Telemetry: first payload byte = slot | flags", _flags()
-    yield _CRC_COMMENT, _crc_defines()
-    yield (
-        "Reception: the spacing of characters, start bit to start bit, in machine cycles (inclusive limits)",
-        _spacing(),
-    )
-    yield _FRESH_COMMENT, _freshness()
-    yield "Failsafe: time without a fresh frame", _failsafe()
-    yield "Values", _values()
-    yield "Tables", _tables()
+def _lines() -> Iterator[str]:
+    yield from ("", "#ifndef PROTOCOL_H", "#define PROTOCOL_H")
+    yield _title("Networks")
+    yield _define("ROBOTS_MIN", min(ROBOT_COUNTS))
+    yield _define("ROBOTS_MAX", max(ROBOT_COUNTS))
+    yield _define("TIMER2_RELOAD_HIGH", _hex(table.TIMER2_RELOAD >> 8), "9615.38 baud")
+    yield _define("TIMER2_RELOAD_LOW", _hex(table.TIMER2_RELOAD & 0xFF))
+    formats = {f"RX{n}": DOWNLINK[n] for n in ROBOT_COUNTS} | {"TX": TELEMETRY}
+    for prefix, form in formats.items():
+        yield _title("Robot to host" if form is TELEMETRY else f"Host to robot, N = {prefix[2:]}")
+        yield from _format(prefix, form)
+    yield _title("HDR = type << 6 | seq")
+    yield _define("PREAMBLE_BYTE", _hex(TELEMETRY.lead[0]))
+    yield _define("PREAMBLE_LAST", _hex(TELEMETRY.lead[-1]))
+    yield _define("SYNC_0", _hex(table.SYNC[0]))
+    yield _define("SYNC_1", _hex(table.SYNC[1]))
+    yield _define("SEQ_MASK", _hex(table.SEQ_MODULUS - 1))
+    yield _define("TYPE_MASK", _hex(0xFF & -table.SEQ_MODULUS))
+    for kind in table.FrameType:
+        yield _define(f"TYPE_{kind.name}", _hex(kind * table.SEQ_MODULUS), table.FRAME_MEANINGS[kind])
+    yield _title("Offsets inside the payload, whose first byte follows HDR")
+    yield from _payloads()
+    yield _title("Telemetry: first payload byte = slot | flags")
+    yield _define("SLOT_MASK", _hex(table.SLOT_MASK))
+    for flag, meaning in table.FLAG_MEANINGS.items():
+        yield _define(f"FLAG_{flag.name}", _hex(flag), meaning)
+    yield _title(CRC_COMMENT)
+    yield _define("CRC_POLYNOMIAL_REFLECTED", _hex(crc.POLYNOMIAL_REFLECTED, 4))
+    yield _define("CRC_XOR_OUT", _hex(crc.XOR_OUT, 4))
+    for prefix, form in formats.items():
+        yield _define(f"CRC_START_{prefix}", _hex(crc.register(bytes([form.layout])), 4))
+    yield _define("CRC_RESIDUE", _hex(crc.residue(), 4))
+    yield _title(SPACING_COMMENT)
+    spacing, tolerance = table.SPACING_TICKS, table.SPACING_TOLERANCE_TICKS
+    for name, ticks in (("NOMINAL", spacing), ("MIN", spacing - tolerance), ("MAX", spacing + tolerance)):
+        yield _define(f"SPACING_{name}", ticks // table.TICKS_PER_CYCLE)
+    yield _title(FRESH_COMMENT)
+    yield _define("FRESH_STEPS", table.FRESH_STEPS)
+    yield _define("FRESH_AGAIN_MS", table.FRESH_AGAIN_TICKS // table.TICKS_PER_MS)
+    yield _title("Failsafe: time without a fresh frame")
+    yield _define("FAILSAFE_STOP_MS", table.FAILSAFE_STOP_TICKS // table.TICKS_PER_MS, "smooth stop")
+    yield _define("FAILSAFE_OFF_MS", table.FAILSAFE_OFF_TICKS // table.TICKS_PER_MS, "motors off")
+    yield _define("CYCLES_PER_MS", table.TICKS_PER_MS // table.TICKS_PER_CYCLE)
+    yield _title("Values")
+    yield _define("VELOCITY_SATURATION", table.VELOCITY_SATURATION, "+-, 1/256 count per sample: 1.46 m/s")
+    acceleration = f"{table.DEFAULT_ACCELERATION}UL"
+    yield _define("DEFAULT_ACCELERATION", acceleration, "16.16 count/sample^2: 6 m/s2 at 6 MHz")
+    yield _title("Tables")
+    yield "#ifdef PROTOCOL_TABLES"
+    yield from _array("whitening", whitening.STRING)
+    yield from _array("crc_nibble_low", [word & 0xFF for word in crc.table_of(4)])
+    yield from _array("crc_nibble_high", [word >> 8 for word in crc.table_of(4)])
+    yield from ("#endif", "", "#endif")
 
 
-_CRC_COMMENT = (
+CRC_COMMENT = (
     "CRC-16 5935h reflected over layout byte, HDR, payload in clear; sent low byte first, before whitening.\n"
     " * A register that starts at CRC_START_x needs no layout byte; XOR CRC_XOR_OUT gives the CRC to send.\n"
     " * Taken on over both received CRC bytes, an intact frame leaves CRC_RESIDUE.\n"
     " * Per byte, twice, low nibble first: reg = (reg >> 4) ^ table[(reg ^ nibble) & 15]"
 )
-_FRESH_COMMENT = (
+SPACING_COMMENT = (
+    "Reception: the spacing of characters, start bit to start bit, in machine cycles (inclusive limits)"
+)
+FRESH_COMMENT = (
     "Freshness of a valid frame: step = (seq - seq of the last fresh frame) & SEQ_MASK is 1..FRESH_STEPS;\n"
     " * any step but 0 when FRESH_AGAIN_MS or more have passed since that frame; always before the first one"
 )
+
+
+def _title(text: str) -> str:
+    return f"\n/* {text} */"
+
+
+def _hex(number: int, digits: int = 2) -> str:
+    return f"0x{number:0{digits}X}"
 
 
 def _define(name: str, value: int | str, note: str = "") -> str:
@@ -65,16 +108,9 @@ def _define(name: str, value: int | str, note: str = "") -> str:
     return f"{line:<44} /* {note} */" if note else line
 
 
-def _networks() -> Iterator[str]:
-    yield _define("ROBOTS_MIN", min(ROBOT_COUNTS))
-    yield _define("ROBOTS_MAX", max(ROBOT_COUNTS))
-    yield _define("TIMER2_RELOAD_HIGH", f"0x{table.TIMER2_RELOAD >> 8:02X}", "9615.38 baud")
-    yield _define("TIMER2_RELOAD_LOW", f"0x{table.TIMER2_RELOAD & 0xFF:02X}")
-
-
 def _format(prefix: str, form: Format) -> Iterator[str]:
     header = len(form.sync)
-    yield _define(f"{prefix}_LAYOUT", f"0x{form.layout:02X}", "fed to the CRC first, never sent")
+    yield _define(f"{prefix}_LAYOUT", _hex(form.layout), "fed to the CRC first, never sent")
     yield _define(f"{prefix}_PREAMBLE", form.lead.count(b"\x55"), "characters 55h, then one FFh")
     yield _define(f"{prefix}_WIRE", form.wire_size, "characters from the preamble to the CRC")
     yield _define(f"{prefix}_FRAME", form.size, "characters from the sync to the CRC: the window")
@@ -85,17 +121,6 @@ def _format(prefix: str, form: Format) -> Iterator[str]:
     yield _define(f"{prefix}_AT_CRC", header + form.body_size)
 
 
-def _header() -> Iterator[str]:
-    yield _define("PREAMBLE_BYTE", f"0x{TELEMETRY.lead[0]:02X}")
-    yield _define("PREAMBLE_LAST", f"0x{TELEMETRY.lead[-1]:02X}")
-    yield _define("SYNC_0", f"0x{table.SYNC[0]:02X}")
-    yield _define("SYNC_1", f"0x{table.SYNC[1]:02X}")
-    yield _define("SEQ_MASK", f"0x{table.SEQ_MODULUS - 1:02X}")
-    yield _define("TYPE_MASK", f"0x{0xFF & -table.SEQ_MODULUS:02X}")
-    for kind in table.FrameType:
-        yield _define(f"TYPE_{kind.name}", f"0x{kind * table.SEQ_MODULUS:02X}", table.FRAME_MEANINGS[kind])
-
-
 def _offsets(prefix: str, fields: Sequence[Field], start: int = 0) -> Iterator[str]:
     for field in fields:
         note = ", ".join(part for part in (field.c_type, field.meaning, field.unit) if part)
@@ -104,68 +129,19 @@ def _offsets(prefix: str, fields: Sequence[Field], start: int = 0) -> Iterator[s
 
 
 def _payloads() -> Iterator[str]:
-    yield _define(
-        "PAIR_SIZE", sum(field.size for field in table.VELOCITY), "one robot's velocities, slot 0 first"
-    )
+    size = sum(field.size for field in table.VELOCITY)
+    yield _define("PAIR_SIZE", size, "one robot's velocities, slot 0 first")
     yield from _offsets("PAIR", table.VELOCITY)
     yield from _offsets("SERVICE", table.SERVICE)
     start = sum(field.size for field in table.SERVICE)
     for opcode in table.Opcode:
-        yield _define(f"OPCODE_{opcode.name}", f"0x{opcode:02X}")
+        yield _define(f"OPCODE_{opcode.name}", _hex(opcode))
         yield from _offsets("SERVICE", table.SERVICE_DATA[opcode], start)
     yield from _offsets("TELEMETRY", table.TELEMETRY_FIELDS)
-
-
-def _flags() -> Iterator[str]:
-    yield _define("SLOT_MASK", f"0x{table.SLOT_MASK:02X}")
-    for flag, meaning in table.FLAG_MEANINGS.items():
-        yield _define(f"FLAG_{flag.name}", f"0x{flag:02X}", meaning)
-
-
-def _crc_defines() -> Iterator[str]:
-    yield _define("CRC_POLYNOMIAL_REFLECTED", f"0x{crc.POLYNOMIAL_REFLECTED:04X}")
-    yield _define("CRC_XOR_OUT", f"0x{crc.XOR_OUT:04X}")
-    for prefix, form in (*((f"RX{n}", DOWNLINK[n]) for n in ROBOT_COUNTS), ("TX", TELEMETRY)):
-        yield _define(f"CRC_START_{prefix}", f"0x{crc.register(bytes([form.layout])):04X}")
-    yield _define("CRC_RESIDUE", f"0x{crc.residue():04X}")
-
-
-def _spacing() -> Iterator[str]:
-    low = table.SPACING_TICKS - table.SPACING_TOLERANCE_TICKS
-    high = table.SPACING_TICKS + table.SPACING_TOLERANCE_TICKS
-    for name, ticks in (("NOMINAL", table.SPACING_TICKS), ("MIN", low), ("MAX", high)):
-        yield _define(f"SPACING_{name}", ticks // table.TICKS_PER_CYCLE)
-
-
-def _freshness() -> Iterator[str]:
-    yield _define("FRESH_STEPS", table.FRESH_STEPS)
-    yield _define("FRESH_AGAIN_MS", table.FRESH_AGAIN_TICKS // table.TICKS_PER_MS)
-
-
-def _failsafe() -> Iterator[str]:
-    yield _define("FAILSAFE_STOP_MS", table.FAILSAFE_STOP_TICKS // table.TICKS_PER_MS, "smooth stop")
-    yield _define("FAILSAFE_OFF_MS", table.FAILSAFE_OFF_TICKS // table.TICKS_PER_MS, "motors off")
-    yield _define("CYCLES_PER_MS", table.TICKS_PER_MS // table.TICKS_PER_CYCLE)
-
-
-def _values() -> Iterator[str]:
-    yield _define("VELOCITY_SATURATION", table.VELOCITY_SATURATION, "+-, 1/256 count per sample: 1.46 m/s")
-    yield _define(
-        "DEFAULT_ACCELERATION", f"{table.DEFAULT_ACCELERATION}UL", "16.16 count/sample^2: 6 m/s2 at 6 MHz"
-    )
-
-
-def _tables() -> Iterator[str]:
-    words = crc.table_of(4)
-    yield "#ifdef PROTOCOL_TABLES"
-    yield from _array("whitening", whitening.STRING)
-    yield from _array("crc_nibble_low", [word & 0xFF for word in words])
-    yield from _array("crc_nibble_high", [word >> 8 for word in words])
-    yield "#endif"
 
 
 def _array(name: str, values: Sequence[int]) -> Iterator[str]:
     yield f"static const __code unsigned char {name}[{len(values)}] = {{"
     for start in range(0, len(values), 8):
-        yield "    " + " ".join(f"0x{value:02X}," for value in values[start : start + 8])
+        yield "    " + " ".join(f"{_hex(value)}," for value in values[start : start + 8])
     yield "};"
