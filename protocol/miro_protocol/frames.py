@@ -37,8 +37,6 @@ from miro_protocol.table import (
 from miro_protocol.whitening import whiten
 
 _LOW = max(field.low for field in VELOCITY)
-_HIGH = min(field.high for field in VELOCITY)
-_TEAM, _TEAM_ASK = FrameType.TEAM, FrameType.TEAM_ASK
 _CODES = {1: "b", 2: "h", 4: "i"}
 _VELOCITIES = {
     n: struct.Struct("<" + n * "".join(_CODES[field.size] for field in VELOCITY)) for n in ROBOT_COUNTS
@@ -177,7 +175,7 @@ def encode(message: Message, n: int) -> bytes:
     return seal(form, _body(message, n, form))
 
 
-def _body(message: Message, n: int, form: Format) -> bytes:
+def _body(message: Any, n: int, form: Format) -> bytes:
     """HDR and payload in clear."""
     if isinstance(message, TeamFrame):
         kind, payload = _team_type(message.type), _team_payload(message, n)
@@ -186,24 +184,16 @@ def _body(message: Message, n: int, form: Format) -> bytes:
     elif isinstance(message, TelemetryFrame):
         kind, payload = FrameType.TELEMETRY, _telemetry_payload(message, n)
     else:
-        raise _no_message(message)
-    seq = message.seq
-    header = kind * SEQ_MODULUS + (seq if type(seq) is int and 0 <= seq < SEQ_MODULUS else checked(SEQ, seq))
+        what = "must be a TeamFrame, ServiceFrame or TelemetryFrame"
+        raise EncodeError(f"message = {_shown(message)}: {what}")
+    header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
     return bytes([header]) + payload.ljust(form.payload_size, b"\0")
-
-
-def _no_message(value: Any) -> EncodeError:
-    return EncodeError(f"message = {_shown(value)}: must be a TeamFrame, ServiceFrame or TelemetryFrame")
 
 
 def seal(form: Format, body: bytes) -> bytes:
     """Wire bytes around any `body` (HDR and payload in clear): CRC, whitening, sync and preamble."""
-    return form.lead + form.sync + whiten(body + crc(form, body).to_bytes(2, "little"))
-
-
-def crc(form: Format, body: bytes) -> int:
-    """The CRC a frame of this format must carry behind `body`."""
-    return crc16(bytes([form.layout]) + body)
+    crc = crc16(bytes([form.layout]) + body)
+    return form.lead + form.sync + whiten(body + crc.to_bytes(2, "little"))
 
 
 def decode_fields(body: bytes, n: int) -> Message:
@@ -261,27 +251,16 @@ def _require_sendable(message: Message, body: bytes, n: int) -> None:
 
 
 def _team_type(kind: int) -> int:
-    if kind is _TEAM or kind is _TEAM_ASK:
-        return int(kind)
-    allowed = (_TEAM, _TEAM_ASK)
-    what = f"{_TEAM:d} or {_TEAM_ASK:d}"
+    what = f"{FrameType.TEAM:d} or {FrameType.TEAM_ASK:d}"
     number = _whole("type", kind, what)
-    if number not in allowed:
+    if number not in (FrameType.TEAM, FrameType.TEAM_ASK):
         raise EncodeError(f"type = {_shown(kind)}: a team frame has type {what}")
     return number
 
 
 def _team_payload(message: TeamFrame, n: int) -> bytes:
     pairs = _items("velocities", message.velocities, n, "pairs of (left, right), one a robot")
-    numbers: list[int] = []
-    for slot, pair in enumerate(pairs):
-        if type(pair) is tuple and len(pair) == 2:  # what a station sends, judged without a call
-            left, right = pair
-            if type(left) is type(right) is int and _LOW <= left <= _HIGH and _LOW <= right <= _HIGH:
-                numbers += pair
-                continue
-        numbers += _pair(slot, pair)
-    return _VELOCITIES[n].pack(*numbers)
+    return _VELOCITIES[n].pack(*(number for slot, pair in enumerate(pairs) for number in _pair(slot, pair)))
 
 
 def _pair(slot: int, pair: Any) -> tuple[int, int]:
