@@ -22,7 +22,6 @@ cdef class Scanner:
     cpdef begin(self)
     cpdef bint take(self, int byte, bint bad_stop, long long tick) except -1
     cdef void _clear(self) noexcept
-    cpdef int body_at(self, int place) noexcept
 
     @cython.locals(tick='long long', view='const unsigned char[::1]')
     cpdef list feed(self, data, start_tick=*)

@@ -32,8 +32,7 @@ RUN_LIMIT = 4096  # a run of garbage is reported in pieces of so many characters
 TICK_LIMIT = NEVER_TICK  # ticks beyond +- this are refused: they are 64-bit numbers here
 REASONS = tuple(Reason)
 
-_CAPACITY = 4160  # C constants when compiled: room for a run and the window that goes on after it
-_BAD_STOP = 1  # flaws of a character
+_BAD_STOP = 1  # flaws of a character; these are C constants when compiled
 _APART = 2  # ... does not follow its predecessor at the right distance
 _FRAME = 1  # what a character completed
 _RUN = 2
@@ -83,19 +82,12 @@ class Scanner:
         self._spacing = SPACING_TICKS
         self._tolerance = tolerance_ticks
         self._run_limit = run_limit
-        self.valid = 0
-        self.rejected = 0
-        # The characters not yet given out, side by side: byte, flaws, time.
-        self._data = bytearray(_CAPACITY)
-        self._flaws = bytearray(_CAPACITY)
+        # The characters not yet given out, side by side: byte, flaws, time. Room for a run and the window after it.
+        self._data = bytearray(4160)
+        self._flaws = bytearray(4160)
         self._ticks = [0] * 4160
-        self._count = 0
-        self._last_bad = -1  # where among them the last bad stop bit is, and the last pause
-        self._last_apart = -1
-        self._reason = _NO_SYNC
-        self._next_tick = 0  # where a character would start that follows at once
-        self._paused = True
         self.body = bytearray(64)
+        self.begin()
 
     def __repr__(self) -> str:
         counts = f"{self.valid} valid, {self.rejected} rejected, {self._count} characters pending"
@@ -106,11 +98,18 @@ class Scanner:
         self.valid = 0
         self.rejected = 0
         self._clear()
-        self._next_tick = 0
+        self._next_tick = 0  # where a character would start that follows at once
         self._paused = True
 
+    def _clear(self) -> None:
+        """No character waits for its event."""
+        self._count = 0
+        self._last_bad = -1  # where the last bad stop bit is among them, and the last pause
+        self._last_apart = -1
+        self._reason = _NO_SYNC
+
     def take(self, byte: int, bad_stop: bool, tick: int) -> bool:
-        """A character, without events: whether it completes a frame, whose HDR and payload `body_at` then gives.
+        """A character, without events: whether it completes a frame, whose HDR and payload then stand in `body`.
 
         For who judges millions of frames; `tick` is that of the start bit, below 2^62.
         """
@@ -121,10 +120,6 @@ class Scanner:
         elif found:
             self._give_out(found, [])
         return found == _FRAME
-
-    def body_at(self, place: int) -> int:
-        """A byte of the frame that `take` completed last, without whitening: HDR at 0, then the payload."""
-        return self.body[place]
 
     @property
     def pending(self) -> int:
@@ -264,13 +259,6 @@ class Scanner:
     def _read_body(self, sync: int) -> None:
         for place in range(self._size - 4):
             self.body[place] = self._data[sync + 2 + place] ^ self._white[place]
-
-    def _clear(self) -> None:
-        """No character waits for its event."""
-        self._count = 0
-        self._last_bad = -1
-        self._last_apart = -1
-        self._reason = _NO_SYNC
 
     def _lead_start(self, sync: int) -> int:
         """Where the preamble begins: its last characters that are intact right before the sync."""

@@ -5,9 +5,9 @@ cdef int _ANSWER_SIZE
 
 
 cdef class SilenceRule:
-    cdef readonly long long after_ticks, tolerance_ticks, last_tick, received_tick
+    cdef readonly long long after_ticks, tolerance_ticks, received_tick
+    cdef public long long last_tick
 
-    cpdef void begin(self, long long last_tick) noexcept
     cpdef long long end_tick(self) noexcept
     cpdef long long earliest_tick(self) noexcept
     cpdef long long latest_tick(self) noexcept
@@ -19,11 +19,11 @@ cdef class SilenceRule:
 
 
 cdef class DrivingRule:
-    cdef readonly long long within_ticks, fresh_tick, deadline
+    cdef readonly long long within_ticks, deadline
+    cdef public long long fresh_tick
     cdef readonly list waiting
 
     cpdef begin(self)
-    cpdef void fresh(self, long long tick) noexcept
     cpdef bint may_move(self, long long tick) noexcept
     cpdef team(self, long long tick, int left, int right)
     cpdef told(self, int left, int right)
@@ -34,7 +34,6 @@ cdef class OriginRule:
     cdef readonly long long within_ticks
     cdef readonly object frames
 
-    cpdef begin(self)
     cpdef team(self, long long tick, int left, int right)
     @cython.locals(begun='long long', one=int, other=int, found=bint)
     cpdef bint allows(self, long long tick, int left, int right) except -1

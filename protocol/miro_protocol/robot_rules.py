@@ -37,8 +37,9 @@ class SilenceRule:
     """So long after the last fresh frame both wheels are stopped, or off, within a tolerance.
 
     A robot may count from the start or from the end of the frame's last character. One that receives characters when
-    the time comes may be testing a frame, which may be the fresh one: it has `TESTING_TICKS` more. `last_tick`: of the
-    last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of the last character.
+    the time comes may be testing a frame, which may be the fresh one: it has `TESTING_TICKS` more. `last_tick`, which
+    who judges sets: of the last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of
+    the last character.
     """
 
     NOT_STATE = ("*",)
@@ -48,10 +49,6 @@ class SilenceRule:
         self.tolerance_ticks = tolerance_ticks
         self.last_tick = -1
         self.received_tick = -1
-
-    def begin(self, last_tick: int) -> None:
-        """The last fresh frame is that at `last_tick`; -1: there is none, or it is judged."""
-        self.last_tick = last_tick
 
     def end_tick(self) -> int:
         """The end of the last fresh frame."""
@@ -63,7 +60,7 @@ class SilenceRule:
 
     def latest_tick(self) -> int:
         """When the time of a robot that tests no frame is over."""
-        return self.last_tick + _CHARACTER + self.after_ticks + self.tolerance_ticks
+        return self.end_tick() + self.after_ticks + self.tolerance_ticks
 
     def received(self, tick: int) -> None:
         """A character came. Once the time is over it puts nothing off."""
@@ -92,26 +89,22 @@ class SilenceRule:
 class DrivingRule:
     """Wheels are told to turn only within `within_ticks` of a fresh frame, and what a fresh team frame says in time.
 
-    `fresh_tick`: of the last fresh frame, -1 before the first; `deadline`: of the first team frame that waits.
+    `fresh_tick`, which who judges sets: of the last fresh frame of any type, -1 before the first; `deadline`: of the
+    first team frame that waits.
     """
 
     NOT_STATE = ("*",)
 
     def __init__(self, within_ticks: int = ACTING_TICKS) -> None:
         self.within_ticks = within_ticks
-        self.fresh_tick = -1
-        self.deadline = NEVER_TICK
         self.waiting: list[tuple[int, int, int]] = []
+        self.begin()
 
     def begin(self) -> None:
         """No frame has come yet."""
         self.fresh_tick = -1
         self.deadline = _NEVER
         self.waiting.clear()
-
-    def fresh(self, tick: int) -> None:
-        """A fresh frame of any type."""
-        self.fresh_tick = tick
 
     def may_move(self, tick: int) -> bool:
         """Whether a wheel may be told to turn at `tick`."""
@@ -140,17 +133,13 @@ class DrivingRule:
 
 
 class OriginRule:
-    """Velocities are those of one team frame of the last `within_ticks`; 0 for both is always allowed to stop."""
+    """Velocities are those of one of the team `frames` of the last `within_ticks`."""
 
     NOT_STATE = ("*",)
 
     def __init__(self, within_ticks: int) -> None:
         self.within_ticks = within_ticks
         self.frames: deque[tuple[int, int, int]] = deque()
-
-    def begin(self) -> None:
-        """No frame has come yet."""
-        self.frames.clear()
 
     def team(self, tick: int, left: int, right: int) -> None:
         """A team frame, in the order of time."""

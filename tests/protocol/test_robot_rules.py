@@ -22,7 +22,7 @@ NEAR = st.integers(-5, 5)
 def test_silence_is_over_at_its_deadline_and_early_before_its_window(last_tick, after, tolerance, around):
     rule = SilenceRule(after, tolerance)
     assert not rule.is_over(last_tick + 1000 * MS)
-    rule.begin(last_tick)
+    rule.last_tick = last_tick
     due = rule.end_tick() + after
     received = sorted(due + offset for offset in around)
     for tick in received:
@@ -32,7 +32,7 @@ def test_silence_is_over_at_its_deadline_and_early_before_its_window(last_tick, 
     assert [rule.is_over(deadline + more) for more in (-1, 0, 1)] == [False, False, True]
     for tick in (*received, rule.earliest_tick() - 1, rule.earliest_tick()):
         assert rule.is_early(tick) == naive.silence_is_early(last_tick, after, tolerance, tick)
-    rule.begin(-1)
+    rule.last_tick = -1
     assert not rule.is_over(deadline + 1)
 
 
@@ -50,7 +50,7 @@ def test_frames_that_are_not_obeyed_in_time_are_missed(events, within):
             missed.append(naive.Said(found[0] - within, found[1:]))
         (frames if is_frame else orders).append(naive.Said(now, words))
         if is_frame:
-            rule.fresh(now)
+            rule.fresh_tick = now
             rule.team(now, *words)
         else:
             rule.told(*words)

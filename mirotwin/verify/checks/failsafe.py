@@ -85,7 +85,7 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
         elif event.what == "frame":
             if event.value and event.frame is not None:
                 self._fail_late(event.tick)
-                self.rule.begin(event.frame.last_tick)
+                self.rule.last_tick = event.frame.last_tick
                 self.in_time = False
         else:
             self._command(event)
@@ -101,14 +101,14 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
             self.judged += 1
             after = in_ms(event.tick - self.rule.end_tick())
             self.fail(event.tick, self.wanted, f"the {order.side} one after {after}")
-            self.rule.begin(-1)
+            self.rule.last_tick = -1
         elif self.rule.is_judged(event.tick):
             self.in_time = True
 
     def restarted(self, tick: int) -> None:
         self.until(tick)
         self._fail_late(tick)
-        self.rule.begin(-1)
+        self.rule.last_tick = -1
         super().restarted(tick)
 
     def end(self, tick: int) -> None:
@@ -121,7 +121,7 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
         self.judged += bool(unfulfilled or self.in_time)
         if unfulfilled:
             self.late = (self.rule.end_tick(), self.rule.deadline())
-        self.rule.begin(-1)
+        self.rule.last_tick = -1
 
     def _fail_late(self, tick: int) -> None:
         """Notes the failure of wheels that are late, when it is known how late: at `tick` they are told, or it is given

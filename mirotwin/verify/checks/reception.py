@@ -45,7 +45,7 @@ class MovesMonitor(OrdersMonitor[MovesOnlyWhenFresh]):
     def event(self, event: Event) -> None:
         if event.what == "frame":
             if event.value and event.frame is not None:
-                self.rule.fresh(event.frame.last_tick)
+                self.rule.fresh_tick = event.frame.last_tick
             return
         order = self.orders.take(event)
         if order is None or not order.moves:

@@ -100,7 +100,7 @@ class FastOracle(LiveOracle):
         self.decided = 1  # 0: it cannot be said any more what the robot must do
         self.up_tick = -1  # until when firmware that was reset may take to come up
         self._forget()
-        self.origin.begin()
+        self.origin.frames.clear()
 
     def _forget(self) -> None:
         """The processor begins again: nothing was received or told."""
@@ -113,8 +113,8 @@ class FastOracle(LiveOracle):
         self.right_order.begin()
         self.driving.begin()
         self.answers.begin()
-        self.stop.begin(-1)
-        self.off.begin(-1)
+        self.stop.last_tick = -1
+        self.off.last_tick = -1
 
     def restarted(self, tick: int) -> None:
         """Pins that all went high at once may have told an LM629 nonsense, until firmware has reset it."""
@@ -177,7 +177,7 @@ class FastOracle(LiveOracle):
         if silence.is_over(tick):
             if not (self._is_over(code, self.left_order) and self._is_over(code, self.right_order)):
                 self._found(code, silence.deadline())
-            silence.begin(-1)
+            silence.last_tick = -1
 
     def _is_over(self, code: int, order: WheelOrder) -> bool:
         """Whether a wheel is as it has to be in silence: stopped or off."""
@@ -193,7 +193,7 @@ class FastOracle(LiveOracle):
 
     def _frame(self, tick: int) -> None:
         """A valid frame, whose last character began at `tick`."""
-        hdr = self.window.body_at(0)
+        hdr = self.window.body[0]
         kind = hdr >> 6
         seq = hdr % SEQ_MODULUS
         self._ask_whether_decided(seq, tick)
@@ -205,9 +205,9 @@ class FastOracle(LiveOracle):
             self.accepted += 1
             self.fresh_tick = tick
             self.fresh_seq = seq
-            self.driving.fresh(tick)
-            self.stop.begin(tick)
-            self.off.begin(tick)
+            self.driving.fresh_tick = tick
+            self.stop.last_tick = tick
+            self.off.last_tick = tick
             if team and not self._stops_already():
                 self.driving.team(tick, self.left, self.right)
             if kind == _ASK and seq % self.robots == self.slot:
@@ -232,14 +232,14 @@ class FastOracle(LiveOracle):
         if self.slot >= self.robots:
             return False
         for place in range(1, self.payload, 2):
-            if self.window.body_at(place) == 0 and self.window.body_at(place + 1) == 0x80:
+            if self.window.body[place] == 0 and self.window.body[place + 1] == 0x80:
                 return False
         self.left = self._word(1 + 4 * self.slot)
         self.right = self._word(3 + 4 * self.slot)
         return True
 
     def _word(self, place: int) -> int:
-        word = self.window.body_at(place) | self.window.body_at(place + 1) << 8
+        word = self.window.body[place] | self.window.body[place + 1] << 8
         if word >= 0x8000:
             word -= 0x10000
         return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
@@ -265,8 +265,8 @@ class FastOracle(LiveOracle):
             self._found(_IN_TURN, tick)
         elif self.telemetry.take(value, False, tick - TO_TI_TICKS):
             tick -= TO_TI_TICKS
-            seq = self.telemetry.body_at(0) % SEQ_MODULUS
-            slot = self.telemetry.body_at(1) & SLOT_MASK
+            seq = self.telemetry.body[0] % SEQ_MODULUS
+            slot = self.telemetry.body[1] & SLOT_MASK
             if not self.answers.in_turn(seq) or slot != self.slot:
                 self._found(_IN_TURN, tick)
             if self.answers.late(tick, seq):

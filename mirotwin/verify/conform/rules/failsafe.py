@@ -181,7 +181,7 @@ def off_behind(script: TrialScript, last: Frame) -> None:
 
 def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
     rule = SilenceRule(after_ticks)
-    rule.begin(last.last_tick)
+    rule.last_tick = last.last_tick
     earliest, latest = rule.earliest_tick(), rule.latest_tick()
 
     def done(observed: Observed, side: str, tick: int) -> bool:
