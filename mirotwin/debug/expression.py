@@ -122,8 +122,10 @@ def _element(value: Value, index: int) -> Value:
     return _part(value, kind.element, index * kind.element.size)
 
 
-def _pointed(value: Value, index: int) -> Value:
+def _pointed(value: Value, index: Any) -> Value:
     """What a pointer points to, or so many elements after it; of an array its element."""
+    if not isinstance(index, int):
+        raise NoValue(f"[{index}] is no whole number")
     kind = value.kind
     if kind is None or kind.kind != "pointer":
         return _element(value, index)

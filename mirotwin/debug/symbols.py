@@ -119,7 +119,7 @@ class Moment:
         self.symbols = symbols
         self.core = core
         self.frame = frame
-        self.pc = self.frames()[frame].pc if frame else core.cpu.pc
+        self.pc = self.frames()[frame].place if frame else core.cpu.pc
 
     def frames(self) -> list[StackFrame]:
         return self.symbols.unwinder.frames(self.core.cpu)
@@ -153,9 +153,11 @@ class Moment:
         there = self.symbols.variables.by_name.get(name, ())
         fitting = [one for one in there if not module or module in (one.scope, one.module)]
         near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
-        if len(fitting) > 1 and not near:
-            places = ", ".join(f"{one.scope}:{name}" for one in fitting)
-            raise NoValue(f"there are several {name}", f"give one of {places}")
+        if there and not near and len(fitting) != 1:
+            what = f"there are several {name}" if fitting else f"there is no {name} of {module}"
+            raise NoValue(
+                what, f"give one of {', '.join(f'{one.scope or one.module}:{name}' for one in there)}"
+            )
         return next(iter(near or fitting), None)
 
     def placed(self, variable: Variable) -> Value:

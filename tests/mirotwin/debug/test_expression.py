@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from miro_exact.bad_input import BadInput
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
+from miro_robot.image.c_types import CType
 from mirotwin.debug.expression import NoValue, Value, content, expression
 from mirotwin.rerun.inspected_run import BareRun
 from tests import children
@@ -17,13 +18,18 @@ from tests.mutants.sdcc import needs_sdcc
 
 
 class Numbers:
-    """A scope of plain numbers."""
+    """A scope of plain numbers, and of `m`, a memory of zeros."""
 
     def __init__(self, **numbers):
         self.numbers = numbers
 
     def find(self, name, module):
+        if name == "m":
+            return Value(CType("array", 8, element=CType("int", 1), count=8), "iram", 0, self)
         return Value(number=self.numbers[name])
+
+    def read(self, space, address, count):
+        return bytes(count)
 
 
 def value(text, scope=None):
@@ -57,7 +63,9 @@ def test_operators_have_the_ranks_of_c(text, expected):
 
 @given(
     st.lists(
-        st.sampled_from(["a", "b", "3", "+", "-", "*", "(", ")", "&", "<", ".", "[", "]", "0x", "'", "$"])
+        st.sampled_from(
+            ["a", "b", "m", "1.5", "3", "+", "-", "*", "(", ")", "&", "<", ".", "[", "]", "0x", "'", "$"]
+        )
     )
 )
 def test_what_cannot_be_read_is_said(parts):
@@ -68,7 +76,7 @@ def test_what_cannot_be_read_is_said(parts):
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "1 +", "(1", "a b", "1 << 99", "1 / 0", "a[0]", "*a", "&a"),
+        *("", "1 +", "(1", "a b", "1 << 99", "1 / 0", "m[0.5]", "m[8]", "a[0]", "*a", "&a"),
         *("(" * 200 + "1" + ")" * 200, f"{9**300} * {9**300}"),
     ],
 )
@@ -150,6 +158,7 @@ def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp
     ("text", "said"),
     [
         ("frames_acepted", "did you mean frames_accepted"),
+        ("failsaef:age", "there is no age of failsaef; give one of failsafe:age"),
         ("xram[1]", "is in xram: the board has no such memory"),
         ("sfr[3]", "0x03 is no special function register; they begin at"),
         ("iram[256]", "give 0 to 255"),
