@@ -224,18 +224,23 @@ class Console(Cmd):
             self.tell(line)
 
     def _list(self, rest: str) -> None:
-        address = self.symbols.at(rest)[0][0] if rest else self.debugger.frames()[self.frame].pc
+        here = self.debugger.frames()[self.frame].place
+        address = self.symbols.at(rest)[0][0] if rest else here
         line = self.symbols.line(address)
         path = None if line is None else self.symbols.sources.path(line.file)
         if line is not None and path is not None:
-            here, rows = line.line, enumerate(path.read_text(errors="replace").splitlines(), 1)
-            shown = [(at, f"{at:4}  {text}") for at, text in rows if abs(at - here) <= LINES_AROUND]
+            asked = rest.rpartition(":")[2]
+            middle = int(asked) if ":" in rest and asked.isdecimal() else line.line
+            rows = enumerate(path.read_text(errors="replace").splitlines(), 1)
+            shown = [(at, f"{at:4}  {text}") for at, text in rows if abs(at - middle) <= LINES_AROUND]
+            stands = self.symbols.line(here)
+            marked = stands.line if stands is not None and stands.file == line.file else -1
         else:
-            here = self.debugger.cpu.pc
             shown = [(row.address, f"{row.address:#06x}  {row.text}") for row in self.symbols.listing]
             shown = [row for row in shown if row[0] >= address][: 2 * LINES_AROUND]
+            marked = here
         for at, text in shown:
-            self.tell(f"{'=>' if at == here else '  '} {text}")
+            self.tell(f"{'=>' if at == marked else '  '} {text}")
 
     def _help(self, rest: str) -> None:
         for verb, text in VERBS.items():

@@ -43,6 +43,25 @@ def test_a_scenario_is_stepped_through_forwards_and_backwards(console):
     assert lines[14] == " #0  failsafe.c:145 in failsafe_tick"
 
 
+def test_a_list_is_around_the_line_asked_for_and_marks_the_one_it_stands_at(console):
+    moves = ("break main.c:49", "continue", "list", "list main.c:46", "list failsafe.c:20")
+    parts = console("fig6", lines=moves).split("(mirotwin) list")[1:]
+    listed = [part.splitlines()[1:] for part in parts]
+    numbers = [[int(line[2:].split()[0]) for line in lines] for lines in listed]
+    assert numbers == [list(range(middle - 5, middle + 6)) for middle in (49, 46, 20)]
+    marked = [
+        [number for number, line in zip(*pair, strict=True) if line.startswith("=>")]
+        for pair in zip(numbers, listed, strict=True)
+    ]
+    assert marked == [[49], [49], []]
+
+
+def test_a_list_of_an_outer_frame_is_around_its_call(console):
+    out = console("fig6", lines=["break failsafe_look", "continue", "where 1", "list"])
+    called = next(line for line in out.splitlines() if line.startswith("*#1")).split(":")[1].split()[0]
+    assert f"\n=> {called:>4}  " in out
+
+
 @pytest.mark.parametrize("step", ["step", "next"])
 def test_a_step_passes_the_code_without_lines_before_main(console, step):
     lines = console("fig6", lines=[step, f"r{step}"]).splitlines()
