@@ -62,7 +62,7 @@ class Adapter:
         self.console: Console
         self.began = False
         self.children: list[dict[str, Shown]] = []
-        self.paused = self.changed = self.ended = False
+        self.paused = self.ended = False
         self.run_after: Callable[[], object] | None = None
         self.begin: Callable[[], object] = lambda: None
 
@@ -179,13 +179,15 @@ class Adapter:
     def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
         """All breakpoints of a kind, which replace those before."""
         self.its.breakpoints[:] = [one for one in self.its.breakpoints if one.kind != kind]
-        self.changed = True
+        self.its.changed = True
         found = []
         for one in given.get("breakpoints") or ():
             asked = one.get("condition") or "", one.get("hitCondition") or ""
             try:
                 where = place(one)
                 log = _logged(one["logMessage"]) if one.get("logMessage") else None
+                if one.get("accessType", "write") != "write":
+                    raise ValueError("only what is written can be stopped at")
                 if kind == "data breakpoint":
                     space, address, size = where.split(":")
                     made = self.its.watch(where, *asked, Value(CType("int", int(size)), space, int(address)))
@@ -239,28 +241,23 @@ class Adapter:
         return threads.index(asked)
 
     def _go(self, verb: str, by_instruction: bool) -> None:
-        """A move, which begins again where it was broken off by new breakpoints only."""
         self.paused = False
-        self.changed = True
-        why = "interrupted"
-        while why == "interrupted" and self.changed and not self.paused:
-            self.changed = False
-            try:
-                why = self.its.move(verb, by_instruction)
-            except BadInput as error:
-                self._event("output", category="stderr", output=f"{error}\n")
-                why = "step"
-            for cycle, core, text, address in self.its.told:
-                begin = self.console.time(cycle * CYCLE_TICKS, core)
-                self._event(
-                    "output", category="console", output=f"{begin}{text}\n", **self._place(address, "source")
-                )
-            self.its.told.clear()
+        try:
+            why = self.its.move(verb, by_instruction)
+        except BadInput as error:
+            self._event("output", category="stderr", output=f"{error}\n")
+            why = "step"
+        for cycle, core, text, address in self.its.told:
+            begin = self.console.time(cycle * CYCLE_TICKS, core)
+            self._event(
+                "output", category="console", output=f"{begin}{text}\n", **self._place(address, "source")
+            )
+        self.its.told.clear()
         self._stopped(why)
 
     def _interrupted(self) -> bool:
         """Answers what comes during a run; true where that ends it."""
-        while (request := self.wire.next(wait=False)) != {}:
+        while not self.paused and (request := self.wire.next(wait=False)) != {}:
             if request is None:
                 self.paused = True
             elif request["command"] == "pause":
@@ -270,9 +267,7 @@ class Adapter:
                 self.answer(request)
             else:
                 self._respond(request, refused="the run is under way: pause it first")
-            if self.paused:
-                return True
-        return self.changed
+        return self.paused
 
     def _stopped(self, why: str, text: str = "") -> None:
         word, _, digits = why.partition(" ")
@@ -391,16 +386,19 @@ class Adapter:
         if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, "result")
-        before, self.paused, self.changed = self.timeline.tick, False, False
+        there, self.paused, self.console.why = self.its.breakpoints[:], False, ""
         self.console.do(text)
-        if self.timeline.tick != before:
-            self.run_after = partial(self._stopped, "goto")
+        for one in there:
+            if one.kind and one not in self.its.breakpoints:
+                self._event("breakpoint", reason="removed", breakpoint={"id": one.number, "verified": False})
+        if self.console.why:
+            self.run_after = partial(self._stopped, self.console.why)
         if self.console.ended:
             self.on_terminate(given)
         return {"result": "\n".join(self.console.lines), "variablesReference": 0}
 
     def on_completions(self, given: Message) -> Message:
-        begun = given["text"][: given["column"] - 1].split(" ")[-1]
+        begun = re.split(r"\W", given["text"][: given["column"] - 1])[-1]
         words = sorted({*VERBS, *self.symbols.known})
         return {"targets": [{"label": word} for word in words if word.startswith(begun)]}
 

@@ -69,7 +69,7 @@ class Console(Cmd):
         self.frame = 0
         self.done = True
         self.ended = False
-        self.last = ""
+        self.last = self.why = ""
 
     def completenames(self, text: str, *ignored: object) -> list[str]:
         return [verb for verb in sorted(VERBS) if verb.startswith(text)]
@@ -120,7 +120,7 @@ class Console(Cmd):
 
     def say(self, why: str) -> None:
         """What logs told, where it stands, and why."""
-        self.frame = 0
+        self.frame, self.why = 0, why
         for cycle, core, text, address in self.debugger.told:
             self.tell(f"{self.time(cycle * CYCLE_TICKS, core)}{self.symbols.place(address)}: {text}")
         self.debugger.told.clear()
@@ -163,12 +163,12 @@ class Console(Cmd):
         for key, _, value in (word.partition("=") for word in keys):
             given[key] = int(value, 16) if _HEX.fullmatch(value) else value
         try:
-            event = self.timeline.until(struct_of(given, kind, strict=False))
+            event = self.debugger.until(struct_of(given, kind, strict=False))
         except TomlError as error:
             raise BadInput(f"until {name}", error.place, error.what, error.remedy) from None
         except ValueError as error:
             raise BadInput("", rest, str(error), f"its keys are {', '.join(fields)}") from None
-        self.say("no such event before the end" if event is None else str(event))
+        self.say(event)
 
     # Breakpoints
 

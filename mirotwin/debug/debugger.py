@@ -7,7 +7,7 @@ and the static height of the instruction, so calls and interrupts in between cos
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -19,9 +19,10 @@ from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, SFRS, is_call
+from miro_sim.world.conditions import Condition
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
-from mirotwin.debug.timeline import Core, Hit, Timeline, Trap
+from mirotwin.debug.timeline import Core, Hit, Position, Timeline, Trap
 from mirotwin.rerun.inspected_run import RobotRun
 
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
@@ -74,6 +75,7 @@ class _Line(NamedTuple):
 class Debugger:
     """Of one run. `everyone`: breakpoints are for all processors, else for the one in focus.
 
+    `changed`: set by who changes breakpoints while it searches, which then goes on with them.
     What stops is told as a text: "breakpoint 1", "step", "the run ends here".
     """
 
@@ -83,7 +85,9 @@ class Debugger:
         self.everyone = everyone
         self.breakpoints: list[Breakpoint] = []
         self.told: list[LogOutput] = []
+        self.changed = False
         self._numbers = 0
+        self._told_there: list[LogOutput] = []
 
     # Where it stands
 
@@ -165,11 +169,12 @@ class Debugger:
 
         def ask(core: Core) -> object:
             pc = core.cpu.pc
-            there = (one for one in self.breakpoints if pc in one.addresses)
-            found = next((one for one in there if self._stops(one, core)), None)
-            if found is None and step is not None and core is self.timeline.core and pc in step.addresses:
+            stops = [one for one in self.breakpoints if pc in one.addresses and self._stops(one, core)]
+            if stops:
+                return stops[0]
+            if step is not None and core is self.timeline.core and pc in step.addresses:
                 return step.ask(core)
-            return found
+            return None
 
         cores = range(len(self.timeline.cores)) if self.everyone else [self.timeline.focus]
         traps = {at: Trap(places, ask) for at in cores}
@@ -199,15 +204,21 @@ class Debugger:
             self.told.append(LogOutput(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
         return one.log is None
 
-    def _count_hits(self) -> None:
-        """Counts the hits from the start of the run up to now, where a breakpoint asks for their number."""
+    def _count_hits(self) -> bool:
+        """Counts the hits from the start of the run up to now, where a breakpoint asks for their number.
+
+        False where that was interrupted.
+        """
         for one in self.breakpoints:
             if one.count is not None and one.counted_to < self.timeline.tick:
                 ask = Trap(one.addresses, lambda core, one=one: self._is_met(one, core) or None)  # type: ignore[misc]
                 with self.timeline.staying():
-                    hits = self.timeline.hits_back(dict.fromkeys(self._traps(), ask))
-                    one.hits = [hit[:2] for hit in hits][::-1]
-                one.counted_to = self.timeline.tick
+                    hits = [hit[:2] for hit in self.timeline.hits_back(dict.fromkeys(self._traps(), ask))]
+                    whole = self.timeline.at_begin
+                if not whole:
+                    return False
+                one.hits, one.counted_to = hits[::-1], self.timeline.tick
+        return True
 
     # Moving
 
@@ -230,25 +241,46 @@ class Debugger:
         reached = self.timeline.go_to(tick, self.timeline.interrupted)
         return self._at_end() or ("goto" if reached else INTERRUPTED)
 
+    def until(self, condition: Condition) -> str:
+        """On to an event; what it says of itself."""
+        event = self.timeline.until(condition)
+        if event is not None:
+            return str(event)
+        return "no such event before the end" if self.timeline.run.over else INTERRUPTED
+
+    def _search(
+        self, seek: Callable[[Mapping[int, Trap], Position], Hit | None], step: Trap | None = None
+    ) -> Hit | None:
+        """To what stops, by `seek`."""
+        here, interrupted = self.timeline.here, self.timeline.interrupted
+        hit, self.changed = None, True
+        with self.timeline.interrupted_by(lambda: interrupted() or self.changed):
+            while hit is None and self.changed:
+                self.changed = False
+                if self._count_hits():
+                    hit = seek(self._traps(step), here)
+                    for one in self.breakpoints:
+                        one.counted_to = max(one.counted_to, self.timeline.tick)
+        return hit
+
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()
-        self._count_hits()
-        hit = self.timeline.find(self._traps(step))
-        for one in self.breakpoints:
-            one.counted_to = max(one.counted_to, self.timeline.tick)
+        here, known = self.timeline.here, self._told_there
+        hit = self._search(self.timeline.find, step)
+        told = sorted(one for one in self.told if one[:2] != here or one not in known)
+        self.told = [one for one in told if hit is None or one[:2] <= hit[:2]]
         if hit is None:
             return self._at_end() or INTERRUPTED
-        self.told = [one for one in self.told if one[:2] <= hit[:2]]
+        self._told_there = [one for one in self.told if one[:2] == hit[:2]]
         return _named(hit)
 
     def _back(self) -> str:
-        self._count_hits()
-        hit = self.timeline.find_back(self._traps())
+        hit = self._search(self.timeline.find_back)
         self.told.clear()
         return self._at_begin() if hit is None else _named(hit)
 
     def _at_begin(self) -> str:
-        return INTERRUPTED if self.timeline.tick > self.timeline.begin_tick else BEGINS
+        return BEGINS if self.timeline.at_begin else INTERRUPTED
 
     def _at_end(self) -> str:
         if not self.timeline.run.over:

@@ -48,6 +48,10 @@ class Core(NamedTuple):
         return None if self.robot is None else self.robot.board
 
 
+Position = tuple[int, int]
+"""(cycle, processor)."""
+
+
 class Hit(NamedTuple):
     """Something that was asked for is true in `cycle` of processor `core`, before the next instruction."""
 
@@ -93,6 +97,7 @@ class Timeline:
             self.code_in_ram = run.machine.bus.code_of is not None
             self.state, self._restore = flat.save, flat.load
         self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
+        self._begins = [core.cpu.cycles for core in self.cores]
         self._kept: list[_Checkpoint] = []
         self.kept_bytes = 0
         self._save()
@@ -102,9 +107,13 @@ class Timeline:
         return self.cores[self.focus]
 
     @property
-    def begin_tick(self) -> int:
-        """Where the run begins: 0, or where a saved world goes on."""
-        return self._kept[0].tick
+    def here(self) -> Position:
+        return self.core.cpu.cycles, self.focus
+
+    @property
+    def at_begin(self) -> bool:
+        """Whether it stands where the run begins: at reset, or where a saved world goes on."""
+        return self.core.cpu.cycles == self._begins[self.focus]
 
     @property
     def tick(self) -> int:
@@ -241,44 +250,49 @@ class Timeline:
     @contextmanager
     def shown(self, what: str, interrupted: Callable[[], bool] = lambda: False) -> Iterator[None]:
         """Within it, what takes more than a second shows a bar, and `interrupted` may end a search."""
-        before = self.interrupted
         with ProgressBar(what, self.run.end_tick) as bar:
 
             def asked() -> bool:
                 bar.to(self.tick)
                 return interrupted()
 
-            self.interrupted = asked
-            try:
+            with self.interrupted_by(asked):
                 yield
-            finally:
-                self.interrupted = before
 
-    def find(self, traps: Mapping[int, Trap]) -> Hit | None:
-        """Goes on to the first moment after this one at which a trap, by processor, finds something.
+    @contextmanager
+    def interrupted_by(self, interrupted: Callable[[], bool]) -> Iterator[None]:
+        """Within it this may end a search."""
+        before, self.interrupted = self.interrupted, interrupted
+        try:
+            yield
+        finally:
+            self.interrupted = before
+
+    def find(self, traps: Mapping[int, Trap], after: Position | None = None) -> Hit | None:
+        """Goes on to the first moment after `after` (default: this one) at which a trap, by processor, finds something.
 
         None, at the end of the run or where it was interrupted, if there is none.
         """
-        here = (self.core.cpu.cycles, self.focus)
+        here = after or self.here
         with self._asking(traps, lambda hit: hit[:2] > here) as found:
 
             def later() -> list[Hit]:
                 return [hit for hit in found if hit[:2] > here]
 
             self._run_to(NEVER_TICK, lambda: bool(later()) or self.interrupted())
+            if not later():
+                self._settle()
         hit = min(later(), key=_ORDER, default=None)
-        if hit is None:
-            self._settle()
-        else:
+        if hit is not None:
             self.land(hit)
         return hit
 
-    def hits_back(self, traps: Mapping[int, Trap]) -> Iterator[Hit]:
-        """The moments before this one at which a trap finds something, the latest first; meanwhile it is anywhere.
+    def hits_back(self, traps: Mapping[int, Trap], before: Position | None = None) -> Iterator[Hit]:
+        """The moments before `before` (default: this one) at which a trap finds something, the latest first.
 
-        After the last one it stands where the run begins, or where it was interrupted.
+        Meanwhile it is anywhere; after the last one it stands where the run begins, or where it was interrupted.
         """
-        here = (self.core.cpu.cycles, self.focus)
+        here = before or self.here
         end_tick, first = self.tick + 1, False
         self._look_closely(end_tick)  # where a hit is likely
         while not first:
@@ -292,15 +306,15 @@ class Timeline:
             end_tick, first = begin_tick, first or self.interrupted()
         self.go_to(begin_tick)
 
-    def find_back(self, traps: Mapping[int, Trap]) -> Hit | None:
-        """Goes back to the last moment before this one at which a trap finds something; None if there is none."""
-        hit = next(self.hits_back(traps), None)
+    def find_back(self, traps: Mapping[int, Trap], before: Position | None = None) -> Hit | None:
+        """Goes back to the first of these; None if there is none."""
+        hit = next(self.hits_back(traps, before), None)
         if hit is not None:
             self.land(hit)
         return hit
 
     def until(self, condition: Condition) -> Event | None:
-        """Goes on to the first tick at which `condition` is true; None, and no further than the end, if it never is."""
+        """Goes on to the first tick at which `condition` is true; None at the end or where it was interrupted."""
         assert isinstance(self.run, RobotRun)
         while not self.run.over and not self.interrupted():
             with suppress(WaitExpired):
@@ -310,6 +324,7 @@ class Timeline:
                 self._settle()
                 return event
             self._save()
+        self._settle()
         return None
 
     def radio_events(self) -> list[Event]:

@@ -6,10 +6,14 @@ import socket
 
 import pytest
 
+from miro_robot.bare.machine import BareMachine
+from mirotwin.debug.adapter import Adapter
+from mirotwin.rerun.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.debug.runs import robot_run
+from tests.mirotwin.debug.runs import debugger_of, robot_run
 from tests.mirotwin.program import COMMAND
+from tests.mirotwin.verify.bare.firmwares import image
 from tests.robot.mcs51.asm import assemble
 
 NO_MESSAGE = "mirotwin: error: --dap: the client sends no message of the protocol"
@@ -134,6 +138,47 @@ def test_a_breakpoint_that_is_set_during_a_run_stops_it(adapter):
     assert client.until(event="stopped")["body"]["reason"] == "function breakpoint"
 
 
+SLOW = """
+LCALL slow
+SJMP $
+slow:
+MOV R6,#0
+MOV R7,#0
+again:
+DJNZ R7,again
+DJNZ R6,again
+RET
+"""
+
+
+class ClientDuringARun:
+    """A wire in this process; `requests` come during a run, and `events` are what was sent."""
+
+    def __init__(self, *requests):
+        self.requests = list(requests)
+        self.events = {}
+
+    def next(self, wait):
+        return self.requests.pop(0) if self.requests else {}
+
+    def send(self, message):
+        self.events[message.get("event")] = message["body"]
+
+
+@pytest.mark.parametrize(("place", "stops_at"), [(0x1000, 3), (13, 13)])  # elsewhere; before RET
+def test_a_step_goes_on_past_a_change_of_breakpoints_and_stops_at_new_ones(place, stops_at):
+    places = {"breakpoints": [{"instructionReference": hex(place)}]}
+    wire = ClientDuringARun({"seq": 2, "command": "setInstructionBreakpoints", "arguments": places})
+    debugger = debugger_of(BareRun(BareMachine(image(SLOW)), None, None))
+    adapter = Adapter(wire)
+    adapter.use(debugger)
+    adapter.answer({"seq": 1, "command": "next", "arguments": {"threadId": 1}})
+    adapter.run_after()
+    assert wire.requests == []
+    assert debugger.cpu.pc == stops_at
+    assert wire.events["stopped"]["reason"] == ("step" if stops_at == 3 else "instruction breakpoint")
+
+
 @pytest.mark.parametrize(
     ("command", "arguments", "said"),
     [
@@ -208,6 +253,9 @@ def test_breakpoints_that_cannot_be_set_say_why(adapter):
     places = [{"dataId": one} for one in ("iram:9999:1", "iram", "iram:48:1")]
     found = client.ask("setDataBreakpoints", breakpoints=places)["body"]["breakpoints"]
     assert [one["verified"] for one in found] == [False, False, True]
+    reads = [{"dataId": "iram:48:1", "accessType": kind} for kind in ("read", "readWrite", "write")]
+    found = client.ask("setDataBreakpoints", breakpoints=reads)["body"]["breakpoints"]
+    assert [one["verified"] for one in found] == [False, False, True]
     assert client.ask("dataBreakpointInfo", name="A")["body"]["dataId"] is None
     client.send("reverseContinue", threadId=1)
     assert client.until(event="stopped")["body"]["description"] == "the run begins here"
@@ -237,10 +285,19 @@ def test_the_verbs_of_the_console_work_in_the_debug_console(adapter):
     done = (("r stepi", "step: "), ("where", "#0"), ("print tick", "tick = "), ("break act", "breakpoint 1"))
     for text, said in done:
         assert said in client.ask("evaluate", expression=text, context="repl")["body"]["result"]
-    targets = client.ask("completions", text="break failsafe_ti", column=18)["body"]["targets"]
-    assert targets == [{"label": "failsafe_tick"}]
-    client.send("continue", threadId=1)
+    for text in ("break failsafe_ti", "print 3+failsafe_ti", "print -failsafe_ti - 1"):
+        end = text.index("_ti") + 4
+        targets = client.ask("completions", text=text, column=end)["body"]["targets"]
+        assert targets == [{"label": "failsafe_tick"}]
+    client.send("evaluate", expression="continue", context="repl")
     assert client.until(event="stopped")["body"]["reason"] == "breakpoint"
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "failsafe_tick"}])
+    client.send("evaluate", expression="continue", context="repl")
+    stopped = client.until(event="stopped")["body"]
+    assert (stopped["reason"], stopped["hitBreakpointIds"]) == ("function breakpoint", [2])
+    client.send("evaluate", expression="delete", context="repl")
+    removed = client.until(event="breakpoint")["body"]
+    assert (removed["reason"], removed["breakpoint"]["id"]) == ("removed", 2)
     client.send("evaluate", expression="quit", context="repl")
     client.until(event="terminated")
 

@@ -174,6 +174,62 @@ def test_a_log_point_tells_and_does_not_stop(debugger, capsys):
     assert "breakpoint 2" in lines[-1]
 
 
+@pytest.mark.parametrize("log_first", [False, True])
+def test_a_log_where_another_breakpoint_stops_tells_each_time_once(debugger, log_first):
+    pair = [debugger.add("failsafe_tick") for _ in range(2)]
+    pair[0 if log_first else 1].log = lambda moment: "tick"
+    for _ in range(3):
+        debugger.move("continue")
+        assert [(one.cycle, one.text) for one in debugger.told] == [(debugger.cpu.cycles, "tick")]
+    third = debugger.cpu.cycles
+    debugger.move("rcontinue")
+    second = debugger.cpu.cycles
+    debugger.move("continue")
+    assert [one.cycle for one in debugger.told] == [second, third]
+
+
+def test_counted_hits_are_those_of_the_whole_run_after_an_interruption(debugger):
+    debugger.add("failsafe_tick")
+    cycles = []
+    for _ in range(60):
+        debugger.move("continue")
+        cycles.append(debugger.cpu.cycles)
+    debugger.breakpoints.clear()
+    debugger.add("failsafe_tick", count="5")
+    debugger.timeline.interrupted = lambda: True
+    assert debugger.move("rcontinue") == "interrupted"
+    debugger.timeline.interrupted = lambda: False
+    debugger.go_to(cycles[-1] * CYCLE_TICKS)
+    debugger.move("rcontinue")
+    assert debugger.cpu.cycles == cycles[4]
+
+
+def test_a_run_that_goes_on_within_an_instruction_begins_at_the_next_one():
+    run = robot_run()
+    run.to(1_200_100)
+    while run.cpu.cycles * CYCLE_TICKS == run.world.tick:
+        run.to(run.world.tick + 1)
+    debugger = debugger_of(run)
+    begun = debugger.cpu.cycles
+    debugger.move("continue")
+    for move in ("rcontinue", "rstepi"):
+        assert debugger.move(move) == "the run begins here"
+        assert debugger.cpu.cycles == begun
+    debugger.add("failsafe_tick", count="2")
+    debugger.go_to(SECOND)
+    assert debugger.move("rcontinue") == "breakpoint 1"
+
+
+def test_until_that_is_interrupted_does_not_say_that_there_is_no_event(debugger):
+    console = Console(debugger)
+    debugger.timeline.interrupted = lambda: True
+    console.do("until answer")
+    assert "interrupted: " in console.lines[-1]
+    debugger.timeline.interrupted = lambda: False
+    console.do("until touch")
+    assert "no such event before the end: " in console.lines[-1]
+
+
 def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(ProgressBar, "PATIENCE_S", 0.0)
