@@ -147,8 +147,8 @@ def _judged(
     full = 0
     for here, there in both:
         if here is None or there is None:
-            one = here or there
-            if before is not None and one is not None:  # the first may be to a number that the robot knew
+            one = here or there  # the first may be to a number that the robot knew
+            if one is not None and (before is not None or not late):
                 question = f"to question {one.said.seq}"
                 yield differs(one.tick, "answer", here and question, there and question)
             continue

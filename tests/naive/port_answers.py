@@ -75,7 +75,7 @@ def compared(port, twin, sent, lost_tick, within_counts, within_ticks):
         earlier = [both for both in full if both[0][0] < (one or other)[0]]
         if not (one and other):
             still_to_come = one and one[0] + way + within_ticks > lost_tick
-            if earlier and not still_to_come:
+            if (earlier or not full) and not still_to_come:
                 differences.append(((one or other)[0], "answer"))
             continue
         at = full.index((one, other))

@@ -85,6 +85,15 @@ def test_a_run_is_sent_again_as_a_stream_is(mirotwin, tmp_path, monkeypatch):
     assert (code, ALIKE in out) == (0, True), out + err
 
 
+def test_a_robot_in_a_slot_that_is_empty_in_the_twin_does_not_answer_as_it(mirotwin, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mirotwin("run", "fig6", "--set", "duration_s=1.5", "--out", "run", "-q")
+    other = ("--port", f"{ROBOT}&set=network.robot.slot=1", "--allow-motion", "-q")
+    err = mirotwin.ends(4, "replay", "run", *other)
+    assert "robot 0 of the twin is not at the port: not compared" in err
+    assert re.search("/net0/robot1/answer: robot to question [0-9]+, twin nothing", err)
+
+
 @pytest.mark.parametrize(
     ("option", "said"),
     [
