@@ -15,7 +15,7 @@ from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, FrameType, Opcode
 from mirotwin.shell.command import Option, Options
-from mirotwin.shell.options import NAME, FiniteNumber
+from mirotwin.shell.options import FiniteNumber, PathType
 
 MAX_SPEED_M_S = 0.5
 """Of each wheel, unless another limit is given. A third of what the robot can do."""
@@ -24,6 +24,7 @@ WHEELS = Wheels()
 _WHERE = "Talk to a robot: /dev/ttyUSB0, or any URL that pyserial knows."
 _MOTION = "Send what moves a robot, too. Without it only what lets it stand is sent."
 _FASTEST = "Refuse what makes a wheel faster, in m/s."
+_URL = PathType(readable=False)  # who may not open it is told by the port what to do
 _SPEED = FiniteNumber(0.0, WHEELS.limit_m_s)
 
 
@@ -31,7 +32,7 @@ class DeskOptions(Options, frozen=True, kw_only=True):
     """Where a robot is, and what may be done to it. `port` None: no robot, only its twin."""
 
     HEADING = "A robot at a port"
-    port: Annotated[str | None, Option(type=NAME, metavar="URL", help=_WHERE)] = None
+    port: Annotated[str | None, Option(type=_URL, metavar="URL", help=_WHERE)] = None
     allow_motion: Annotated[bool, Option(needs="port", help=_MOTION)] = False
     max_speed: Annotated[float, Option(type=_SPEED, metavar="M_S", needs="port", help=_FASTEST)] = (
         MAX_SPEED_M_S

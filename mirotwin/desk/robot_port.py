@@ -396,14 +396,12 @@ def _opened(url: str) -> Any:
     _check_address(url)
     more: dict[str, Any] = {"write_timeout": BLOCKED_S}
     address = url
-    if "://" not in url:
-        more["exclusive"] = True
-    elif url.lower().startswith("rfc2217:"):  # ser2net says nothing of a DTR that is not there
+    if url.lower().startswith("rfc2217:"):  # ser2net says nothing of a DTR that is not there
         more["write_timeout"] = None  # the only one that pyserial has there
         address += "&ign_set_control" if "?" in url else "?ign_set_control"
         realtime_priority()  # of the thread that reads there, too
     try:
-        port = serial.serial_for_url(address, BAUD, timeout=0, **more)
+        port = serial.serial_for_url(address, BAUD, timeout=0, exclusive=True, **more)
         if url.lower().startswith(
             "socket:"
         ):  # or a frame waits until the one before is acknowledged, up to 40 ms

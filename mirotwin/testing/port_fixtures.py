@@ -56,7 +56,7 @@ class PortFixtures:
         except NotObservable as error:
             pytest.skip(str(error))
         except BadInput as error:
-            pytest.fail(str(error), pytrace=False)
+            raise pytest.fail.Exception(str(error), pytrace=False) from None
 
     @pytest.fixture
     def links(self, world: RobotPort) -> list[Link]:

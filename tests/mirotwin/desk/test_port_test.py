@@ -206,6 +206,14 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     found.stdout.fnmatch_lines_random(SKIPPED)
 
 
+def test_a_port_that_is_not_there_is_told_once_for_each_test(pytester):
+    pytester.makepyfile("def test_answer(link): link.poll()")
+    found = pytester.runpytest_inprocess("-p", "no:xdist", "--mirotwin-port=/dev/nope")
+    found.assert_outcomes(errors=1)
+    found.stdout.no_fnmatch_line("*another exception occurred*")
+    assert sum(line.startswith("/dev/nope: there is no such port") for line in found.outlines) == 1
+
+
 @pytest.mark.parametrize("command", ["replay", "test", "conform"])
 def test_a_port_without_a_name_does_not_mean_the_twin(mirotwin, pytester, command):
     assert "'--port': the path is empty" in mirotwin.refuses(command, "some.file", "--port", "")

@@ -3,10 +3,13 @@
 The robot is another world behind `miro://`, whose clock is virtual: each test gives the same every time.
 """
 
+import errno
 import json
+import os
 import re
 
 import pytest
+import serial
 
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.recording import reader
@@ -46,6 +49,16 @@ def test_a_port_that_cannot_be_opened_leaves_nothing_in_the_way_of_the_next_try(
     for _ in range(2):
         err = mirotwin.refuses("replay", drive, "--port", port, "--allow-motion")
         assert "there is no such port" in err or "does anybody serve it?" in err
+
+
+def test_a_port_that_may_not_be_read_is_told_with_the_group_to_join(mirotwin, drive, monkeypatch):
+    def refuse(*given, **named):
+        raise serial.SerialException(errno.EACCES, "could not open port")
+
+    monkeypatch.setattr(os, "access", lambda path, mode: path != "/dev/tty")
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    err = mirotwin.refuses("replay", drive, "--port", "/dev/tty", "--allow-motion")
+    assert "/dev/tty: no permission to open it; join the group that owns it (dialout)" in err
 
 
 def test_too_fast_a_wheel_is_refused_before_anything_is_sent(mirotwin, drive):

@@ -169,9 +169,10 @@ def test_a_port_that_takes_nothing_more_is_told_and_its_buffer_is_emptied_for_th
     assert stops(pty.read())
 
 
-def test_a_port_of_another_program_is_not_opened(pty):
+@pytest.mark.parametrize("scheme", ["", "spy://"])
+def test_a_port_of_another_program_is_not_opened(pty, scheme):
     with robots_at(pty.path), pytest.raises(PortError, match="another program has it open; end that"):
-        robots_at(pty.path)
+        robots_at(f"{scheme}{pty.path}")
 
 
 @pytest.mark.parametrize(
