@@ -22,7 +22,7 @@ class _Radio:
         self.sent = b""
         self.network = self.waiting = 0
 
-    def send(self, data):
+    def send(self, data, at_tick):
         assert 0 < len(data) <= self.room, f"{len(data)} bytes where there is room for {self.room}"
         self.sent += data
         return self.tick

@@ -92,15 +92,15 @@ def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig):
     client.sendall(bytes(6000))
     until_s = time.monotonic() + 5
     while port.bytes_in < 4096 and time.monotonic() < until_s:
-        port.exchange()
+        port.exchange(0)
     assert (port.bytes_in, port.port.room) == (4096, 0)
-    port.exchange()
+    port.exchange(0)
     assert port.bytes_in == 4096
     ready = [key.fileobj for key, _ in rig.selector.select(0)]
     assert ready in ([], [port._listener])  # it lets us sleep
     rig.world.run_to(ticks(3.0))
     while port.bytes_in < 6000 and time.monotonic() < until_s:
-        port.exchange()
+        port.exchange(0)
     assert port.bytes_in == 6000
 
 
