@@ -1,5 +1,4 @@
 from miro_robot.mcs51.cpu cimport Cpu
-from miro_robot.mcs51.execute cimport Executor
 
 cdef int BREAKPOINT
 

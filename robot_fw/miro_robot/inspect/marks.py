@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
-from miro_robot.mcs51.execute import Executor
 
 
 class MarkInspector:
@@ -32,7 +31,7 @@ class MarkInspector:
         """See `Cpu.run`."""
         if self.others is not None:
             self.cpu.mark(_shared(self.others(), self.marked))  # the owner took them away
-        reason = Executor.run(self.cpu, until_cycle)
+        reason = self.cpu.run_alone(until_cycle)
         return self._pass_marks(until_cycle) if reason == BREAKPOINT else reason
 
     def _pass_marks(self, until_cycle: int) -> int:
@@ -48,11 +47,11 @@ class MarkInspector:
             if place in others:
                 break
             cpu.unmark((place,))
-            reason = Executor.run(cpu, cpu.cycles + 1)
+            reason = cpu.run_alone(cpu.cycles + 1)
             if place in self.marked:
                 cpu.mark((place,))
             if not reason and cpu.cycles < until_cycle:
-                reason = Executor.run(cpu, until_cycle)
+                reason = cpu.run_alone(until_cycle)
         return reason
 
     def detach(self) -> None:

@@ -1,7 +1,6 @@
 cimport cython
 
 from miro_robot.mcs51.cpu cimport Cpu
-from miro_robot.mcs51.execute cimport Executor
 
 cdef int _VECTOR, _VECTOR_STEP, _CALL_CYCLES
 

@@ -7,7 +7,6 @@ run.
 from __future__ import annotations
 
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.execute import Executor
 
 _VECTOR, _VECTOR_STEP = 3, 8  # interrupt vectors are at 8 * source + 3
 _CALL_CYCLES = 2  # of the hardware's LCALL
@@ -52,12 +51,12 @@ class Inspector:
         self.watchers: list[Watcher] = []
 
     def run(self, until_cycle: int) -> int:
-        """What `Executor.run` does, in steps; the same state comes out, and the same reason for stopping."""
+        """What `Cpu.run_alone` does, in steps; the same state comes out, and the same reason for stopping."""
         cpu = self.cpu
         began = cpu.cycles
         reason = 0
         if began >= until_cycle:
-            return Executor.run(cpu, until_cycle)
+            return cpu.run_alone(until_cycle)
         for watcher in self.watchers:
             watcher.starting(cpu)
         cpu.begin_run()
@@ -77,7 +76,7 @@ class Inspector:
         pc = cpu.pc
         start = cpu.cycles
         executed = cpu.instructions
-        reason = Executor.go_on(cpu, start + 1)
+        reason = cpu.execute(start + 1)
         if cpu.instructions != executed:
             for watcher in self.watchers:
                 watcher.executed(cpu, pc, start)

@@ -1,56 +1,60 @@
 cimport cython
 
-from miro_robot.mcs51.execute cimport Executor
-from miro_robot.mcs51.line cimport Line
-from miro_robot.mcs51.peripherals cimport Peripherals
+from miro_robot.mcs51.chip cimport Chip
 
 cdef long long NEVER_TICK
-cdef int _OUTSIDE, _MARK
-cdef int _STOP_REQUESTED, _REPLAN
-cdef int _WIRE_FULL
-cdef int _P0, _PCON, _IE, _IP
-cdef int _SMOD, _PD, _IDL
-cdef int _PCON_BITS
-cdef int _READ_SAMPLE, _WRITE_RISES
-cdef int _FLOATING
-cdef int _MAIN_LOOP_STARVED, _MARK_CYCLES, _ONE_INSTRUCTION
+cdef int _REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP, _MARK, _MARK_CYCLES, _MAIN_LOOP_STARVED
+cdef int _UNDEFINED_OPCODE, _STACK_OVERFLOW, _STACK_UNDERFLOW, _OUTSIDE_IMAGE
+cdef int _MOV_DATA, _P2, _CORE, _IDL, _SPREAD_FROM, _SPREAD_TO, _DEPTH
 
 @cython.final
-cdef class Cpu(Executor):
-    cdef readonly Peripherals peripherals
-    cdef readonly Line rxd, txd
-    cdef readonly int pcon, idle, powered_down
-    cdef long long next_event, blocked
-    cdef public long long main_loop_limit
-    cdef long long next_mark, marks
-    cdef public int stop_asleep
-    cdef public object inspector
-
-    @cython.locals(address=int, first=int, end=int)
-    cpdef load(self, bytes image, used=*)
-    cdef void _erase(self) noexcept
-    cpdef int write_code(self, int address, int value) except -1
-    cpdef is_loaded(self, int address)
-    cpdef int code_at(self, int address) noexcept
+cdef class Cpu(Chip):
+    cpdef int run(self, long long until_cycle) except -1
+    cdef int run_alone(self, long long until_cycle) except -1
+    cpdef int go_on(self, long long until_cycle) except -1
     cpdef int step(self) except -1
-    cpdef request_stop(self)
-    cdef void replan(self) noexcept
-    cpdef int set_external(self, int port, int levels, long long tick) except -1
-    cpdef asleep(self)
-    cpdef int peek_iram(self, int address) noexcept
-    cpdef int sfr(self, int address) except -1
+    cdef int begin_run(self) except -1
+    cdef int end_run(self) except -1
+    cdef int boundary(self) except -1
     @cython.locals(blocked=bint)
     cdef inline int _attend(self, long long now) except -1
     cdef int _note_end(self, long long now) except -1
     cdef int _look_for_sleep(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1
-    cdef inline bint _taken_over(self) noexcept
     cdef int _enter(self, int source) except -1
-    cdef inline int _block(self) except -1
-    cdef inline int _expect(self, long long earliest) except -1
-    cdef inline long long _next_look(self) noexcept
-    cdef inline int _written(self, int address, int sooner) except -1
+    cdef int end_of_interrupt(self) except -1
+    @cython.locals(now='long long', pc='long long', line='unsigned long long', row=int, value=int)
+    cdef int execute(self, long long until_cycle) except -1
+
+    cdef inline int read(self, int address) except -1
+    cdef int read_register(self, int address) except -1
+    cdef inline int core_register(self, int address) noexcept
+    cpdef int sfr(self, int address) except -1
     cdef int register(self, int address, long long cycle) except -1
-    cdef inline int _other_register(self, int address, long long cycle) except -1
-    cdef int write_pcon(self, int value) except -1
-    cdef int write_port(self, int port, int value) except -1
+    cdef int read_latch(self, int address) except -1
+    cdef inline int read_latched(self, int address) except -1
+    cdef inline int write(self, int address, int value) except -1
+    cdef int write_register(self, int address, int value) except -1
+    cdef inline int read_bit(self, int bit) except -1
+    cdef inline int latched_bit(self, int bit) except -1
+    cdef inline int write_bit(self, int bit, int level) except -1
+    cdef int write_register_bit(self, int address, int mask, int level) except -1
+    cdef inline int branch(self, int pc, int offset) noexcept
+    cdef inline int fork(self, int target) noexcept
+    cdef inline int call(self, int pc, int target) except -1
+    cdef inline int claim(self) except -1
+    @cython.locals(empty=bint)
+    cdef inline int pop(self) except -1
+    @cython.locals(round_the_top=bint)
+    cdef int set_sp(self, int value) except -1
+    cdef inline void add(self, int operand, int carry) noexcept
+    cdef inline void subtract(self, int operand) noexcept
+    cdef inline int compare(self, int pc, int left, int right, int offset) noexcept
+    cdef inline void divide(self) noexcept
+    cdef inline void decimal_adjust(self) noexcept
+
+    cpdef begin_edges(self)
+    @cython.locals(place='unsigned int')
+    cdef void count_edge(self, int target) noexcept
+    cdef void enter_edges(self) noexcept
+    cdef void leave_edges(self) noexcept

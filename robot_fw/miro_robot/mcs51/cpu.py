@@ -1,178 +1,67 @@
-"""The AT89C52 as a board sees it: reset, run, pins in and out, observers, snapshots.
+"""The AT89C52: a chip that runs, its instructions and the loop that executes them.
 
-               +---------v---------+
-      T2  P1.0 | 1              40 | VCC
-    T2EX  P1.1 | 2           39-32 | P0.0-P0.7  address low and data of MOVX; open drain, pulled up
-     P1.2-P1.7 | 3-8            31 | /EA        high: 8 KB of program inside
-           RST | 9              30 | ALE        not modelled (X5)
-     RXD  P3.0 | 10             29 | /PSEN      not modelled (X5)
-     TXD  P3.1 | 11          28-21 | P2.7-P2.0  address high of MOVX
-   /INT0  P3.2 | 12                |
-   /INT1  P3.3 | 13                |   RST      `reset`
-      T0  P3.4 | 14                |   P0-P3    in: `set_external`, out: `Bus.port_written`
-      T1  P3.5 | 15                |   RXD      `rxd`, a Line that the outside writes
-     /WR  P3.6 | 16                |   TXD      `txd`, a Line that the chip writes
-     /RD  P3.7 | 17                |   /RD /WR  `Bus.movx_read`, `Bus.movx_write`
-         XTAL2 | 18                |   XTAL1    24 MHz, the tick of everything
-         XTAL1 | 19                |
-           GND | 20                |   A pin of P3 is its latch AND its second function.
-               +-------------------+
+Registers, memory and pins are the chip's (`chip.py`), timers and serial port its peripherals' (drawn in README.md).
 
-   pins -> ports -> INT0 INT1, T0 T1, T2 T2EX, RXD -> timers, serial port -> flags -> interrupts -> LCALL
-                                   instructions -> SFRs -> timers, serial port, latches -> pins
+Timing inside an instruction (4316E section 2.4; what it leaves open is rule C1 in README.md): operands are read in the
+instruction's first cycle, `start`; results are written at the end of its last, `cycles`. The loop compares `cycles`
+with `limit` once per instruction and knows nothing else about time.
 
-Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. README.md in this folder draws how
-`Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1, ..) are in it, and sources like 4316E.
+The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
+(`threaded` in setup.py); what the head asks has to be rare. Operands are read where they are needed: `rom[at + 1]` and
+`rom[at + 2]`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextvars import ContextVar
-from typing import Protocol
-
 from miro_exact.clock import NEVER_TICK
-from miro_exact.state import FLAG
 from miro_robot.faults import FaultKind
-from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.execute import BREAKPOINT, LAST_CYCLE, REACHED, STOPPED, WIRE_FULL, Executor
-from miro_robot.mcs51.peripherals import Peripherals
+from miro_robot.mcs51.chip import ASLEEP, BREAKPOINT, REACHED, REPLAN, STOPPED, WIRE_FULL, Chip, on_load
 
-__all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
+__all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "REPLAN", "STOPPED", "WIRE_FULL", "Cpu", "on_load"]
 
-ASLEEP = 4  # why a run ended, beside those of `execute.py`: with `stop_asleep`, nothing known wakes it
-
-REPLAN = 5  # `replan` was called
-
-_REPLAN = REPLAN
-_OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
-_MARK = 0x1000
-_STOP_REQUESTED = 1
-_WIRE_FULL = WIRE_FULL
-_P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
-_SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
-_PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
-_READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
-_FLOATING = 0xFF  # what an undriven external bus reads as (X4)
+_REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP = REACHED, BREAKPOINT, WIRE_FULL, ASLEEP
+_MARK = 0x1000  # line that ends a run before its instruction
+_UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
+_STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
+_STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
+_OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 _MAIN_LOOP_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
+_MOV_DATA = 0x75
+_P2 = 0xA0
+_CORE = 0xD0  # the core's registers that have bits (PSW, ACC, B) lie from here on
+_IDL = 0x01  # PCON
+_SPREAD_FROM, _SPREAD_TO = 0x9E35, 0x3C6F  # odd, so that different branches differ in the low bits
+_DEPTH = 8  # interrupts in service whose branches are kept; RETI may be forgotten, so more can come
 _MARK_CYCLES = 2000  # 1 ms: how often it is checked whether the main loop gets time
-_ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
 
 
-on_load: ContextVar[Callable[[Cpu], object] | None] = ContextVar("on_load", default=None)
-"""Called with every CPU that gets an image: how coverage of a test session comes to CPUs that tests make."""
+class Cpu(Chip):
+    """An AT89C52 at 24 MHz. Input is pushed through `set_external` and `rxd`."""
 
-
-class CpuInspector(Protocol):
-    """What looks into a running CPU (`miro_robot.inspect`)."""
-
-    def run(self, until_cycle: int) -> int: ...
-
-
-class Cpu(Executor):
-    """An AT89C52 at 24 MHz. `bus` is what it is soldered to; input is pushed through `set_external` and `rxd`."""
-
-    STATE: dict[str, object] = {
-        "pcon": ("i", 0, 0xFF),
-        "idle": FLAG,
-        "powered_down": FLAG,
-        "blocked": ("q", -1, LAST_CYCLE),
-        "marks": ("q", 0, LAST_CYCLE),
-        "peripherals": Peripherals,
-    }
-    NOT_STATE: tuple[str, ...] = (
-        *Executor.NOT_STATE,
-        "inspector", "limit", "main_loop_limit", "next_event", "next_mark", "rxd", "stop",
-        "stop_asleep", "txd",
-    )  # fmt: skip
-
-    def __init__(self, bus: Bus | None = None) -> None:
-        Executor.__init__(self, Bus() if bus is None else bus)
-        self.peripherals = Peripherals(self.bus)
-        self.rxd = self.peripherals.uart.rxd
-        self.txd = self.peripherals.uart.txd
-        self.next_event = 0
-        self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
-        self.next_mark = NEVER_TICK
-        self.marks = 0  # marks passed since interrupts took over
-        self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
-        self.inspector: CpuInspector | None = None
-        self._erase()
-        self.reset()
-
-    # Image
-
-    def load(self, image: bytes, used: tuple[tuple[int, int], ...] | None = None) -> None:
-        """Puts `image` at address 0; executing outside `used` ((first, end) ranges; default: all of it) is a fault."""
-        self._erase()
-        for address in range(min(len(image), 0x10000)):
-            self.rom[address] = image[address]
-        self.rom[0x10000], self.rom[0x10001] = self.rom[0], self.rom[1]
-        for first, end in ((0, len(image)),) if used is None else used:
-            for address in range(first, end):
-                self.lines[address] = self.line_at(address)
-        loaded = on_load.get()
-        if loaded is not None:
-            loaded(self)
-
-    def _erase(self) -> None:
-        """All code memory reads FFh, and none of it is loaded."""
-        for address in range(0x10002):
-            self.rom[address] = 0xFF
-        for address in range(0x10000):
-            self.lines[address] = _OUTSIDE
-
-    def write_code(self, address: int, value: int) -> None:
-        """One byte of code memory, which from now on counts as loaded."""
-        self.rom[address] = value
-        if address < 2:
-            self.rom[0x10000 + address] = value
-        self.lines[address] = _MARK if self.lines[address] & _MARK else self.line_at(address)
-
-    def is_loaded(self, address: int) -> bool:
-        """Whether executing at `address` is legal."""
-        return not self.lines[address & 0xFFFF] & _OUTSIDE
-
-    def code_at(self, address: int) -> int:
-        return self.rom[address & 0xFFFF]
-
-    @property
-    def code(self) -> bytes:
-        """The 64 KB of code memory."""
-        return bytes([self.rom[address] for address in range(0x10000)])
-
-    # Control
+    # Runs
 
     def run(self, until_cycle: int) -> int:
-        """As `Executor.run`; an inspector that is attached runs it in its own way, with the same result."""
-        if self.inspector is None:
-            return Executor.run(self, until_cycle)
-        return self.inspector.run(until_cycle)
+        """Executes until `cycles` >= `until_cycle`; may end up to 3 cycles late, when an instruction does.
+
+        Returns REACHED, STOPPED (`request_stop`), BREAKPOINT or WIRE_FULL (more than 2048 edges of TXD wait for
+        the listener that it has; it does not go on before these are heard). An inspector that is attached runs it in
+        its own way, with the same result.
+        """
+        return self.run_alone(until_cycle) if self.inspector is None else self.inspector.run(until_cycle)
+
+    def run_alone(self, until_cycle: int) -> int:
+        """As `run` without an inspector."""
+        self.begin_run()
+        stopped = self.execute(until_cycle)
+        self.end_run()
+        return stopped
 
     def go_on(self, until_cycle: int) -> int:
-        """As `Executor.go_on`; an inspector makes runs of the pieces."""
-        if self.inspector is None:
-            return Executor.go_on(self, until_cycle)
-        return self.inspector.run(until_cycle)
+        """A piece of a run, between `begin_run` and `end_run`: what runs in many pieces looks at its lines once.
 
-    def reset(self) -> None:
-        """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
-        now = self.cycles
-        self.peripherals.clear(now)
-        self.clear()
-        self.pcon = 0
-        self.idle = 0
-        self.powered_down = 0
-        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
-        for port in range(4):
-            self.write_port(port, 0xFF)
-        self.peripherals.clock_serial()
-
-    def hold(self) -> None:
-        """RST goes high and stays: nothing is executed until `reset`, its falling edge."""
-        self.reset()
-        self.peripherals.freeze(self.cycles)
-        self.powered_down = 1
+        An inspector makes runs of the pieces.
+        """
+        return self.execute(until_cycle) if self.inspector is None else self.inspector.run(until_cycle)
 
     def step(self) -> int:
         """One instruction or interrupt entry; an idle CPU advances by a cycle."""
@@ -189,58 +78,6 @@ class Cpu(Executor):
             return self.run(until_cycle)
         finally:
             self.unmark(addresses)
-
-    def mark(self, addresses: tuple[int, ...]) -> None:
-        """From now on a run ends before each instruction at one of `addresses`, with BREAKPOINT."""
-        for address in addresses:
-            self.lines[address] = _MARK | (self.lines[address] & _OUTSIDE)
-
-    def unmark(self, addresses: tuple[int, ...]) -> None:
-        """Takes the marks away."""
-        for address in addresses:
-            self.lines[address] = _OUTSIDE if self.lines[address] & _OUTSIDE else self.line_at(address)
-
-    def request_stop(self) -> None:
-        """Ends the run after the instruction in progress; for callbacks of the bus."""
-        self.stop = _STOP_REQUESTED
-        self.limit = 0
-
-    def replan(self) -> None:
-        """Ends a piece of a run after the instruction in progress, for the caller of `go_on` to make another one."""
-        if self.stop == 0:
-            self.stop = _REPLAN
-        self.limit = 0
-
-    def set_external(self, port: int, levels: int, tick: int) -> None:
-        """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
-        ports = self.peripherals.ports
-        if ports.next_cycle == NEVER_TICK and not port & 1 and tick <= 12 * self.cycles + 9:
-            ports.outside[port] = levels
-        else:
-            self.peripherals.push(port, levels, tick)
-            self.next_event = 0
-            self.limit = 0
-
-    # Observers
-
-    def asleep(self) -> bool:
-        """Whether only a reset or a new input can make it execute another instruction."""
-        idle_for_ever = self.idle != 0 and self.peripherals.next_event(self.cycles) == NEVER_TICK
-        return self.powered_down != 0 or idle_for_ever
-
-    def peek_iram(self, address: int) -> int:
-        """A byte of internal RAM (0..255)."""
-        return self.iram[address & 0xFF]
-
-    def poke_iram(self, address: int, value: int) -> None:
-        """Writes internal RAM between two instructions."""
-        self.iram[address & 0xFF] = value & 0xFF
-
-    def sfr(self, address: int) -> int:
-        """A special function register (80h..FFh; ports: their latch) as of now, without side effects."""
-        return self.register(address, self.cycles)
-
-    # The run loop's view of time
 
     def begin_run(self) -> None:
         self.next_mark = (
@@ -279,11 +116,6 @@ class Cpu(Executor):
         self.limit = event
         return 0
 
-    def _next_look(self) -> int:
-        """The cycle of the next event, mark or end of the run, whichever comes first: instructions go on until then."""
-        event = self.next_event if self.next_event < self.until else self.until
-        return event if event < self.next_mark else self.next_mark
-
     def _attend(self, now: int) -> int:
         """Everything due at the start of cycle `now`: 1 if that was an interrupt, or ends the run.
 
@@ -316,11 +148,11 @@ class Cpu(Executor):
         """Whether a mark, or sleep that nothing known ends, ends the run at the start of cycle `now`."""
         if not self.idle and not self.powered_down:
             if self.lines[self.pc] & _MARK:
-                self.stop = BREAKPOINT
+                self.stop = _BREAKPOINT
         elif self.stop_asleep:
             self.peripherals.settle()
             if self.asleep():
-                self.stop = ASLEEP
+                self.stop = _ASLEEP
 
     def _look_for_sleep(self, now: int) -> None:
         """Looks up again when less may be known of what ends idle mode: then nothing may be left."""
@@ -340,12 +172,6 @@ class Cpu(Executor):
                 self.marks = 1
                 self.fault(_MAIN_LOOP_STARVED)
 
-    def _taken_over(self) -> bool:
-        """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
-        which does not count as time of its own.
-        """
-        return self.peripherals.interrupts.in_service != 0 or self.cycles - self.blocked <= _ONE_INSTRUCTION
-
     def _enter(self, source: int) -> None:
         """The hardware LCALL: two cycles, and the end of idle mode."""
         if not self._taken_over():
@@ -361,127 +187,546 @@ class Cpu(Executor):
         self._expect(self.cycles)
 
     def end_of_interrupt(self) -> None:
+        """RETI was executed."""
         self.leave_edges()
         self.peripherals.interrupts.leave()
         self._block()
 
-    def _block(self) -> None:
-        """No interrupt before one more instruction has been executed: after RETI and writes to IE, IP."""
-        self.blocked = self.cycles
-        self._expect(self.cycles + 1)
+    # Instructions
 
-    def _expect(self, earliest: int) -> None:
-        """What is due next may have changed; nothing that the pins ask for has."""
-        self.next_event = self.peripherals.next_event(earliest)
-        self.limit = 0 if self.stop or self.txd.full else self._next_look()
+    def execute(self, until_cycle: int) -> int:
+        """The loop over instructions: ends at `until_cycle`, or when `stop` is set."""
+        self.until = until_cycle
+        self.stop = _REACHED
+        self.limit = 0
+        iram = self.iram
+        rom = self.rom
+        now = self.cycles
+        pc = self.pc
+        count = self.instructions
+        while True:
+            if now >= self.limit:
+                self.pc = pc
+                if self.boundary():
+                    break
+                now = self.cycles
+                pc = self.pc
+                continue
+            self.at = pc
+            at = pc
+            line = self.lines[pc]
+            if line & 0x1800:  # no opcode's: a breakpoint, or outside the image
+                if line & _MARK:
+                    self.stop = _BREAKPOINT
+                    break
+                self.fault(_OUTSIDE_IMAGE)
+                line = self.line_at(pc)
+            pc = line >> 16
+            self.start = now
+            now += (line >> 8) & 0xFF
+            self.cycles = now
+            count += 1
+            row = line & 0xFF
+            if row == 0x00:  # NOP
+                pass
+            elif row == 0x01:  # AJMP addr11
+                pc = (pc & 0xF800) | ((rom[at] & 0xE0) << 3) | rom[at + 1]
+            elif row == 0x02:  # LJMP addr16
+                pc = (rom[at + 1] << 8) | rom[at + 2]
+            elif row == 0x03:  # RR A
+                self.a = (self.a >> 1) | ((self.a & 1) << 7)
+            elif row == 0x04:  # INC A
+                self.a = (self.a + 1) & 0xFF
+            elif row == 0x05:  # INC dir
+                self.write(rom[at + 1], (self.read_latched(rom[at + 1]) + 1) & 0xFF)
+            elif row == 0x06:  # INC @Ri
+                address = iram[self.bank + (rom[at] & 1)]
+                iram[address] = (iram[address] + 1) & 0xFF
+            elif row == 0x08:  # INC Rn
+                iram[self.bank + (rom[at] & 7)] = (iram[self.bank + (rom[at] & 7)] + 1) & 0xFF
+            elif row == 0x10:  # JBC bit,rel
+                if self.latched_bit(rom[at + 1]):
+                    self.write_bit(rom[at + 1], 0)
+                    pc = self.branch(pc, rom[at + 2])
+            elif row == 0x11:  # ACALL addr11
+                pc = self.call(pc, (pc & 0xF800) | ((rom[at] & 0xE0) << 3) | rom[at + 1])
+            elif row == 0x12:  # LCALL addr16
+                pc = self.call(pc, (rom[at + 1] << 8) | rom[at + 2])
+            elif row == 0x13:  # RRC A
+                value = self.a
+                self.a = (value >> 1) | (self.cy << 7)
+                self.cy = value & 1
+            elif row == 0x14:  # DEC A
+                self.a = (self.a - 1) & 0xFF
+            elif row == 0x15:  # DEC dir
+                self.write(rom[at + 1], (self.read_latched(rom[at + 1]) - 1) & 0xFF)
+            elif row == 0x16:  # DEC @Ri
+                address = iram[self.bank + (rom[at] & 1)]
+                iram[address] = (iram[address] - 1) & 0xFF
+            elif row == 0x18:  # DEC Rn
+                iram[self.bank + (rom[at] & 7)] = (iram[self.bank + (rom[at] & 7)] - 1) & 0xFF
+            elif row == 0x20:  # JB bit,rel
+                if self.read_bit(rom[at + 1]):
+                    pc = self.branch(pc, rom[at + 2])
+            elif row == 0x22:  # RET
+                value = self.pop() << 8
+                pc = value | self.pop()
+            elif row == 0x23:  # RL A
+                self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
+            elif row == 0x24:  # ADD A,#imm
+                self.add(rom[at + 1], 0)
+            elif row == 0x25:  # ADD A,dir
+                self.add(self.read(rom[at + 1]), 0)
+            elif row == 0x26:  # ADD A,@Ri
+                self.add(iram[iram[self.bank + (rom[at] & 1)]], 0)
+            elif row == 0x28:  # ADD A,Rn
+                self.add(iram[self.bank + (rom[at] & 7)], 0)
+            elif row == 0x30:  # JNB bit,rel
+                if not self.read_bit(rom[at + 1]):
+                    pc = self.branch(pc, rom[at + 2])
+            elif row == 0x32:  # RETI
+                value = self.pop() << 8
+                pc = value | self.pop()
+                self.end_of_interrupt()
+            elif row == 0x33:  # RLC A
+                value = self.a
+                self.a = ((value << 1) & 0xFF) | self.cy
+                self.cy = value >> 7
+            elif row == 0x34:  # ADDC A,#imm
+                self.add(rom[at + 1], self.cy)
+            elif row == 0x35:  # ADDC A,dir
+                value = self.read(rom[at + 1])  # which may be PSW: CY is taken after
+                self.add(value, self.cy)
+            elif row == 0x36:  # ADDC A,@Ri
+                self.add(iram[iram[self.bank + (rom[at] & 1)]], self.cy)
+            elif row == 0x38:  # ADDC A,Rn
+                self.add(iram[self.bank + (rom[at] & 7)], self.cy)
+            elif row == 0x40:  # JC rel
+                if self.cy:
+                    pc = self.branch(pc, rom[at + 1])
+            elif row == 0x42:  # ORL dir,A
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) | self.a)
+            elif row == 0x43:  # ORL dir,#imm
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) | rom[at + 2])
+            elif row == 0x44:  # ORL A,#imm
+                self.a |= rom[at + 1]
+            elif row == 0x45:  # ORL A,dir
+                self.a |= self.read(rom[at + 1])
+            elif row == 0x46:  # ORL A,@Ri
+                self.a |= iram[iram[self.bank + (rom[at] & 1)]]
+            elif row == 0x48:  # ORL A,Rn
+                self.a |= iram[self.bank + (rom[at] & 7)]
+            elif row == 0x50:  # JNC rel
+                if not self.cy:
+                    pc = self.branch(pc, rom[at + 1])
+            elif row == 0x52:  # ANL dir,A
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) & self.a)
+            elif row == 0x53:  # ANL dir,#imm
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) & rom[at + 2])
+            elif row == 0x54:  # ANL A,#imm
+                self.a &= rom[at + 1]
+            elif row == 0x55:  # ANL A,dir
+                self.a &= self.read(rom[at + 1])
+            elif row == 0x56:  # ANL A,@Ri
+                self.a &= iram[iram[self.bank + (rom[at] & 1)]]
+            elif row == 0x58:  # ANL A,Rn
+                self.a &= iram[self.bank + (rom[at] & 7)]
+            elif row == 0x60:  # JZ rel
+                if self.a == 0:
+                    pc = self.branch(pc, rom[at + 1])
+            elif row == 0x62:  # XRL dir,A
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) ^ self.a)
+            elif row == 0x63:  # XRL dir,#imm
+                self.write(rom[at + 1], self.read_latched(rom[at + 1]) ^ rom[at + 2])
+            elif row == 0x64:  # XRL A,#imm
+                self.a ^= rom[at + 1]
+            elif row == 0x65:  # XRL A,dir
+                self.a ^= self.read(rom[at + 1])
+            elif row == 0x66:  # XRL A,@Ri
+                self.a ^= iram[iram[self.bank + (rom[at] & 1)]]
+            elif row == 0x68:  # XRL A,Rn
+                self.a ^= iram[self.bank + (rom[at] & 7)]
+            elif row == 0x70:  # JNZ rel
+                if self.a != 0:
+                    pc = self.branch(pc, rom[at + 1])
+            elif row == 0x72:  # ORL C,bit
+                self.cy |= self.read_bit(rom[at + 1])
+            elif row == 0x73:  # JMP @A+DPTR
+                pc = self.fork((self.a + self.dptr) & 0xFFFF)
+            elif row == 0x74:  # MOV A,#imm
+                self.a = rom[at + 1]
+            elif row == 0x75:  # MOV dir,#imm
+                self.write(rom[at + 1], rom[at + 2])
+            elif row == 0x76:  # MOV @Ri,#imm
+                iram[iram[self.bank + (rom[at] & 1)]] = rom[at + 1]
+            elif row == 0x78:  # MOV Rn,#imm
+                iram[self.bank + (rom[at] & 7)] = rom[at + 1]
+            elif row == 0x80:  # SJMP rel
+                pc = self.branch(pc, rom[at + 1])
+            elif row == 0x82:  # ANL C,bit
+                self.cy &= self.read_bit(rom[at + 1])
+            elif row == 0x83:  # MOVC A,@A+PC
+                self.a = rom[(pc + self.a) & 0xFFFF]
+            elif row == 0x84:  # DIV AB
+                self.divide()
+            elif row == 0x85:  # MOV dst,src
+                self.write(rom[at + 2], self.read(rom[at + 1]))
+            elif row == 0x86:  # MOV dir,@Ri
+                self.write(rom[at + 1], iram[iram[self.bank + (rom[at] & 1)]])
+            elif row == 0x88:  # MOV dir,Rn
+                self.write(rom[at + 1], iram[self.bank + (rom[at] & 7)])
+            elif row == 0x90:  # MOV DPTR,#imm16
+                self.dptr = (rom[at + 1] << 8) | rom[at + 2]
+            elif row == 0x92:  # MOV bit,C
+                self.write_bit(rom[at + 1], self.cy)
+            elif row == 0x93:  # MOVC A,@A+DPTR
+                self.a = rom[(self.dptr + self.a) & 0xFFFF]
+            elif row == 0x94:  # SUBB A,#imm
+                self.subtract(rom[at + 1])
+            elif row == 0x95:  # SUBB A,dir
+                self.subtract(self.read(rom[at + 1]))
+            elif row == 0x96:  # SUBB A,@Ri
+                self.subtract(iram[iram[self.bank + (rom[at] & 1)]])
+            elif row == 0x98:  # SUBB A,Rn
+                self.subtract(iram[self.bank + (rom[at] & 7)])
+            elif row == 0xA0:  # ORL C,/bit
+                self.cy |= self.read_bit(rom[at + 1]) ^ 1
+            elif row == 0xA2:  # MOV C,bit
+                self.cy = self.read_bit(rom[at + 1])
+            elif row == 0xA3:  # INC DPTR
+                self.dptr = (self.dptr + 1) & 0xFFFF
+            elif row == 0xA4:  # MUL AB
+                value = self.a * self.b
+                self.a = value & 0xFF
+                self.b = value >> 8
+                self.cy = 0
+                self.ov = 1 if value > 0xFF else 0
+            elif row == 0xA5:  # undefined: runs as NOP (C2)
+                self.fault(_UNDEFINED_OPCODE)
+            elif row == 0xA6:  # MOV @Ri,dir
+                value = self.read(rom[at + 1])
+                iram[iram[self.bank + (rom[at] & 1)]] = value
+            elif row == 0xA8:  # MOV Rn,dir
+                value = self.read(rom[at + 1])
+                iram[self.bank + (rom[at] & 7)] = value
+            elif row == 0xB0:  # ANL C,/bit
+                self.cy &= self.read_bit(rom[at + 1]) ^ 1
+            elif row == 0xB2:  # CPL bit
+                self.write_bit(rom[at + 1], self.latched_bit(rom[at + 1]) ^ 1)
+            elif row == 0xB3:  # CPL C
+                self.cy ^= 1
+            elif row == 0xB4:  # CJNE A,#imm,rel
+                pc = self.compare(pc, self.a, rom[at + 1], rom[at + 2])
+            elif row == 0xB5:  # CJNE A,dir,rel
+                value = self.read(rom[at + 1])
+                pc = self.compare(pc, self.a, value, rom[at + 2])
+            elif row == 0xB6:  # CJNE @Ri,#imm,rel
+                pc = self.compare(pc, iram[iram[self.bank + (rom[at] & 1)]], rom[at + 1], rom[at + 2])
+            elif row == 0xB8:  # CJNE Rn,#imm,rel
+                pc = self.compare(pc, iram[self.bank + (rom[at] & 7)], rom[at + 1], rom[at + 2])
+            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one (C4)
+                self.claim()
+                value = self.read(rom[at + 1])
+                iram[self.sp] = value
+            elif row == 0xC2:  # CLR bit
+                self.write_bit(rom[at + 1], 0)
+            elif row == 0xC3:  # CLR C
+                self.cy = 0
+            elif row == 0xC4:  # SWAP A
+                self.a = ((self.a << 4) & 0xF0) | (self.a >> 4)
+            elif row == 0xC5:  # XCH A,dir
+                value = self.read(rom[at + 1])
+                address = self.a
+                self.a = value
+                self.write(rom[at + 1], address)
+            elif row == 0xC6:  # XCH A,@Ri
+                address = iram[self.bank + (rom[at] & 1)]
+                value = iram[address]
+                iram[address] = self.a
+                self.a = value
+            elif row == 0xC8:  # XCH A,Rn
+                value = iram[self.bank + (rom[at] & 7)]
+                iram[self.bank + (rom[at] & 7)] = self.a
+                self.a = value
+            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped (C4)
+                value = self.pop()
+                self.write(rom[at + 1], value)
+            elif row == 0xD2:  # SETB bit
+                self.write_bit(rom[at + 1], 1)
+            elif row == 0xD3:  # SETB C
+                self.cy = 1
+            elif row == 0xD4:  # DA A
+                self.decimal_adjust()
+            elif row == 0xD5:  # DJNZ dir,rel
+                value = (self.read_latched(rom[at + 1]) - 1) & 0xFF
+                self.write(rom[at + 1], value)
+                if value:
+                    pc = self.branch(pc, rom[at + 2])
+            elif row == 0xD6:  # XCHD A,@Ri
+                address = iram[self.bank + (rom[at] & 1)]
+                value = iram[address]
+                iram[address] = (value & 0xF0) | (self.a & 0x0F)
+                self.a = (self.a & 0xF0) | (value & 0x0F)
+            elif row == 0xD8:  # DJNZ Rn,rel
+                value = (iram[self.bank + (rom[at] & 7)] - 1) & 0xFF
+                iram[self.bank + (rom[at] & 7)] = value
+                if value:
+                    pc = self.branch(pc, rom[at + 1])
+            elif row == 0xE0:  # MOVX A,@DPTR
+                self.a = self.movx_read(self.dptr)
+            elif row == 0xE2:  # MOVX A,@Ri
+                self.a = self.movx_read(self.read_latch(_P2) << 8 | iram[self.bank + (rom[at] & 1)])
+            elif row == 0xE4:  # CLR A
+                self.a = 0
+            elif row == 0xE5:  # MOV A,dir
+                self.a = self.read(rom[at + 1])
+            elif row == 0xE6:  # MOV A,@Ri
+                self.a = iram[iram[self.bank + (rom[at] & 1)]]
+            elif row == 0xE8:  # MOV A,Rn
+                self.a = iram[self.bank + (rom[at] & 7)]
+            elif row == 0xF0:  # MOVX @DPTR,A
+                self.movx_write(self.dptr, self.a)
+            elif row == 0xF2:  # MOVX @Ri,A
+                self.movx_write(self.read_latch(_P2) << 8 | iram[self.bank + (rom[at] & 1)], self.a)
+            elif row == 0xF4:  # CPL A
+                self.a ^= 0xFF
+            elif row == 0xF5:  # MOV dir,A
+                self.write(rom[at + 1], self.a)
+            elif row == 0xF6:  # MOV @Ri,A
+                iram[iram[self.bank + (rom[at] & 1)]] = self.a
+            elif row == 0xF8:  # MOV Rn,A
+                iram[self.bank + (rom[at] & 7)] = self.a
+        self.pc = pc
+        self.instructions = count
+        return self.stop
 
-    # Special function registers
+    # Addressing
+
+    def read(self, address: int) -> int:
+        """Direct address, ports at their pins."""
+        return self.iram[address] if address < 0x80 else self.read_register(address)
+
+    def read_register(self, address: int) -> int:
+        value = self.core_register(address)
+        return value if value >= 0 else self.read_sfr(address)
+
+    def core_register(self, address: int) -> int:
+        """A register of the core itself, -1 if it is another."""
+        if address == 0xE0:
+            return self.a
+        elif address == 0xD0:
+            return self.psw()
+        elif address == 0x82:
+            return self.dptr & 0xFF
+        elif address == 0x83:
+            return self.dptr >> 8
+        elif address == 0xF0:
+            return self.b
+        elif address == 0x81:
+            return self.sp
+        return -1
+
+    def sfr(self, address: int) -> int:
+        """A special function register (80h..FFh; ports: their latch) as of now, without side effects."""
+        return self.register(address, self.cycles)
 
     def register(self, address: int, cycle: int) -> int:
         """A register, ports at their latches, with everything below `cycle` done."""
         value = self.core_register(address)
         return value if value >= 0 else self._other_register(address, cycle)
 
-    def _other_register(self, address: int, cycle: int) -> int:
-        return self.pcon if address == _PCON else self.peripherals.read(address, cycle)
-
-    def read_sfr(self, address: int) -> int:
-        if address & 0xCF == 0x80:
-            return self.peripherals.pin_levels((address - _P0) >> 4, self.start)
-        return self._other_register(address, self.start + 1)
-
     def read_latch(self, address: int) -> int:
         return self.register(address, self.start + 1)
 
-    def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
-        if address & 0xCF == 0x80:
-            port = (address - _P0) >> 4
-            value = self.peripherals.ports.latches[port]
-            self.write_port(port, value | mask if level else value & (0xFF ^ mask))
+    def read_latched(self, address: int) -> int:
+        """Direct address as read-modify-write instructions see it: ports at their latches."""
+        return self.iram[address] if address < 0x80 else self.read_latch(address)
+
+    def write(self, address: int, value: int) -> None:
+        if address < 0x80:
+            self.iram[address] = value
         else:
-            self._written(address, self.peripherals.write_bit(address, mask, level, self.cycles))
+            self.write_register(address, value)
 
-    def write_sfr(self, address: int, value: int) -> None:
-        if address == _PCON:
-            self.write_pcon(value)
-        elif address & 0xCF == 0x80:
-            self.write_port((address - _P0) >> 4, value)
+    def write_register(self, address: int, value: int) -> None:
+        if address == 0xE0:
+            self.a = value
+        elif address == 0xD0:
+            self.write_psw(value)
+        elif address == 0x82:
+            self.dptr = (self.dptr & 0xFF00) | value
+        elif address == 0x83:
+            self.dptr = (self.dptr & 0x00FF) | (value << 8)
+        elif address == 0xF0:
+            self.b = value
+        elif address == 0x81:
+            self.set_sp(value)
         else:
-            self._written(address, self.peripherals.write(address, value, self.cycles))
+            self.write_sfr(address, value)
 
-    def _written(self, address: int, sooner: int) -> None:
-        """After a write to a register of the peripherals. `sooner`: an event may come sooner by it."""
-        if address in (_IE, _IP):
-            self.marks = self.marks if self.peripherals.interrupts.in_service else 0
-            self._block()
-        elif sooner:
-            self._expect(self.cycles)
+    def read_bit(self, bit: int) -> int:
+        if bit < 0x80:
+            byte = self.iram[0x20 + (bit >> 3)]
+        elif bit < _CORE:
+            byte = self.read_sfr(bit & 0xF8)
+        else:
+            byte = self.read_register(bit & 0xF8)
+        return (byte >> (bit & 7)) & 1
 
-    def write_pcon(self, value: int) -> None:
-        """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""
-        if (value ^ self.pcon) & _SMOD:
-            self.peripherals.write_smod(value >> 7, self.cycles)
-            self.next_event = 0
-        self.pcon = value & _PCON_BITS
-        if value & _PD:
-            self.peripherals.freeze(self.cycles)
-            self.powered_down = 1
-            self.next_event = 0
-        elif value & _IDL:
-            self.idle = 1
-            if self.stop_asleep:  # an event that has become later must not keep it awake
-                self.next_event = 0
-        self.limit = 0
+    def latched_bit(self, bit: int) -> int:
+        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read_latch(bit & 0xF8)
+        return (byte >> (bit & 7)) & 1
 
-    def write_port(self, port: int, value: int) -> None:
-        if value != self.peripherals.ports.latches[port]:
-            if port == 3:
-                self.peripherals.write_p3(value, self.cycles)
-            elif port == 1:
-                self.peripherals.sync(self.cycles)
-            self.peripherals.ports.latches[port] = value  # the pins follow with the next cycle
-            if port & 1:  # P1 and P3 carry sampled inputs
-                self.next_event = 0
-                self.limit = 0
-            self.bus.port_written(port, value, 12 * self.cycles)
+    def write_bit(self, bit: int, level: int) -> None:
+        if bit < 0x80:
+            address = 0x20 + (bit >> 3)
+            kept = self.iram[address] & (0xFF ^ (1 << (bit & 7)))
+            self.iram[address] = kept | (level << (bit & 7))
+        elif bit < _CORE:
+            self.write_sfr_bit(bit & 0xF8, 1 << (bit & 7), level)
+        else:
+            self.write_register_bit(bit & 0xF8, 1 << (bit & 7), level)
 
-    # External bus
+    def write_register_bit(self, address: int, mask: int, level: int) -> None:
+        """Only the one bit changes."""
+        value = self.core_register(address)
+        if value < 0:
+            self.write_sfr_bit(address, mask, level)
+        else:
+            self.write_register(address, value | mask if level else value & (0xFF ^ mask))
 
-    def page(self) -> int:
-        return self.peripherals.ports.latches[2] << 8
+    # Flow
 
-    def movx_read(self, address: int) -> int:
-        """Without a strobe (P3.7 latched low, X3) nothing drives the bus."""
-        value = _FLOATING
-        if self.peripherals.ports.latches[3] & 0x80:
-            value = self.bus.movx_read(address, 12 * self.start + _READ_SAMPLE) & 0xFF
-        self.write_port(0, 0xFF)
+    # The loop keeps PC in a variable of its own: these take the address after the instruction and give the new one.
+
+    def branch(self, pc: int, offset: int) -> int:
+        return self.fork((pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
+
+    def fork(self, target: int) -> int:
+        """A jump that was a choice, or is as short as one."""
+        if self.edge_mask:
+            self.count_edge(target)
+        return target
+
+    def call(self, pc: int, target: int) -> int:
+        """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
+        self.claim()
+        self.iram[self.sp] = pc & 0xFF
+        self.claim()
+        self.iram[self.sp] = pc >> 8
+        return target
+
+    def claim(self) -> None:
+        """SP counts up; a byte is about to be stored there."""
+        self.sp = (self.sp + 1) & 0xFF
+        if self.sp > self.highest_sp:
+            self.highest_sp = self.sp
+        if self.sp == self.stack_end:
+            self.fault(_STACK_OVERFLOW)
+
+    def pop(self) -> int:
+        value = self.iram[self.sp]
+        empty = self.sp == self.stack_floor
+        self.sp = (self.sp - 1) & 0xFF
+        if empty:
+            self.fault(_STACK_UNDERFLOW)
         return value
 
-    def movx_write(self, address: int, value: int) -> None:
-        """Without a strobe (P3.6 latched low, X3) nothing is written."""
-        if self.peripherals.ports.latches[3] & 0x40:
-            self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
-        self.write_port(0, 0xFF)
+    def set_sp(self, value: int) -> None:
+        """An instruction writes SP. Leaving the stack is a fault, and so is a sum that goes round the top of RAM:
+        a step up by less than half of RAM that ends lower. A number in the instruction (MOV SP,#data) is no sum.
+        """
+        before, self.sp = self.sp, value
+        end = self.stack_end or 0x100
+        if value > self.highest_sp:
+            self.highest_sp = value
+        if self.stack_floor <= before < end:  # else it has not been set up yet, or was outside already
+            round_the_top = value < before - 0x80 and self.rom[self.at] != _MOV_DATA
+            if round_the_top or value >= end:
+                self.fault(_STACK_OVERFLOW)
+            elif value < self.stack_floor:
+                self.fault(_STACK_UNDERFLOW)
 
-    # State
+    # ALU
 
-    def before_save(self) -> None:
-        """Brings the peripherals up to where the core is. Marks count only while interrupts hold the CPU."""
-        self.peripherals.sync(self.cycles)
-        self.peripherals.settle()
-        self.peripherals.timers.store()
-        if not self._taken_over():
-            self.marks = 0
+    def add(self, operand: int, carry: int) -> None:
+        a = self.a
+        total = a + operand + carry
+        self.ac = ((a ^ operand ^ total) >> 4) & 1
+        self.ov = (((a ^ total) & (operand ^ total)) >> 7) & 1
+        self.cy = total >> 8
+        self.a = total & 0xFF
 
-    def after_load(self) -> None:
-        """Raises ValueError unless the peripherals stand where the core does."""
-        if self.bank & ~0x18 or self.user_flags & ~0x22:
-            raise ValueError(f"PSW has bank {self.bank:02X}h and flags {self.user_flags:02X}h")
-        self.peripherals.check_times(self.cycles)
+    def subtract(self, operand: int) -> None:
+        a = self.a
+        total = (a - operand - self.cy) & 0x1FF
+        self.ac = ((a ^ operand ^ total) >> 4) & 1
+        self.ov = (((a ^ operand) & (a ^ total)) >> 7) & 1
+        self.cy = total >> 8
+        self.a = total & 0xFF
 
-    def __repr__(self) -> str:
-        return (
-            f"Cpu(pc={self.pc:04X}h, cycles={self.cycles}, a={self.a:02X}h, psw={self.psw():02X}h, "
-            f"sp={self.sp:02X}h, dptr={self.dptr:04X}h{', idle' if self.idle else ''})"
-        )
+    def compare(self, pc: int, left: int, right: int, offset: int) -> int:
+        """CJNE: the new PC."""
+        self.cy = 1 if left < right else 0
+        return pc if left == right else self.branch(pc, offset)
+
+    def divide(self) -> None:
+        """Dividing by zero leaves A and B as they were (undefined on silicon: C3) and sets OV."""
+        self.cy = 0
+        self.ov = 1 if self.b == 0 else 0
+        if self.b:
+            quotient = self.a // self.b
+            self.b = self.a - quotient * self.b
+            self.a = quotient
+
+    def decimal_adjust(self) -> None:
+        value = self.a
+        if self.ac or (value & 0x0F) > 9:
+            value += 0x06
+        if self.cy or value > 0x9F:  # also when the first step carried
+            value += 0x60
+        if value > 0xFF:
+            self.cy = 1
+        self.a = value & 0xFF
+
+    # Edges between branches
+
+    def watch_edges(self, edges: memoryview) -> None:
+        """Counts from now on how often each edge between two taken branches is passed, in `edges`.
+
+        A writable buffer of 2^n bytes, at most 65536; a count goes from 255 to 1. One byte: counts nothing.
+        """
+        size = len(edges)
+        if size & (size - 1) or not 1 <= size <= 0x10000:
+            raise ValueError(f"a map of {size} bytes: give it 1, 2, 4 .. 65536")
+        self.edges = memoryview(edges).cast("B")
+        self.edge_mask = size - 1
+        self.begin_edges()
+
+    def begin_edges(self) -> None:
+        """No branch has been taken yet: after the core was put back to another moment."""
+        self.edge_before = 0
+        self.edge_depth = 0
+        self.highest_sp = self.sp
+
+    def count_edge(self, target: int) -> None:
+        """A branch goes to `target`. The index is that of AFL: this place, and the one before shifted by a bit."""
+        place = (self.at * _SPREAD_FROM + target * _SPREAD_TO) >> 3
+        index = (place ^ self.edge_before) & self.edge_mask
+        self.edge_before = (place & self.edge_mask) >> 1
+        count = self.edges[index] + 1
+        self.edges[index] = (count & 0xFF) + (count >> 8)
+
+    def enter_edges(self) -> None:
+        """An interrupt is taken: its branches do not follow those of the program that it interrupts."""
+        if self.edge_depth < _DEPTH:
+            self.edge_outer[self.edge_depth] = self.edge_before
+        self.edge_depth += 1
+        self.edge_before = 0
+
+    def leave_edges(self) -> None:
+        """The routine is over: what comes next follows the branch before it."""
+        if self.edge_depth:
+            self.edge_depth -= 1
+            if self.edge_depth < _DEPTH:
+                self.edge_before = self.edge_outer[self.edge_depth]

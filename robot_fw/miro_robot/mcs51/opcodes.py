@@ -1,6 +1,6 @@
 """The instruction set, one line per instruction: its name, its operands, its length and its time.
 
-And the names of registers and bits, and how an operand is written. What an instruction does is in `execute.py`. With
+And the names of registers and bits, and how an operand is written. What an instruction does is in `cpu.py`. With
 the symbols of an image, `miro_robot.inspect.symbol_names` writes operands. Source: Atmel 8051 Hardware Manual,
 instruction table and 2.1; AT89C52 data sheet, SFR map.
 """

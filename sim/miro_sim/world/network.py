@@ -14,7 +14,7 @@ from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol.decoder import Received, Symbol
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
-from miro_robot.mcs51.execute import STOPPED
+from miro_robot.mcs51.cpu import STOPPED
 from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.uplink import Uplink
