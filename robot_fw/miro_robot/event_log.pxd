@@ -14,5 +14,4 @@ cdef class EventLog:
     cdef list _data
 
     cpdef void note(self, int kind, long long tick, long long code, long long value, bytes data=*) noexcept
-    cpdef void copy(self, EventLog other, long long serial) noexcept
     cpdef cut(self, long long serial)

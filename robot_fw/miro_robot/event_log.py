@@ -48,12 +48,6 @@ class EventLog:
         if self.end - self.first > CAPACITY:
             self.first = self.end - CAPACITY
 
-    def copy(self, other: EventLog, serial: int) -> None:
-        """Adds an event of another log once more."""
-        place = serial & _MASK
-        kind, tick, code = other._kinds[place], other._ticks[place], other._codes[place]
-        self.note(kind, tick, code, other._values[place], other._data[place])
-
     def event(self, serial: int) -> tuple[int, int, int, int, bytes]:
         """(tick, kind, code, value, data). Raises IndexError for an event that is not kept."""
         if not self.first <= serial < self.end:

@@ -27,7 +27,7 @@ cdef class Moment:
     cdef long long tick
     cdef object flat
     cdef bytes state
-    cdef EventLog events
+    cdef list events
     cdef int[::1] passed
     cdef int edge_before, edge_depth, highest_sp
     cdef int edge_outer[8]

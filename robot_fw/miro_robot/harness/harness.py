@@ -83,7 +83,7 @@ class Moment:
         self.tick = -1
         self.flat = Flat(machine)
         self.state = b""
-        self.events = EventLog()
+        self.events: list[tuple[int, int, int, int, bytes]] = []
         self.passed = array("i")  # index in the map of edges, how often, index, ..
         self.edge_before = 0
         self.edge_depth = 0
@@ -95,10 +95,8 @@ class Moment:
         cpu = self.cpu
         self.tick = tick
         self.state = self.flat.save()
-        self.events = EventLog()
         if self.log is not None:
-            for serial in range(begun, self.log.end):
-                self.events.copy(self.log, serial)
+            self.events = [self.log.event(serial) for serial in range(begun, self.log.end)]
         self.passed = array("i", [n for index, count in enumerate(edges) if count for n in (index, count)])
         self.edge_before = cpu.edge_before
         self.edge_depth = cpu.edge_depth
@@ -122,8 +120,8 @@ class Moment:
     def tell(self) -> None:
         """Puts the events into the log."""
         if self.log is not None:
-            for serial in range(self.events.end):
-                self.log.copy(self.events, serial)
+            for tick, kind, code, value, data in self.events:
+                self.log.note(kind, tick, code, value, data)
 
 
 class Harness:

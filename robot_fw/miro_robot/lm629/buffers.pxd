@@ -36,8 +36,9 @@ cdef class TrajectoryBuffer:
 
 @cython.final
 cdef class FilterBuffer:
-    cdef public int due, kp, ki, kd, il, ds
-    cdef public int taken_kp, taken_ki, taken_kd, taken_il, taken_ds
+    cdef public int due, ds, taken_ds
+    cdef readonly int coefficients[4]
+    cdef int taken[4]
 
     cpdef void reset(self) noexcept
     cpdef int begin(self, int control) noexcept

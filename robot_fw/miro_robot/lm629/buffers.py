@@ -178,37 +178,27 @@ class TrajectoryBuffer:
 
 
 class FilterBuffer:
-    """LFIL's primary registers and the copy a UDF has taken: (kp, ki, kd, il, ds)."""
+    """LFIL's primary registers and the copy a UDF has taken: coefficients (kp, ki, kd, il), and ds."""
 
     STATE = {
         "due": ("i", 0, 0x000F),
-        "kp": _FIT_15,
-        "ki": _FIT_15,
-        "kd": _FIT_15,
-        "il": _FIT_15,
+        "coefficients": ("4i", 0, 0x7FFF),
         "ds": ("i", 0, 0xFF),
-        "taken_kp": _FIT_15,
-        "taken_ki": _FIT_15,
-        "taken_kd": _FIT_15,
-        "taken_il": _FIT_15,
+        "taken": ("4i", 0, 0x7FFF),
         "taken_ds": ("i", 0, 0xFF),
     }
 
     def __init__(self) -> None:
+        self.coefficients = [0] * 4
+        self.taken = [0] * 4
         self.reset()
 
     def reset(self) -> None:
         self.due = 0
-        self.kp = 0
-        self.ki = 0
-        self.kd = 0
-        self.il = 0
         self.ds = 0
-        self.taken_kp = 0
-        self.taken_ki = 0
-        self.taken_kd = 0
-        self.taken_il = 0
-        self.taken_ds = 0
+        for place in range(4):
+            self.coefficients[place] = 0
+        self.take()
 
     def begin(self, control: int) -> int:
         """The control word arrived. Returns how many words follow."""
@@ -221,20 +211,12 @@ class FilterBuffer:
         return (self.due >> 3 & 1) + (self.due >> 2 & 1) + (self.due >> 1 & 1) + (self.due & 1)
 
     def word(self, word: int, clamp: int = 0) -> int:
-        """The next coefficient, 15 bits, in the order kp, ki, kd, il. Returns 0 or OUT_OF_RANGE."""
-        value = fit_15(word, clamp)
-        if self.due & 8:
-            self.due &= ~8
-            self.kp = value
-        elif self.due & 4:
-            self.due &= ~4
-            self.ki = value
-        elif self.due & 2:
-            self.due &= ~2
-            self.kd = value
-        else:
-            self.due = 0
-            self.il = value
+        """The next coefficient, 15 bits; bits 3 to 0 of `due` are those of kp to il. Returns 0 or OUT_OF_RANGE."""
+        place = 0
+        while place < 3 and not self.due & 8 >> place:
+            place += 1
+        self.due &= ~(8 >> place)
+        self.coefficients[place] = fit_15(word, clamp)
         return _OUT_OF_RANGE if word > 0x7FFF else 0
 
     def abandon(self) -> None:
@@ -243,8 +225,6 @@ class FilterBuffer:
 
     def take(self) -> None:
         """UDF was accepted: it will act on the registers as they are now."""
-        self.taken_kp = self.kp
-        self.taken_ki = self.ki
-        self.taken_kd = self.kd
-        self.taken_il = self.il
+        for place in range(4):
+            self.taken[place] = self.coefficients[place]
         self.taken_ds = self.ds

@@ -53,7 +53,6 @@ cdef class Lm629:
     cpdef int advance(self, long long tick) except -1
     cpdef rest(self, long long tick)
     cdef inline int _period(self, long long now) except -1
-    cdef bint _late_pulse_begins(self, long long now) noexcept
     cdef inline int _sample(self, long long now) except -1
     cdef inline int _latch_position(self, long long now) noexcept
     cdef int _start(self) except -1

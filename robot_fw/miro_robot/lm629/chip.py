@@ -32,7 +32,7 @@ from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer, fit_15, signed_31
-from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
+from miro_robot.lm629.commands import BY_OPCODE, COMMANDS
 from miro_robot.lm629.encoder import Encoder
 from miro_robot.lm629.host_port import HostPort
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
@@ -59,15 +59,10 @@ _STOPS, _COMPLETED, _OUT_OF_RANGE = buffers.STOPS, buffers.COMPLETED, buffers.OU
 _COMMAND_CAME, _WORD_CAME, _ANSWERED = host_port.COMMAND, host_port.WORD, host_port.ANSWERED
 _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET = host_port.OPEN, host_port.HARDWARE_RESET, host_port.SOFTWARE_RESET
 
-_RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12 = (
-    BY_NAME[name].opcode for name in ("RESET", "STT", "DFH", "SIP", "UDF", "PORT8", "PORT12")
-)
-_RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS = (
-    BY_NAME[name].opcode for name in ("RDDV", "RDDP", "RDIP", "RDRP", "RDRV", "RDSIGS")
-)
-_LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR = (
-    BY_NAME[name].opcode for name in ("LPES", "LPEI", "MSKI", "RSTI", "LFIL", "LTRJ", "SBPA", "SBPR")
-)
+(
+    _RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12, _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS, _RDSUM,
+    _LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR,
+) = (command.opcode for command in COMMANDS)  # fmt: skip
 _WORDS_IN = [BY_OPCODE[opcode].words_in if opcode in BY_OPCODE else 0 for opcode in range(256)]
 _WORDS_OUT = [BY_OPCODE[opcode].words_out if opcode in BY_OPCODE else 0 for opcode in range(256)]
 
@@ -234,11 +229,8 @@ class Lm629:
             now = self.next_tick
             if self.mode != _RUNNING:
                 self._end_reset(now)
-            elif self.pwm and not self.pulse_late:
-                self.pwm = 0
-                self.next_tick = self.period_tick + _PWM_TICKS
-            elif self.pulse_late and self._late_pulse_begins(now):
-                self.pwm = 1
+            elif self.pwm != self.pulse_late and self.pwm_magnitude and (self.pwm or self.pulses):
+                self.pwm = self.pulse_late  # the edge inside of a period (O3)
                 self.next_tick = self.period_tick + _PWM_TICKS
             else:
                 self._period(now)
@@ -271,12 +263,6 @@ class Lm629:
         else:
             self.pwm = 1
             self.next_tick = now + 16 * self.pwm_magnitude
-
-    def _late_pulse_begins(self, now: int) -> bool:
-        """O3 read the other way: the pulse is at the end of its period."""
-        if self.pwm or self.pwm_magnitude == 0:
-            return False
-        return now == self.period_tick + _PWM_TICKS - 16 * self.pwm_magnitude
 
     def _sample(self, now: int) -> None:
         """One sample; its order is chosen (README.md, "Inside a sample")."""
@@ -345,16 +331,13 @@ class Lm629:
             profile.stop_abruptly(self.real_position if at_real else profile.position >> 16)
             self.signals.word |= _ON_TARGET
             return _TRAJECTORY_COMPLETE
-        if control & _STOP_SMOOTHLY:
-            profile.stop_smoothly()
-        else:
-            profile.start()
+        profile.start(1 if control & _STOP_SMOOTHLY else 0)
         return 0
 
     def _update_filter(self) -> None:
         """The accepted UDF takes effect."""
-        buffer = self.filter_buffer
-        self.pid.load(buffer.taken_kp, buffer.taken_ki, buffer.taken_kd, buffer.taken_il, buffer.taken_ds)
+        taken = self.filter_buffer.taken
+        self.pid.load(taken[0], taken[1], taken[2], taken[3], self.filter_buffer.taken_ds)
         if self.options.update_clears:
             self.pid.open_loop()
 

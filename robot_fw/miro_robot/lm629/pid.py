@@ -13,11 +13,7 @@ _DRIVE = ("q", -0x8000, 0x7FFF)
 
 def _saturated(value: int) -> int:
     """Limited to 16 bits, two's complement."""
-    if value > 32767:
-        return 32767
-    if value < -32768:
-        return -32768
-    return value
+    return max(-32768, min(value, 32767))
 
 
 class Pid:

@@ -14,8 +14,7 @@ cdef class ProfileGenerator:
     cdef public int velocity_mode, forward, stopping, moving, crossed
 
     cpdef void reset(self) noexcept
-    cpdef void start(self) noexcept
-    cpdef void stop_smoothly(self) noexcept
+    cpdef void start(self, int stopping=*) noexcept
     cpdef void stop_abruptly(self, long long place) noexcept
     cpdef void follow(self, long long real_position) noexcept
     cpdef void define_home(self, long long real_position) noexcept
@@ -26,4 +25,3 @@ cdef class ProfileGenerator:
     cdef int _towards_target(self) noexcept
     cdef long long _speed(self, long long v, long long distance) noexcept
     cdef void _move(self, long long velocity) noexcept
-    cdef void _arrive(self) noexcept

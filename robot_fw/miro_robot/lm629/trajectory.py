@@ -55,25 +55,18 @@ class ProfileGenerator:
         self.reset()
 
     def reset(self) -> None:
-        self.position = 0
-        self.velocity = 0
+        self.follow(0)
         self.acceleration = 0
         self.max_velocity = 0
         self.target = 0
         self.velocity_mode = 0
         self.forward = 0
-        self.stopping = 0
-        self.moving = 0
         self.crossed = 0
 
-    def start(self) -> None:
-        """The working registers were loaded: run them."""
+    def start(self, stopping: int = 0) -> None:
+        """The working registers were loaded: run them, or stop smoothly."""
         self.moving = 1
-        self.stopping = 0
-
-    def stop_smoothly(self) -> None:
-        self.moving = 1
-        self.stopping = 1
+        self.stopping = stopping
 
     def stop_abruptly(self, place: int) -> None:
         """The target becomes `place`, and is reached."""
@@ -81,7 +74,7 @@ class ProfileGenerator:
         self.target = place
 
     def follow(self, real_position: int) -> None:
-        """The desired position is the real one (motor off)."""
+        """The desired position is the real one (motor off), or another one where it rests."""
         self.position = real_position * 65536
         self.velocity = 0
         self.moving = 0
@@ -111,7 +104,7 @@ class ProfileGenerator:
             self.moving = 0
             self.stopping = 0
         else:
-            self._arrive()
+            self.follow(self.target)
         return 1
 
     def _approach(self, goal: int) -> None:
@@ -127,14 +120,14 @@ class ProfileGenerator:
         a = self.acceleration
         distance = self.target * 65536 - self.position
         if distance == 0 and self.velocity == 0:
-            self._arrive()
+            self.follow(self.target)
             return 1
         backwards = distance < 0 or (distance == 0 and self.velocity < 0)
         v = -self.velocity if backwards else self.velocity
         if backwards:
             distance = -distance
         if 0 <= v <= a and distance <= min(a, self.max_velocity):
-            self._arrive()
+            self.follow(self.target)
             return 1
         if v < 0:
             v = min(v + a, 0)
@@ -162,9 +155,3 @@ class ProfileGenerator:
         self.position = _wrapped(moved)
         if self.position != moved:
             self.crossed = 1
-
-    def _arrive(self) -> None:
-        self.position = self.target * 65536
-        self.velocity = 0
-        self.moving = 0
-        self.stopping = 0

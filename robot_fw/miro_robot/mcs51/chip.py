@@ -293,8 +293,7 @@ class Chip:
 
     def _next_look(self) -> int:
         """The cycle of the next event, mark or end of the run, whichever comes first: instructions go on until then."""
-        event = self.next_event if self.next_event < self.until else self.until
-        return event if event < self.next_mark else self.next_mark
+        return min(self.next_event, self.until, self.next_mark)
 
     def _taken_over(self) -> bool:
         """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,

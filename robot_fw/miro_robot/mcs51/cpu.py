@@ -67,12 +67,8 @@ class Cpu(Chip):
         """One instruction or interrupt entry; an idle CPU advances by a cycle."""
         return self.run(self.cycles + 1)
 
-    def run_until_pc(self, address: int, until_cycle: int) -> int:
-        """Like `run`, but returns BREAKPOINT before the instruction at `address` is executed."""
-        return self.run_until_any((address,), until_cycle)
-
     def run_until_any(self, addresses: tuple[int, ...], until_cycle: int) -> int:
-        """The same for several addresses; `pc` tells which it was."""
+        """Like `run`, but returns BREAKPOINT before the instruction at one of `addresses`; `pc` tells which it was."""
         self.mark(addresses)
         try:
             return self.run(until_cycle)
@@ -110,7 +106,7 @@ class Cpu(Chip):
         event = self._next_look()
         if (self.idle or self.powered_down) and now < event:
             if not self._taken_over():  # nor will it be at a mark
-                event = self.next_event if self.next_event < self.until else self.until
+                event = min(self.next_event, self.until)
             self.idle_cycles += event - now
             self.cycles = event
         self.limit = event

@@ -139,10 +139,7 @@ class Peripherals:
         """`timer_wait`, `serial_wait` or the first push is new, or timer 2 sleeps or wakes."""
         self.quiet = -1
         if self.timer2.sleeps and not self.pulsed:
-            serial = self.serial_wait // 12
-            self.quiet = serial if serial < self.timer_wait else self.timer_wait
-            if self.ports.next_cycle < self.quiet:
-                self.quiet = self.ports.next_cycle
+            self.quiet = min(self.serial_wait // 12, self.timer_wait, self.ports.next_cycle)
 
     def settle(self) -> None:
         """Brings timers and serial port up to where the rest is."""
@@ -167,8 +164,7 @@ class Peripherals:
         pulse2 = self.timer2.next_pin_overflow()
         self.timers.sync(cycle)
         self.timer2.sync(cycle)
-        first = pulse1 if pulse1 < pulse2 else pulse2
-        second = pulse1 if pulse1 > pulse2 else pulse2
+        first, second = min(pulse1, pulse2), max(pulse1, pulse2)
         if first < cycle:
             self._pulse(first == pulse1, first == pulse2, first)
         if second < cycle and second != first:
@@ -189,44 +185,29 @@ class Peripherals:
 
         The flags of the serial port are waited for though a routine may hold their interrupt off: the bus is told.
         """
-        event = self.interrupts.next_boundary(now)
-        if self.ports.next_cycle < event:
-            event = self.ports.next_cycle
+        event = min(self.interrupts.next_boundary(now), self.ports.next_cycle)
         if self.frozen:
             return event
         sources = self.interrupts.open()
         if sources & _BOTH_TIMERS:
-            flag = self.timers.next_flag(sources) + 2
-            if flag < event:
-                event = flag
+            event = min(event, self.timers.next_flag(sources) + 2)
         if sources & _TIMER2:
-            flag = self.timer2.next_flag() + 2
-            if flag < event:
-                event = flag
+            event = min(event, self.timer2.next_flag() + 2)
         if self.interrupts.enabled() & _SERIAL:
             if self.serial_wait < 0:
                 self.settle()
             if self.serial_wait < STOPPED_TICK:
-                flag = (self.serial_wait + 2) // 12 + 2
-                if flag < event:
-                    event = flag
+                event = min(event, (self.serial_wait + 2) // 12 + 2)
         return event
 
     def serial_turn(self) -> int:
         """The first cycle in which more may be known of the next flag of the serial port, which is up to date."""
-        tick = self.uart.turn_tick()
-        if self.serial_wait < tick:
-            tick = self.serial_wait
+        tick = min(self.uart.turn_tick(), self.serial_wait)
         return tick // 12 + 1 if tick < STOPPED_TICK else NEVER_TICK
 
     def serial_tick(self) -> int:
         """A tick before which neither TI nor RI will go up."""
-        tick = self.uart.ti_tick()
-        received = self.uart.ri_tick()
-        if received < tick:
-            tick = received
-        shifted = self.shift.flag_tick()
-        return shifted if shifted < tick else tick
+        return min(self.uart.ti_tick(), self.uart.ri_tick(), self.shift.flag_tick())
 
     def clock_serial(self) -> None:
         """Works out the serial port's 16x ticks again, after anything that they depend on has changed."""

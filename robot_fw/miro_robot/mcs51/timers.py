@@ -120,9 +120,7 @@ class Timers:
     def _begin(self, part: int) -> None:
         """From now on it counts cycles."""
         self.start[part] = self.synced - self.value(part)
-        overflow = self.start[part] + self.top[part] - 1
-        if overflow < self.due:
-            self.due = overflow
+        self.due = min(self.due, self.start[part] + self.top[part] - 1)
 
     def mode(self, timer: int) -> int:
         return (self.tmod >> (4 * timer)) & 3
@@ -177,9 +175,7 @@ class Timers:
         if timers & _TIMER0 and not self.control & _TF0:
             first = self.next_overflow(0)
         if timers & _TIMER1 and not self.control & _TF1:
-            second = self.next_overflow(2 if self.mode(0) == 3 else 1)
-            if second < first:
-                return second
+            return min(first, self.next_overflow(2 if self.mode(0) == 3 else 1))
         return first
 
     def fall(self, timer: int, cycle: int) -> None:

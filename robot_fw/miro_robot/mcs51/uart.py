@@ -245,9 +245,7 @@ class Uart:
                 self.rx_next = now + self.rx_period
                 return
             self.rx_last = level
-            change = self.rxd.next_edge(now) if self.latch & 1 else NEVER_TICK
-            if change > tick:
-                change = tick
+            change = min(self.rxd.next_edge(now), tick) if self.latch & 1 else tick
             now += ((change - now + self.rx_period - 1) // self.rx_period) * self.rx_period
         self.rx_next = now
 
@@ -352,9 +350,7 @@ class Uart:
         settled = self.rxd.settled_tick
         if tick >= settled or (self.rx_last and not self.rxd.level_at(tick)):
             return tick
-        change = self.rxd.next_edge(tick)
-        if change > settled:
-            change = settled
+        change = min(self.rxd.next_edge(tick), settled)
         return change + (tick - change) % self.rx_period if change < _STOPPED else NEVER_TICK
 
     def turn_tick(self) -> int:

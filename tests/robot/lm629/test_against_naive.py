@@ -154,7 +154,7 @@ class Pair:
                 (naive.buffer["a"], naive.buffer["v"], naive.buffer["p"], naive.relative),
             ),
             "filter": (
-                (gains.kp, gains.ki, gains.kd, gains.il, gains.ds),
+                (*gains.coefficients, gains.ds),
                 tuple(naive.filter[name] for name in ("kp", "ki", "kd", "il", "ds")),
             ),
         }

@@ -300,7 +300,7 @@ def test_out_of_range_parameters_are_taken_modulo_their_width():
     bench.ready()
     buffer = bench.chip.trajectory_buffer
     assert (buffer.acceleration, buffer.velocity, buffer.position) == (1, 2, -1)
-    assert bench.chip.filter_buffer.kp == 1
+    assert bench.chip.filter_buffer.coefficients[0] == 1
     assert bench.chip.threshold == 0x7FFF
 
 

@@ -259,7 +259,7 @@ def test_a_smooth_stop_slows_down_by_the_acceleration_and_ends_on_a_whole_count(
     for _ in range(6):
         trajectory.step()
     assert trajectory.position == -0x2D000
-    trajectory.stop_smoothly()
+    trajectory.start(stopping=1)
     assert run(trajectory) == ([-0x6000, -0x3000, 0], [-4, -4, -4])  # -3.2, -3.4, down to -4
     assert (trajectory.position, trajectory.target) == (-4 * 65536, -4)
 

@@ -56,7 +56,7 @@ def run_to_loop(text, cycles=100_000):
     """... run until it hangs in `end: SJMP $`, which is appended."""
     cpu = cpu_with(text + "\nend:\nSJMP $")
     end = len(assemble(text))
-    assert cpu.run_until_pc(end, cycles) == 2, f"never came to its end: {cpu}"
+    assert cpu.run_until_any((end,), cycles) == 2, f"never came to its end: {cpu}"
     return cpu
 
 

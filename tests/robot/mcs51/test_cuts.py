@@ -62,7 +62,7 @@ def test_tf2_interrupts_a_cycle_before_exf2_of_the_same_cycle(t2con, rcap2):
         return cpu
 
     cpu = prepare()
-    assert cpu.run_until_pc(0x2B, 100) == BREAKPOINT
+    assert cpu.run_until_any((0x2B,), 100) == BREAKPOINT
     assert cpu.cycles == 28
     whole, cut = whole_and_cut(prepare, 27)
     assert snapshot(whole) == snapshot(cut)
@@ -74,7 +74,7 @@ def test_a_low_level_is_answered_though_the_pin_falls_again_in_the_polling_cycle
     cpu = cpu_with("LJMP main\nORG 0003h\nSJMP $\nORG 0040h\nmain:\nMOV IE,#81h\n" + "NOP\n" * 40)
     for number in range(4):
         cpu.set_external(3, 0xFF if number % 2 else INT0_LOW, 12 * (20 + number * pulse))
-    assert cpu.run_until_pc(3, 100) == BREAKPOINT
+    assert cpu.run_until_any((3,), 100) == BREAKPOINT
     assert cpu.cycles == 24
 
 
@@ -116,7 +116,7 @@ def test_a_state_loads_where_a_run_ended_in_the_cycle_in_which_a_pin_moves(port,
     reached.stop_asleep = 0
     for cpu in (ended, reached):
         cpu.set_external(*port, 12 * 12)
-    assert ended.run_until_pc(13 if reason == BREAKPOINT else 0x100, 100) == reason
+    assert ended.run_until_any((13 if reason == BREAKPOINT else 0x100,), 100) == reason
     reached.run(ended.cycles)
     assert snapshot(ended) == snapshot(reached)
     again = sleeper(text)

@@ -120,7 +120,7 @@ def test_a_stop_request_ends_the_run_after_the_instruction():
 
 def test_a_run_until_an_address_stops_before_its_instruction():
     cpu = cpu_with("MOV A,#01h\nMOV A,#02h\nMOV A,#03h")
-    assert cpu.run_until_pc(2, 100) == 2
+    assert cpu.run_until_any((2,), 100) == 2
     assert (cpu.a, cpu.pc) == (1, 2)
     cpu.step()
     assert cpu.a == 2
@@ -138,11 +138,11 @@ def test_a_run_until_any_of_several_addresses_says_by_pc_which():
 def test_code_that_is_written_where_a_run_is_to_stop_does_not_hide_the_place():
     cpu = cpu_with("MOV DPTR,#6\nMOV A,#4\nMOVX @DPTR,A\nNOP\nSJMP $")  # writes INC A over the NOP
     cpu.bus.movx_write = lambda address, value, tick: cpu.write_code(address, value)
-    assert cpu.run_until_pc(6, 100) == 2
+    assert cpu.run_until_any((6,), 100) == 2
     cpu.step()
     assert (cpu.a, cpu.pc) == (5, 7)
     assert not cpu.is_loaded(0x20)
-    assert cpu.run_until_pc(0x20, 50) == 0
+    assert cpu.run_until_any((0x20,), 50) == 0
     assert not cpu.is_loaded(0x20)
 
 

@@ -58,7 +58,7 @@ def measured(lengths, counts, number):
     reload = 0x10000 - counts
     loop = "\n".join(OF_LENGTH[length] for length in lengths)
     cpu = cpu_with(PROGRAM.format(low=reload & 0xFF, high=reload >> 8, loop=loop))
-    cpu.run_until_pc(cpu_loop(cpu), 100)
+    cpu.run_until_any((cpu_loop(cpu),), 100)
     begin = cpu.cycles
     found = []
     while len(found) < number:

@@ -168,14 +168,14 @@ def test_every_source_has_its_vector_and_only_flags_of_timers_0_and_1_and_of_edg
 ):
     """4316E section 2.16."""
     cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
-    assert cpu.run_until_pc(vector, 60) == 2
+    assert cpu.run_until_any((vector,), 60) == 2
     assert (cpu.sp, sfr(cpu, register)) == (9, left)
 
 
 def test_exf2_does_not_interrupt_while_timer_2_counts_up_and_down():
     """4316E section 2.16."""
     cpu = cpu_with(ISRS + "MOV T2MOD,#01h\nMOV IE,#0A0h\nSETB EXF2\n" + "NOP\n" * 20)
-    assert cpu.run_until_pc(VECTORS[5], 40) == 0
+    assert cpu.run_until_any((VECTORS[5],), 40) == 0
 
 
 def test_without_ea_nothing_happens():

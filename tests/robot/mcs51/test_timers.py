@@ -141,7 +141,7 @@ def test_timer_2_reloads_and_flags_a_cycle_sooner_than_the_others():
         ("T2", "MOV TMOD,#01h\nMOV TL2,#0F0h\nMOV TH2,#0FFh\nMOV IE,#0A0h\nNOP\nSETB TR2\n", 0x2B),
     ):
         cpu = cpu_with(body + setup + "NOP\n" * 60)
-        assert cpu.run_until_pc(vector, 100) == 2
+        assert cpu.run_until_any((vector,), 100) == 2
         entered[name] = cpu.cycles
     assert entered["T2"] == entered["T0"] - 1
 
@@ -252,7 +252,7 @@ def test_exf2_is_answered_a_cycle_later_than_an_external_interrupt():
     would begin in 24.
     """
     cpu = falling(20, "LJMP main\nORG 002Bh\nSJMP $\nORG 0040h\nmain:\nMOV IE,#0A0h\nMOV T2CON,#08h\n")
-    assert cpu.run_until_pc(0x2B, 100) == 2
+    assert cpu.run_until_any((0x2B,), 100) == 2
     assert cpu.cycles == 25
 
 

@@ -99,7 +99,7 @@ def test_another_mode_stops_the_character_that_goes_out():
     """Rule U5: SCON goes from mode 1 to mode 3 in D1 of 55h, a space; TXD is mark from the next cycle, without TI."""
     wait = "MOV R0,#0FAh\nDJNZ R0,$\nMOV R0,#5Ah\nDJNZ R0,$\n"  # 682 cycles
     cpu = cpu_with(TIMER2_9600 + "MOV SCON,#40h\nMOV SBUF,#55h\n" + wait + "MOV SCON,#0C0h\nSJMP $")
-    assert cpu.run_until_pc(cpu.code.index(bytes.fromhex("7598C0")) + 3, 2000) == 2
+    assert cpu.run_until_any((cpu.code.index(bytes.fromhex("7598C0")) + 3,), 2000) == 2
     written = cpu.cycles
     cpu.run(8000)
     ticks = [tick for tick, _ in cpu.txd.edges()]

@@ -59,7 +59,7 @@ def ours(programs):
     found = []
     for number, program in enumerate(programs):
         cpu.pc = number * SIZE
-        cpu.run_until_pc(number * SIZE + program.end, 1 << 40)
+        cpu.run_until_any((number * SIZE + program.end,), 1 << 40)
         found.append(bytes([cpu.peek_iram(address) for address in range(0x20, 0x80)]))
     return found
 

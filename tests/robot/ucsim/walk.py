@@ -73,7 +73,7 @@ class Walker:
     def walk(self, steps):
         cpu = self.cpu
         self._define(len(PROLOGUE), 0)
-        cpu.run_until_pc(len(PROLOGUE), 1 << 40)
+        cpu.run_until_any((len(PROLOGUE),), 1 << 40)
         done = []
         moved = False
         state = 0
@@ -95,7 +95,7 @@ class Walker:
         offset = self.random.choice(states.OFFSETS)
         self.cpu.dptr = offset
         self.cpu.pc = states.AT
-        self.cpu.run_until_pc(states.END, 1 << 40)
+        self.cpu.run_until_any((states.END,), 1 << 40)
         self.cpu.pc = self.random.randrange(0x10000)
         return offset
 
