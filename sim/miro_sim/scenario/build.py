@@ -74,8 +74,13 @@ def pilot_for(robot: sc.RobotSpec, reference: Trajectory, scenario: sc.Scenario,
 
 
 def _remembering(plugin: Any, maker: Any) -> Any:
-    """The plug-in itself, once its memory was found to be as declared."""
-    _a_plugin(plugin, "check_memory", maker).check_memory()
+    """The plug-in itself, once its memory was found to be as declared. Raises PluginError."""
+    _a_plugin(plugin, "check_memory", maker)
+    try:
+        plugin.check_memory()
+    except ValueError as error:
+        place = defined_at(type(plugin).__init__) or defined_at(type(plugin).step)
+        raise PluginError(at_place(str(error), place), "mend STATE, NOT_STATE or `__init__`") from error
     return plugin
 
 

@@ -96,6 +96,15 @@ class Breaks(LawParameters, frozen=True, tag="law_breaks"):
     def law(self):
         raise RuntimeError("no model file")
 
+class Forgets(LawParameters, frozen=True, tag="law_forgets"):
+    def law(self):
+        return ForgetsLaw(self)
+
+class ForgetsLaw(Law):
+    def __init__(self, parameters):  # forgets
+        super().__init__(parameters)
+        self.seen_m = 0.0
+
 class Says(LawParameters, frozen=True, tag="law_says"):
     def __post_init__(self):
         raise ValueError("how: is refused")
@@ -146,6 +155,8 @@ PLUGINS_TOLD = {
     "controller={law='law_raises'}": LAW_RAISES,
     "controller={law='law_none'}": "`law` returned None (site/plugged_laws.py:",
     "controller={law='law_breaks'}": "law 'law_breaks' cannot be made: RuntimeError: no model file (site/",
+    "controller={law='law_forgets'}": "cannot be made: attribute 'seen_m' is neither in STATE nor in NOT_STATE "
+    f"({at('laws', '# forgets')} in ForgetsLaw.__init__); mend ",
     "controller={law='law_refuses'}": f"cannot check its parameters: KeyError: 'x' ({at('laws', 'KeyError')} in ",
     "controller={law='law_says'}": "controller.how: is refused",
     "estimator={kind='estimator_raises'}": f"({at('estimators', 'given.nothing')} in RaisesEstimator.step)",
