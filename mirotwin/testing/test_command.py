@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -147,14 +148,15 @@ class TestOptions(Options, frozen=True, kw_only=True):
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
-    def line_for(self, file: str) -> str:
-        """The command that gives the verdict on this scenario again."""
+    def line_for(self, file: str, saves: bool = False) -> str:
+        """The command that gives the verdict on this scenario again; one that saves worlds needs a folder for them."""
         again = TestOptions(
             paths=(file,),
             seed=self.seed,
             settings=self.settings,
             expected=self.expected,
             firmware=self.firmware,
+            artifacts=self.artifacts if saves else None,
             desk=self.desk,
         )
         return again.command_line()
@@ -162,7 +164,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
 
 def run_scenario(options: TestOptions, file: str) -> Outcome:
     """Runs a scenario file as a test: in the twin, or at a port."""
-    image, again = load_firmware(options.firmware), options.line_for(file)
+    image, again = load_firmware(options.firmware), partial(options.line_for, file)
     settings = (*options.settings, *as_settings(options.expected))
     if options.desk.port:
         from mirotwin.testing.port_test import run_port_test  # loads pyserial
@@ -170,7 +172,7 @@ def run_scenario(options: TestOptions, file: str) -> Outcome:
         outcome = run_port_test(file, image, options.desk, settings, options.artifacts)
     else:
         outcome = run_test(file, image, options.seed, settings, options.artifacts, again)
-    return replace(outcome, again=again)
+    return replace(outcome, again=outcome.again or again())
 
 
 @command_of(TestOptions)

@@ -64,12 +64,12 @@ def run_test(
     seed: int = 0,
     settings: Sequence[str] = (),
     artifacts: Path | None = None,
-    again: str = "",
+    again: Callable[[bool], str] = lambda saves: "",
 ) -> Outcome:
     """Runs a file to its verdict; whatever cannot be run is an outcome, too.
 
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
-    file that saves needs one. `again`: the command that gives the verdict again, for its report.
+    file that saves needs one. `again`: the command that gives the verdict again, of a file that saves or does not.
     """
     return outcome_of(path, artifacts, lambda folder: _run(path, image, seed, settings, folder, again), seed)
 
@@ -96,7 +96,12 @@ def outcome_of(
 
 
 def _run(
-    path: str, image: Image, seed: int, settings: Sequence[str], folder: Path | None, again: str
+    path: str,
+    image: Image,
+    seed: int,
+    settings: Sequence[str],
+    folder: Path | None,
+    again: Callable[[bool], str],
 ) -> Outcome:
     text = load(path, settings, everything)
     steps = steps_of(text.scenario, path)
@@ -115,10 +120,13 @@ def _run(
     player.finish()
     checks.finish()
     lines, notes = said_of(player, checks)
+    command = again(bool(saving))
     if folder is not None and trace is not None:
         keep_saved(player, folder)
         if lines:
-            report = "".join(f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), again))
+            report = "".join(
+                f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), command)
+            )
             case = case or (case_of_checks(world, trace, checks) if checks.failures else None)
             leave(folder, report, case, case_text(world, trace, {}, ""), image, {SCENARIO: text.text})
     return Outcome(
@@ -134,6 +142,7 @@ def _run(
         firmware_sha256=image.sha256 or "",
         left=str(folder) if folder is not None and lines else "",
         left_out=text.notes,
+        again=command,
     )
 
 

@@ -170,6 +170,17 @@ def test_what_steps_save_needs_a_folder(mirotwin, folder):
     assert (folder / "runs/silent-0/booted.world").exists()
 
 
+def test_the_command_of_a_failure_has_the_folder_that_a_save_step_needs(mirotwin, folder):
+    path = "hil/save.scenario.toml"
+    steps = '[{ save = "new.world" }, { wait_for = "answer", within_ms = 5 }]'
+    (folder / path).write_text(f"{HEAD}step = {steps}")
+    command = f"mirotwin test {path} --artifacts left"
+    code, out, _ = mirotwin("test", path, "--artifacts", "left")
+    assert (code, f"    {command}" in out.splitlines()) == (1, True)
+    assert (folder / "left/hil-save/report.txt").read_text().splitlines()[-1] == command
+    assert mirotwin(*command.split()[1:])[0] == 1
+
+
 def test_run_does_steps_too_and_its_recording_replays(mirotwin, folder):
     err = mirotwin.ends(1, "run", "hil/sub/b.scenario.toml", "--out", "run", "-q", "--no-figure")
     assert err.startswith(f"mirotwin: step failed: {TOO_SOON}")
