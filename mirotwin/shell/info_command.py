@@ -15,7 +15,7 @@ from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
     "numpy", "msgspec", "click", "rich", "mcap", "pillow", "pyserial", "crcmod-plus", "pyvcd",
-    "tomli-w", "pyarrow", "distributed",
+    "tomli-w", "hypothesis", "pyarrow", "bokeh", "jinja2", "markupsafe",
 )  # fmt: skip
 
 PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"

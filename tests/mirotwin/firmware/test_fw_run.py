@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+import re
+import tomllib
 
 import pytest
 from click.testing import CliRunner
 
 from miro_robot.firmware import image_path
 from mirotwin.commands import main
+from tests.children import ROOT
 from tests.mirotwin import program
 from tests.mirotwin.conftest import hex_file
 
@@ -280,3 +283,15 @@ def test_info_names_versions_engine_and_firmware(mirotwin):
     sha256 = hashlib.sha256(image_path().read_bytes()).hexdigest()
     for word in ("mirotwin", "Python", "mcap", "engine", sha256, str(image_path()), "bytes of 8192"):
         assert word in out
+
+
+def test_info_has_the_version_of_each_package_that_a_user_installs_with_it(mirotwin):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    needed = [
+        *project["dependencies"],
+        *(one for name in ("hypothesis", "campaign", "report") for one in extras[name]),
+    ]
+    listed = [line.split()[0] for line in mirotwin.succeeds("info").splitlines() if not line.startswith(" ")]
+    others = ("mirotwin", "Python", "platform", "engine", "firmware")
+    assert [name for name in listed if name not in others] == [re.match(r"[\w-]+", one)[0] for one in needed]

@@ -76,6 +76,10 @@ def test_paired_differences_are_those_of_campaign_show(results, markup):
         assert f"{one['difference']:+.4g} {low:.4g} to {high:.4g} {one['median']:+.4g}" in markup.text
 
 
+def test_the_page_names_the_command_that_made_it(markup):
+    assert "Made of mine.parquet by mirotwin campaign page" in markup.text
+
+
 def test_what_failed_is_listed(results, markup):
     table, _ = campaign.read(results)
     failed = [row for row in table.to_pylist() if row["verdict"] == "failed"]
