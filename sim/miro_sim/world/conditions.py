@@ -6,8 +6,9 @@ anything; `slot` None is the network's first robot, but for `Answer`. Only code 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from collections.abc import Callable, Mapping
+from operator import attrgetter
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import msgspec
 from msgspec import Meta
@@ -35,7 +36,6 @@ PORT_PINS = {f"P{port}.{bit}": (port, bit) for port in range(4) for bit in range
 PINS = (*_WIRES, *PORT_PINS)
 """Those of a board that one can wait for. Encoder channels and busy bits are not among them: the board learns of their
 edges late."""
-C = TypeVar("C", bound="Condition")
 
 
 class Condition(
@@ -48,8 +48,10 @@ class Condition(
 ):
     """Something that becomes true at a tick, at the PC of `network`. Raises ValueError for what can never be."""
 
+    OF_EVENT: ClassVar[Mapping[str, Callable[[Event], object]]] = {}
+    """What an event says, by the fields that ask for it."""
     DETAILS: ClassVar[tuple[str, ...]] = ()
-    """The fields in which events of one kind differ."""
+    """The fields in which events of one kind at one place differ."""
 
     network: Network = 0
 
@@ -64,9 +66,11 @@ class Condition(
 
     def met_by(self, event: Event) -> bool:
         """Whether this event, of the network and slot that are meant, fulfils the condition."""
-        return event.what == self.what
+        return event.what == self.what and all(
+            getattr(self, field) in (None, said(event)) for field, said in self.OF_EVENT.items()
+        )
 
-    def any_of_its_kind(self: C) -> C:
+    def any_of_its_kind(self) -> Self:
         """The condition that every event of this kind fulfils, at the same place."""
         return msgspec.structs.replace(self, **dict.fromkeys(self.DETAILS))
 
@@ -90,6 +94,7 @@ class AtRobot(Condition, frozen=True, kw_only=True):
 class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
     """The PC hears a valid answer: of the robot in `slot` or of any, with these fields."""
 
+    OF_EVENT = {"slot": attrgetter("value")}
     DETAILS = (
         "seq",
         *(str(flag.name).lower() for flag in Flags),
@@ -109,7 +114,7 @@ class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
     rejected: Byte | None = None
 
     def met_by(self, event: Event) -> bool:
-        if event.what != "answer" or self.slot not in (None, event.value):
+        if not super().met_by(event):
             return False
         wanted = {key: value for key in self.DETAILS if (value := getattr(self, key)) is not None}
         return not wanted or wanted.items() <= answer_fields(event).items()
@@ -136,12 +141,10 @@ def answer_fields(event: Event) -> dict[str, int | bool]:
 class Heard(Condition, frozen=True, kw_only=True, tag="heard"):
     """The PC hears a character (`byte`: this one) from a robot."""
 
+    OF_EVENT = {"byte": attrgetter("value")}
     DETAILS = ("byte",)
 
     byte: Byte | None = None
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == "heard" and self.byte in (None, event.value)
 
 
 class Sent(Condition, frozen=True, kw_only=True, tag="sent"):
@@ -151,25 +154,19 @@ class Sent(Condition, frozen=True, kw_only=True, tag="sent"):
 class Frame(AtRobot, frozen=True, kw_only=True, tag="frame"):
     """A robot's serial port has received the last character of a valid frame, fresh or not."""
 
+    OF_EVENT = {"seq": attrgetter("frame.seq")}
     DETAILS = ("seq",)
 
     seq: Seq | None = None
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == "frame" and (
-            self.seq is None or (event.frame is not None and event.frame.seq == self.seq)
-        )
 
 
 class Received(AtRobot, frozen=True, kw_only=True, tag="received"):
     """A robot's serial port has received a character (`byte`: this one)."""
 
+    OF_EVENT = {"byte": attrgetter("value")}
     DETAILS = ("byte",)
 
     byte: Byte | None = None
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == self.what and self.byte in (None, event.value)
 
 
 class Transmitted(Received, frozen=True, kw_only=True, tag="transmitted"):
@@ -179,6 +176,7 @@ class Transmitted(Received, frozen=True, kw_only=True, tag="transmitted"):
 class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
     """An LM629 has completed a command: of one `side` or either, of this `name` (`STT`, ..), with the data `hex`."""
 
+    OF_EVENT = {"side": attrgetter("side"), "name": attrgetter("command")}
     DETAILS = ("name", "hex")
 
     side: Literal["left", "right"] | None = None
@@ -197,12 +195,7 @@ class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
             raise ValueError(what) from None
 
     def met_by(self, event: Event) -> bool:
-        return (
-            event.what == "command"
-            and self.side in (None, event.side)
-            and (self.name is None or event.opcode == BY_NAME[self.name].opcode)
-            and (self.hex is None or event.data == bytes.fromhex(self.hex))
-        )
+        return super().met_by(event) and (self.hex is None or event.data == bytes.fromhex(self.hex))
 
 
 class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
@@ -226,10 +219,8 @@ class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
 
     def predicate(self, robot: Robot) -> bool:
         """Whether the wheels are so fast now."""
-        for wanted, found in zip((self.left_m_s, self.right_m_s), speeds_of(robot), strict=True):
-            if wanted is not None and abs(found - wanted) > self.tolerance_m_s:
-                return False
-        return True
+        sides = zip((self.left_m_s, self.right_m_s), speeds_of(robot), strict=True)
+        return all(wanted is None or abs(found - wanted) <= self.tolerance_m_s for wanted, found in sides)
 
 
 def speeds_of(robot: Robot) -> tuple[float, float]:
@@ -241,6 +232,7 @@ def speeds_of(robot: Robot) -> tuple[float, float]:
 class Edge(AtRobot, frozen=True, kw_only=True, tag="edge"):
     """A `pin` of the robot's board changes (to `level`): `rxd`, `txd`, `P1.0`, `left.hi`, .. (`PINS`)."""
 
+    OF_EVENT = {"pin": attrgetter("pin"), "level": attrgetter("value")}
     DETAILS = ("level",)
 
     pin: str
@@ -251,12 +243,11 @@ class Edge(AtRobot, frozen=True, kw_only=True, tag="edge"):
             wired = ", ".join(pin for pin in PINS if not pin.startswith("P"))
             raise ValueError(f"pin: {self.pin!r} is not a pin; there are {wired} and P0.0 to P3.7")
 
-    def met_by(self, event: Event) -> bool:
-        return event.what == "edge" and event.pin == self.pin and self.level in (None, event.value)
-
 
 class Reached(AtRobot, frozen=True, kw_only=True, tag="reached"):
     """The instruction at a `symbol` of the image, or at an `address`, is the next to be executed."""
+
+    OF_EVENT = {"address": attrgetter("address")}
 
     symbol: str | None = None
     address: Word | None = None
@@ -266,9 +257,6 @@ class Reached(AtRobot, frozen=True, kw_only=True, tag="reached"):
             raise ValueError("reached: takes a symbol or an address; give one of the two")
         if self.address is not None and not 0 <= self.address <= 0xFFFF:
             raise ValueError(f"address: {self.address} is not an address; give 0 to 0xffff")
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == "reached" and event.address == self.address
 
 
 class Fault(AtRobot, frozen=True, kw_only=True, tag="fault"):

@@ -64,13 +64,17 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         where = f"net{self.network}/" + ("pc" if self.slot == PC else f"robot{self.slot}")
         return f"tick {self.tick}: {where}: {self.what}{self._detail()}"
 
+    @property
+    def command(self) -> str:
+        """The name of an LM629 command; its opcode where that is none."""
+        known = BY_OPCODE.get(self.opcode)
+        return f"{self.opcode:02X}h" if known is None else known.name
+
     def _detail(self) -> str:
         if self.what in ("heard", "received", "transmitted"):
             return f" {self.value:02X}h{'' if self.good_stop else ' with a bad stop bit'}"
         if self.what == "command":
-            known = BY_OPCODE.get(self.opcode)
-            name = f"{self.opcode:02X}h" if known is None else known.name
-            return f" {self.side} {name} {self.data.hex(' ')}".rstrip()
+            return f" {self.side} {self.command} {self.data.hex(' ')}".rstrip()
         if self.what == "edge":
             return f" {self.pin} to {self.value}"
         if self.what in ("reached", "fault"):

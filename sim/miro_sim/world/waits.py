@@ -8,7 +8,10 @@ nothing is lost and nothing is changed. Events after that tick are left to the n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Flat
@@ -19,6 +22,8 @@ from miro_sim.world.watch import Entry, Watch
 
 if TYPE_CHECKING:
     from miro_sim.world.world import Mark, World
+
+    Before = tuple[int, list[int], list[bytes], Mark]
 
 FIRST_PIECE_TICKS = 24_000
 """1 ms. Pieces double up to the end of the control period: most waits are short, and a piece costs a snapshot."""
@@ -59,7 +64,7 @@ class Waits:
         self.cursors: dict[tuple[int, int], Cursor] = {}
         self.reached: dict[tuple[int, int], int] = {}
         self.decoders: dict[tuple[int, int], Decoder] = {}  # made by the first wait
-        self.states: dict[tuple[int, int], Flat] = {}
+        self.states: list[Flat] = []
         for index, network in enumerate(self.world.networks):
             self.cursors[index, PC] = Cursor(network.log)
             for robot in network.robots:
@@ -72,13 +77,6 @@ class Waits:
     def pass_over(self) -> None:
         """What was collected of before the tick of now does not count for the next wait."""
         self.backlog = [entry for entry in self.backlog if entry[0][0] >= self.world.tick]
-
-    def _make_decoders(self) -> None:
-        """One for each robot, of what its receiver hears."""
-        for index, network in enumerate(self.world.networks):
-            for robot in network.robots:
-                self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
-        self.states = {robot_id: Flat(decoder) for robot_id, decoder in self.decoders.items()}
 
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
         """See `World.run_until`."""
@@ -100,9 +98,10 @@ class Waits:
                     why = "the run ended" if world.finished else f"{within} ticks passed"
                     raise WaitExpired(conditions, begun_tick, world.tick, why, seen)
                 self._run_piece(watch, min(deadline, world.tick + piece))
+                if world.in_period and (world.tick == world.period_end or world.stopped):
+                    world.end_period()
                 found = self._consume(watch, world.tick, seen)
                 piece *= 2
-            self._close_period()
             self.backlog += watch.edges(beyond=True)
         return found
 
@@ -111,42 +110,37 @@ class Waits:
         world = self.world
         world.begin_period()
         until_tick = world.rendezvous(until_tick)
-        before, mark = _Before(self, watch), world.mark()
+        read = [cursor.next for cursor in self.cursors.values()]
+        before = len(self.backlog), read, [state.save() for state in self.states], world.mark()
+        begun_tick = world.tick
         world.run_piece(until_tick)
         self._gather(watch)
         wanted = [entry for entry in self.backlog if watch.wants(entry[1])]
         if not wanted:
-            self._close_period()
             return
-        first, event = min(wanted, key=lambda entry: entry[0])
+        first, event = min(wanted, key=itemgetter(0))
         if first[0] < until_tick:
-            tick = max(first[0], mark.tick)
-            self._again_to(watch, before, mark, tick)
+            tick = max(first[0], begun_tick)
+            self._again_to(watch, before, tick)
             if any(key == first for key, _ in self.backlog):
                 return
-            if (
-                event.what == "reached"
-            ):  # the CPU stands before the instruction and has not looked at it again
+            if event.what == "reached":  # the CPU stands before it and has not looked at it again
                 self.backlog.append((first, event))
             else:  # it happens with the cycle that begins there
-                self._again_to(watch, before, mark, tick + 1)
+                self._again_to(watch, before, tick + 1)
 
-    def _again_to(self, watch: Watch, before: _Before, mark: Mark, tick: int) -> None:
+    def _again_to(self, watch: Watch, before: Before, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""
+        count, read, states, mark = before
         self.world.go_back(mark)
-        self.backlog = list(before.backlog)
-        for source, serial in before.read.items():
-            self.cursors[source].next = serial
-        for robot_id, state in before.states.items():
-            self.states[robot_id].load(state)
-        watch.begin_again(before.next_edge)
+        del self.backlog[count:]
+        for cursor, serial in zip(self.cursors.values(), read, strict=True):
+            cursor.next = serial
+        for state, saved in zip(self.states, states, strict=True):
+            state.load(saved)
+        watch.pick_up()
         self.world.run_piece(tick)
         self._gather(watch)
-
-    def _close_period(self) -> None:
-        world = self.world
-        if world.in_period and (world.tick == world.period_end or world.stopped):
-            world.end_period()
 
     def _consume(self, watch: Watch, until_tick: int, seen: list[Event]) -> Event | None:
         """Takes events out of the backlog, in order, up to `until_tick` or the first that is wanted."""
@@ -170,33 +164,23 @@ class Waits:
     # What happened
 
     def _gather(self, watch: Watch) -> None:
-        """Reads what is new in all logs."""
+        """Reads what is new in all logs; a frame is an event right after its last character."""
         if not self.decoders:
-            self._make_decoders()
+            for index, network in enumerate(self.world.networks):
+                for robot in network.robots:
+                    self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
+            self.states = [Flat(decoder) for decoder in self.decoders.values()]
         for source, cursor in self.cursors.items():
             for serial, event in cursor.read():
                 if event.what == "reached" and self.reached.get(source) == event.value:
                     continue  # a wait has ended before this instruction already
-                self.backlog.append(((event.tick, *source, serial), event))
-                if event.what == "received":
-                    self._decode(source, serial, event)
+                key = (event.tick, *source, serial)
+                self.backlog.append((key, event))
+                if event.what != "received":
+                    continue
+                symbol = (event.value, event.good_stop, event.tick)
+                for result in self.decoders[source].feed_symbols([symbol]):
+                    if isinstance(result, Received):
+                        frame = msgspec.structs.replace(event, what="frame", value=0, frame=result)
+                        self.backlog.append((key, frame))
         self.backlog += watch.edges()
-
-    def _decode(self, robot_id: tuple[int, int], serial: int, event: Event) -> None:
-        """Gives a character to the robot's decoder; a frame that it completes is an event right after it."""
-        symbol = (event.value, event.good_stop, event.tick)
-        for result in self.decoders[robot_id].feed_symbols([symbol]):
-            if isinstance(result, Received):
-                network, slot = robot_id
-                frame = Event(tick=event.tick, what="frame", network=network, slot=slot, frame=result)
-                self.backlog.append(((event.tick, network, slot, serial), frame))
-
-
-class _Before:
-    """What a wait had seen at the start of a piece."""
-
-    def __init__(self, waits: Waits, watch: Watch) -> None:
-        self.next_edge = watch.next_edge
-        self.backlog = list(waits.backlog)
-        self.read = {source: cursor.next for source, cursor in waits.cursors.items()}
-        self.states = {robot_id: state.save() for robot_id, state in waits.states.items()}

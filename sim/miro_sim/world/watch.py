@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -19,10 +22,11 @@ if TYPE_CHECKING:
     from miro_sim.world.world import World
 
 _EDGES, _TRUE = 1 << 40, 1 << 41
-"""Serial numbers of events that are in no log begin here."""
+"""Serial numbers of what is in no log: an edge adds the place of its pin, since at one tick there is one of each."""
 Entry = tuple[tuple[int, int, int, int], Event]
 """An event and what it is sorted by: (tick, network, slot, serial number in its log)."""
 _PLACE = {name: place for place, name in enumerate(PLACES)}
+_BY_TICK = itemgetter(0)
 
 
 class Watch:
@@ -34,10 +38,9 @@ class Watch:
     def __init__(self, world: World, conditions: Sequence[Condition]) -> None:
         self.world = world
         self.conditions = [
-            (self._place(condition), self._with_address(condition)) for condition in conditions
+            (self._robot_id(condition), self._with_address(condition)) for condition in conditions
         ]
-        self.pins: dict[tuple[int, int], PinWatch] = {}
-        self.next_edge = _EDGES
+        self.pins: list[PinWatch] = []
 
     def __enter__(self) -> Watch:
         for robot_id, condition in self.conditions:
@@ -47,7 +50,7 @@ class Watch:
                 robot.marks = (*robot.marks, condition.address)
             elif isinstance(condition, When | WheelSpeeds):
                 self.world.robot(*robot_id).asked.append((condition.predicate, condition.at))
-        self.begin_again(_EDGES)
+        self.pick_up()
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -65,53 +68,47 @@ class Watch:
 
     # Pins
 
-    def begin_again(self, next_edge: int) -> None:
-        """Picks the pins up where the world is now; their edges are numbered from `next_edge` on."""
-        self.next_edge = next_edge
+    def pick_up(self) -> None:
+        """Picks the pins up where the world is now."""
         self._close_pins()
         pins: dict[tuple[int, int], set[str]] = {}
         for robot_id, condition in self.conditions:
             if isinstance(condition, Edge):
                 pins.setdefault(robot_id, set()).add(condition.pin)
-        for (network, slot), names in pins.items():
-            self.pins[network, slot] = PinWatch(self.world.robot(network, slot).board, frozenset(names))
+        self.pins = [
+            PinWatch(robot_id, self.world.robot(*robot_id).board, pins[robot_id]) for robot_id in pins
+        ]
 
     def edges(self, beyond: bool = False) -> list[Entry]:
         """The edges up to where the world is that were not taken yet.
 
         `beyond`: also those that the CPU has made already, in the instruction with which it went past that tick.
         """
-        found = []
-        for (network, slot), pins in self.pins.items():
-            known_tick = pins.board.cpu.cycles * CYCLE_TICKS if beyond else self.world.tick
-            for tick, pin, level in pins.take(known_tick):
-                edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
-                found.append(((tick, network, slot, self.next_edge), edge))
-                self.next_edge += 1
+        found: list[Entry] = []
+        for pins in self.pins:
+            found += pins.take(pins.board.cpu.cycles * CYCLE_TICKS if beyond else self.world.tick)
         return found
 
     def _close_pins(self) -> None:
-        for pins in self.pins.values():
+        for pins in self.pins:
             pins.close()
-        self.pins = {}
+        self.pins = []
 
     # Predicates
 
     def true_now(self) -> list[Entry]:
         """Predicates that are true before anything moves."""
         tick = self.world.tick
-        found = []
-        for (network, slot), condition in self.conditions:
-            if not isinstance(condition, When | WheelSpeeds):
-                continue
-            if condition.predicate(self.world.robot(network, slot)):
-                event = Event(tick=tick, what="true", network=network, slot=slot)
-                found.append(((tick, network, slot, _TRUE), event))
-        return found
+        return [
+            ((tick, network, slot, _TRUE), Event(tick=tick, what="true", network=network, slot=slot))
+            for (network, slot), condition in self.conditions
+            if isinstance(condition, When | WheelSpeeds)
+            and condition.predicate(self.world.robot(network, slot))
+        ]
 
     # What the conditions mean
 
-    def _place(self, condition: Condition) -> tuple[int, int]:
+    def _robot_id(self, condition: Condition) -> tuple[int, int]:
         """Network and slot at which it happens. Raises ValueError for values that no file may give."""
         if type(condition) in CONDITIONS.values():
             struct_of(msgspec.to_builtins(condition), type(condition))
@@ -135,9 +132,10 @@ class Watch:
 
 
 class PinWatch:
-    """Edges of some `pins` of a board with exact ticks, from now until `close`. It costs the CPU its fast loop."""
+    """Edges of some `pins` of a robot with exact ticks, from now until `close`. It costs the CPU its fast loop."""
 
-    def __init__(self, board: Board, pins: frozenset[str]) -> None:
+    def __init__(self, robot_id: tuple[int, int], board: Board, pins: set[str]) -> None:
+        self.robot_id = robot_id
         self.board = board
         self.pins = sorted(pins)
         self.tap = CpuTap(board, lambda: None)
@@ -149,22 +147,22 @@ class PinWatch:
         detach(self.board.cpu, self.tap)
         self.tap.detach()
 
-    def take(self, known_tick: int) -> list[tuple[int, str, int]]:
-        """(tick, pin, level) of the edges up to `known_tick` that were not taken yet, in order."""
-        found = []
+    def take(self, known_tick: int) -> list[Entry]:
+        """The edges up to `known_tick` that were not taken yet."""
+        found: list[Entry] = []
+        network, slot = self.robot_id
         events = self.tap.events
-        events.sort(key=lambda event: event[0])
-        done = 0
-        while done < len(events) and events[done][0] <= known_tick:
-            tick = events[done][0]
-            while done < len(events) and events[done][0] == tick:
-                _, place, level = events[done]
+        events.sort(key=_BY_TICK)
+        done = bisect_right(events, known_tick, key=_BY_TICK)
+        for tick, changes in groupby(events[:done], key=_BY_TICK):
+            for _, place, level in changes:
                 self._levels[place] = level
-                done += 1
-            for pin in self.pins:
-                if self._level(pin) != self._shown[pin]:
-                    self._shown[pin] = self._level(pin)
-                    found.append((tick, pin, self._shown[pin]))
+            for number, pin in enumerate(self.pins):
+                level = self._level(pin)
+                if level != self._shown[pin]:
+                    self._shown[pin] = level
+                    edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
+                    found.append(((tick, network, slot, _EDGES + number), edge))
         del events[:done]
         return found
 
