@@ -100,7 +100,7 @@ def received(robots: int, params: Radio, frames: int, seed: int, eb_n0_db: float
     downlink = Downlink(params, seed, f"decoder{robots}/{eb_n0_db}")
     uart = Uplink(Radio(bit_error_rate=0.0), seed, "uart")
     downlink.listen(0, line)
-    uart.listen(line)
+    uart.band.add(0, line)
     scanner = Decoder(robots)
     size = DOWNLINK[robots].size
     right = wrong = 0

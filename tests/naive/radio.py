@@ -9,7 +9,8 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-from miro_sim.radio.probability import margin_table
+from miro_exact.clock import ticks
+from miro_sim.radio.probability import margin_table, threshold
 from tests.naive import rng
 
 Symbol = tuple[int, bool, int]
@@ -25,9 +26,10 @@ def wire_bits(data):
 def chain_states(params, seed, name, slots):
     """Bad or good in slots 0 .. slots-1, by the book: step by step from a good start."""
     bad, states = False, []
+    enter, leave = params.chances()
     for slot in range(slots):
         draw = rng.u32(seed, name, slot)
-        bad = draw < 2**32 - params.leave if bad else draw < params.enter
+        bad = draw < 2**32 - leave if bad else draw < enter
         states.append(bad)
     return states
 
@@ -62,7 +64,7 @@ class Sender:
         self.arrivals = []
         over = 0
         for start, data, *bad_stop in sent:
-            late = rng.u32(seed, f"{name}/jitter", start // 2500) * (params.jitter_ticks + 1) // 2**32
+            late = rng.u32(seed, f"{name}/jitter", start // 2500) * (ticks(params.jitter_s) + 1) // 2**32
             arrival = max(start + params.latency_ticks + late, over)
             bits = wire_bits(data)
             begins = [arrival + int(number * self.bit_ticks) for number in range(len(bits) + 1)]
@@ -71,7 +73,7 @@ class Sender:
                 number = 10 * place + 9
                 bits[number] = 0
                 backs[number] = arrival + int((number + Fraction(3, 4)) * self.bit_ticks)
-            if rng.u32(seed, f"{name}/lost_frames", start // 2500) >= params.lost_frame_threshold:
+            if rng.u32(seed, f"{name}/lost_frames", start // 2500) >= threshold(params.lost_frames):
                 self.arrivals.append((arrival, bits, begins, backs))
             over = arrival + max(25_000 * len(data), int(10 * len(data) * own))
 
@@ -153,7 +155,7 @@ def decide(tick, rank, on_air, senders, params, slicer, seed, robot):
     if on_air.bit is not None:
         number = (on_air.arrival - senders[rank].params.latency_ticks) // 2500 + on_air.bit
         character = number - on_air.bit % 10
-        lost = rng.u32(seed, f"{robot}/lost", character) < params.lost_threshold
+        lost = rng.u32(seed, f"{robot}/lost", character) < threshold(params.lost_character_rate)
     if chain_bad(params.dropouts, seed, f"{robot}/dropouts", slot):
         level = silence(tick if on_air.bit is None else on_air.begin, slot)
         return 1 if lost else level

@@ -21,7 +21,7 @@ from miro_protocol.table import downlink
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
 from miro_sim.radio.params import UP, Radio
-from miro_sim.radio.probability import ONE
+from miro_sim.radio.probability import ONE, threshold
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, ms_ticks
@@ -54,9 +54,9 @@ def frames_needed(params: Radio, characters: int) -> int:
     """So many frames in a row that a radio like this does not lose all of them; 0: nothing can be said."""
     if abs(params.baud_offset_ppm - params.crystal_offset_ppm) > FURTHEST_PPM:
         return 0
-    arrives = 1.0 - params.lost_frame_threshold / ONE
+    arrives = 1.0 - threshold(params.lost_frames) / ONE
     for _ in range(characters):
-        arrives *= 1.0 - params.lost_threshold / ONE
+        arrives *= 1.0 - threshold(params.lost_character_rate) / ONE
     all_lost = 1.0
     for frames in range(1, MOST_FRAMES):
         all_lost *= 1.0 - arrives

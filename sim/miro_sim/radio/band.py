@@ -71,6 +71,7 @@ class Band:
         self.alone_until = -_NEVER
 
     def add(self, robot: int, line: Line) -> None:
+        """Adds a robot's TXD wire, before anything is received; `robot` is its number in the names of streams."""
         line.unread = False
         self.transmitters.append(Transmitter(line, self.params, self.seed, f"{self.name}/robot{robot}"))
 

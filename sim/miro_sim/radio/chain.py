@@ -28,8 +28,8 @@ class Chain:
 
     def __init__(self, params: Bursts | Dropouts, seed: int, name: str) -> None:
         self.stream = Stream(seed, name)
-        self.enter = params.enter
-        self.stay = _ONE - params.leave  # draws from here on end the bad state
+        self.enter, leave = params.chances()
+        self.stay = _ONE - leave  # draws from here on end the bad state
         self.slot = -1
         self.answer = 0
 

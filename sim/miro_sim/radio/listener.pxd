@@ -20,20 +20,19 @@ cdef class Listener:
     cdef Stream errors, noise, idle, lost, collision
     cdef Chain bursts, dropouts
     cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
-    cdef bint squelch, noise_alone, perfect_idle
+    cdef bint squelch, noise_alone
 
-    @cython.locals(sender=Sender, start='long long', stop='long long')
+    @cython.locals(sender=Sender, start='long long', stop='long long', level=int)
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
-    cdef void hear_nothing(self, long long tick, long long until) except *
     @cython.locals(bits='unsigned long long', level=int, before=int)
     cdef void hear_noise(self, long long tick, long long until) except *
     cdef int silence(self, long long tick, long long slot) except -1
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
     @cython.locals(sender=Sender, first='long long', begun='long long', number='long long', count='long long',
-                   begin='long long', step='long long', place=int, levels=int, level=int, before=int)
+                   begin='long long', place=int, levels=int, level=int, before=int)
     cdef void hear_data(self, long long tick, long long until, long long start, bytes data, bytes stops, list senders,
                         Py_ssize_t rank) except *
     cdef long long next_judged(

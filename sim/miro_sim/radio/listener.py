@@ -23,6 +23,7 @@ from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import DOWN, NOISE, UP, Radio
+from miro_sim.radio.probability import threshold
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
 
@@ -42,7 +43,7 @@ class Listener:
     STATE = {"link_state": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
     NOT_STATE = (
         "burst_threshold", "bursts", "collision", "dropouts", "errors", "false_start", "idle", "line", "lost",
-        "lost_threshold", "noise", "noise_alone", "perfect_idle", "squelch", "threshold",
+        "lost_threshold", "noise", "noise_alone", "squelch", "threshold",
     )  # fmt: skip
 
     def __init__(self, line: Line, params: Radio, seed: int, name: str) -> None:
@@ -56,15 +57,13 @@ class Listener:
         self.threshold = params.error_threshold
         self.burst_threshold = params.burst_threshold
         self.false_start = params.false_start_threshold
-        self.lost_threshold = params.lost_threshold
+        self.lost_threshold = threshold(params.lost_character_rate)
         self.bursts = None if params.bursts is None else Chain(params.bursts, seed, f"{name}/bursts")
         self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
         self.slicer: Slicer | None = None
         if params.slicer is not None and params.eb_n0_db is not None:
             self.slicer = Slicer(params.slicer, params.eb_n0_db)
-        parts = (self.bursts, self.dropouts, self.slicer)
-        self.noise_alone = all(part is None for part in parts)
-        self.perfect_idle = not self.false_start and self.noise_alone
+        self.noise_alone = self.bursts is None and self.dropouts is None and self.slicer is None
         self.link_state = UP
         self.bit_errors = 0
 
@@ -80,7 +79,11 @@ class Listener:
             self.hear_noise(tick, until)
             return
         if rank == len(senders) or self.link_state == _DOWN:
-            self.hear_nothing(tick, until)
+            level = self.silence(tick, tick // _BIT)
+            if self.squelch:
+                self.line.append(tick, level)
+            else:
+                self.hear_noise(tick, until)
             return
         sender = senders[rank]
         for index in range(len(sender.transmissions)):
@@ -106,16 +109,6 @@ class Listener:
         else:
             self.fill(tick, until, senders, rank + 1)
         return until
-
-    def hear_nothing(self, tick: int, until: int) -> None:
-        """No carrier from `tick` to `until`."""
-        if tick >= until:
-            return
-        level = self.silence(tick, tick // _BIT)
-        if self.squelch:
-            self.line.append(tick, level)
-        else:
-            self.hear_noise(tick, until)
 
     def hear_noise(self, tick: int, until: int) -> None:
         """Random levels, from the receiver itself, or from noise on the frequency that is stronger than any carrier."""
@@ -143,7 +136,7 @@ class Listener:
     def hear_idle(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
         """A carrier without data from `tick` to `until`."""
         slot = tick // _BIT
-        if self.perfect_idle and rank + 1 == len(senders):
+        if self.noise_alone and not self.false_start and rank + 1 == len(senders):
             self.line.append(tick, 1)
             return
         while tick < until:
@@ -176,7 +169,6 @@ class Listener:
         sender = senders[rank]
         count = sender.number(until - 1 - start) + 1
         begun = sender.number(tick - start)
-        step = sender.numerator if sender.denominator == 1 else 0
         first = (start - sender.latency) // _BIT  # number of the first error draw
         place = begun % _CHARACTER
         levels = sender.levels(data, stops, begun)
@@ -190,7 +182,7 @@ class Listener:
             place += 1
             if level == before and number != judged:
                 continue
-            begin = start + number * step if step else sender.begin(start, number)
+            begin = sender.begin(start, number)
             if number == judged:
                 level = self.bit(begin, level, first, number, begin >= tick, senders, rank)
                 judged = self.next_judged(first, number + 1, count, stops, senders, rank)

@@ -51,15 +51,9 @@ class Bursts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 " a state must last a bit on average"
             )
 
-    @property
-    def enter(self) -> int:
-        """Chance of going bad in a bit time."""
-        return threshold(self.good_to_bad)
-
-    @property
-    def leave(self) -> int:
-        """Chance of going good in a bit time."""
-        return threshold(self.bad_to_good)
+    def chances(self) -> tuple[int, int]:
+        """Of going bad and of going good in a bit time."""
+        return threshold(self.good_to_bad), threshold(self.bad_to_good)
 
 
 class Dropouts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -76,15 +70,9 @@ class Dropouts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 f" one of them must last more than a bit ({float(BIT_S):.6f} s)"
             )
 
-    @property
-    def enter(self) -> int:
-        """Chance of losing the carrier in a bit time."""
-        return threshold(BIT_S / clock.exact(self.every_s))
-
-    @property
-    def leave(self) -> int:
-        """Chance of its coming back in a bit time."""
-        return threshold(BIT_S / clock.exact(self.length_s))
+    def chances(self) -> tuple[int, int]:
+        """Of losing the carrier and of its coming back in a bit time."""
+        return threshold(BIT_S / clock.exact(self.every_s)), threshold(BIT_S / clock.exact(self.length_s))
 
 
 class SlicerParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -110,7 +98,8 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
     between frames the receiver's slicer makes noise, unless `squelch` holds it at mark. Errors come from
     `bit_error_rate` or from `eb_n0_db`, not both. Networks with the same `channel` hear each other; without
-    one a network is alone. `lost_frames`: chance for each transmission down that it never goes on the air.
+    one a network is alone. A transmission down is late by up to `jitter_s`. `lost_frames`: chance that it never goes on
+    the air; `lost_character_rate`: that a character never gets to the robot's UART.
     `profile` names sets of these keys, see `profiles`; keys that are given win.
     """
 
@@ -151,11 +140,6 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return clock.ticks(self.latency_s)
 
     @property
-    def jitter_ticks(self) -> int:
-        """A transmission is late by 0 to so much on top."""
-        return clock.ticks(self.jitter_s)
-
-    @property
     def keyup_ticks(self) -> int:
         """A keyed carrier comes up (as mark) so long before the first start bit."""
         return clock.ticks(self.keyup_s)
@@ -181,16 +165,6 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def false_start_threshold(self) -> int:
         """Chance that a bit time of idle carrier is a space."""
         return threshold(clock.exact(self.false_starts_hz) * BIT_S)
-
-    @property
-    def lost_threshold(self) -> int:
-        """Chance that a character never gets to the robot's UART."""
-        return threshold(self.lost_character_rate)
-
-    @property
-    def lost_frame_threshold(self) -> int:
-        """Chance that a transmission never goes on the air."""
-        return threshold(self.lost_frames)
 
 
 def bit_ticks(baud_offset_ppm: int, crystal_offset_ppm: int) -> Fraction:

@@ -31,17 +31,13 @@ def _exp(x: float) -> float:
     return dmath.exp(x)
 
 
-def fsk_exponent(eb_n0_db: float) -> float:
-    """Eb / 2N0 as a plain number from Eb/N0 in decibels."""
-    return 0.5 * _exp(eb_n0_db * LN10_TENTH)
-
-
-def fsk_threshold(eb_n0_db: float) -> int:
-    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0).
+def fsk_threshold(eb_n0_db: float, margin: float = 1.0) -> int:
+    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0), of a signal of `margin` the amplitude.
 
     Source: J. G. Proakis, Digital Communications, non-coherent detection of binary orthogonal FSK.
     """
-    return int(2147483648.0 * _exp(-fsk_exponent(eb_n0_db)) + 0.5)
+    exponent = 0.5 * _exp(eb_n0_db * LN10_TENTH)
+    return int(2147483648.0 * _exp(-(exponent * (margin * margin))) + 0.5)
 
 
 def margin_table(eb_n0_db: float) -> tuple[int, ...]:
@@ -51,10 +47,8 @@ def margin_table(eb_n0_db: float) -> tuple[int, ...]:
     margin m has the errors of a signal of m times the amplitude, 0.5 exp(-m^2 Eb/2N0). A negative one means
     that the decision is wrong unless noise turns it over: 1 - that.
     """
-    exponent = fsk_exponent(eb_n0_db)
     table = []
     for step in range(-MARGIN_STEPS, 3 * MARGIN_STEPS + 1):
-        margin = float(step) / float(MARGIN_STEPS)
-        wrong = int(2147483648.0 * _exp(-(exponent * (margin * margin))) + 0.5)
+        wrong = fsk_threshold(eb_n0_db, float(step) / float(MARGIN_STEPS))
         table.append(ONE - wrong if step < 0 else wrong)
     return tuple(table)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from miro_exact.clock import CHARACTER_BITS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
-from miro_robot.mcs51.line import Line
 from miro_sim.radio.band import Band
 from miro_sim.radio.params import Radio
 
@@ -51,15 +50,6 @@ class Uplink:
 
     def __repr__(self) -> str:
         return f"Uplink({self.name!r}, now={self.now}, start_tick={self.start_tick}, bit={self.bit})"
-
-    def listen(self, line: Line, robot: int | None = None) -> None:
-        """Adds a robot's TXD wire, before anything is received. Raises ValueError later.
-
-        `robot` is its number in the names of streams; the next one, if not given.
-        """
-        if self.now:
-            raise ValueError(f"{self.name}: a robot joins after tick 0")
-        self.band.add(len(self.band.transmitters) if robot is None else robot, line)
 
     def receive(self, until_tick: int) -> list[tuple[int, bool, int]]:
         """Symbols (byte, stop bit good, tick of the start bit's edge) known before `until_tick`.

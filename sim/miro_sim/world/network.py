@@ -80,7 +80,7 @@ class Network:
         self.uplink = Uplink(radio, seed, f"net{index}/up")
         for robot in self.robots:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
-            self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
+            self.uplink.band.add(robot.spec.slot, robot.board.cpu.txd)
         self.telemetry = TelemetryReceiver(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
         self.actions = Actions(index)

@@ -201,8 +201,6 @@ def test_a_neighbour_must_be_announced_before_its_carrier_comes_up_here():
     one.settle(500_000)
     with pytest.raises(ValueError, match=r"two: the carrier for tick 510000 .* settled up to 500000"):
         two.send(510_000, b"x")
-    with pytest.raises(ValueError, match="joins the frequency twice, or after tick 0"):
-        one.overhear(two)
 
 
 def test_lost_frames_are_as_many_as_asked_for_and_the_others_are_whole():

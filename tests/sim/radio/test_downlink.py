@@ -162,15 +162,6 @@ def test_an_empty_transmission_is_refused():
         band(clean())[0].send(100_000, b"")
 
 
-def test_a_robot_joins_once_and_before_the_start():
-    downlink, _ = band(clean())
-    with pytest.raises(ValueError, match="robot 0"):
-        downlink.listen(0, Line())
-    downlink.settle(1)
-    with pytest.raises(ValueError, match="robot 1"):
-        downlink.listen(1, Line())
-
-
 def test_a_wire_that_was_open_is_settled_by_the_downlink_only():
     line = Line()
     line.settled_tick = NEVER_TICK
@@ -203,12 +194,6 @@ def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
     downlink.settle(UNTIL)
     symbols = [symbol for one in sent for symbol in Transmission(one[0], ">", one[1], 0, one[2]).symbols()]
     assert LineReceiver().feed(lines[0].edges(), UNTIL) == symbols
-
-
-@pytest.mark.parametrize("bad_stop", [(2,), (-1,), (1, 1), (1, 0)])
-def test_a_bad_stop_bit_of_no_character_is_refused(bad_stop):
-    with pytest.raises(ValueError, match="must be ascending indices of 2 characters"):
-        band(clean())[0].send(100_000, b"ab", bad_stop)
 
 
 @pytest.mark.parametrize("stops", [b"\1", b"\1\0\0"])

@@ -45,7 +45,7 @@ def exercise(seed, radio):
     rxd, txd = [Line() for _ in range(ROBOTS)], [Line() for _ in range(ROBOTS)]
     for robot in range(ROBOTS):
         down.listen(robot, rxd[robot])
-        up.listen(txd[robot])
+        up.band.add(robot, txd[robot])
     payload = Stream(seed, "payload")
     heard = hashlib.sha256()
     for period in range(15):
@@ -73,7 +73,7 @@ def echo(params, seed, sent, until):
     line = Line()
     down, up = Downlink(params, seed, "down"), Uplink(Radio(bit_error_rate=0.0), seed, "up")
     down.listen(0, line)
-    up.listen(line)
+    up.band.add(0, line)
     for start, data in sent:
         down.send(start, data)
     down.settle(until)

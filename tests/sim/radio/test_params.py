@@ -63,5 +63,4 @@ def test_a_margin_of_one_is_no_penalty():
 
 def test_times_become_chances_a_bit():
     assert [Radio(false_starts_hz=hz).false_start_threshold for hz in (0.0, 9600.0)] == [0, ONE]
-    dropouts = Dropouts(every_s=2.0, length_s=0.02)
-    assert (dropouts.enter, dropouts.leave) == (round(ONE / 19_200), round(ONE / 192))
+    assert Dropouts(every_s=2.0, length_s=0.02).chances() == (round(ONE / 19_200), round(ONE / 192))

@@ -26,8 +26,8 @@ def txd(sent, bit_ticks=2496):
 
 def band(radio, seed, wires):
     uplink = Uplink(radio, seed, "net")
-    for sent in wires:
-        uplink.listen(txd(sent)[0])
+    for robot, sent in enumerate(wires):
+        uplink.band.add(robot, txd(sent)[0])
     return uplink
 
 
@@ -61,13 +61,13 @@ def test_a_snapshot_at_any_tick_carries_the_half_received_character(radio, seed,
     first = Uplink(radio, seed, "net")
     second = Uplink(radio, seed, "net")
     lines = [txd(sent)[0] for sent in wires]
-    for line in lines:
-        first.listen(line)
+    for robot, line in enumerate(lines):
+        first.band.add(robot, line)
     first.receive(tick)
-    for line in lines:
+    for robot, line in enumerate(lines):
         copy = Line()
         restore(copy, snapshot(line))
-        second.listen(copy)
+        second.band.add(robot, copy)
     restore(second, snapshot(first))
     assert second.receive(UNTIL) == first.receive(UNTIL)
     assert snapshot(second) == snapshot(first)
@@ -82,7 +82,7 @@ def test_a_snapshot_does_not_fit_a_network_of_another_size():
 def test_without_errors_every_byte_arrives_at_any_clock_within_two_percent(sent, bit_ticks):
     spaced = [(start + index * 20_000, data) for index, (start, data) in enumerate(sent)]
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(txd(spaced, bit_ticks)[0])
+    uplink.band.add(0, txd(spaced, bit_ticks)[0])
     assert bytes_of(uplink.receive(2 * UNTIL)) == b"".join(data for _, data in sent)
 
 
@@ -106,7 +106,7 @@ def test_nothing_is_received_from_a_wire_that_is_not_settled_yet():
     line, _ = txd([(10_000, b"A")])
     line.settled_tick = 30_000
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(line)
+    uplink.band.add(0, line)
     assert uplink.receive(UNTIL) == []
     assert uplink.now == 30_000
     line.settled_tick = UNTIL
@@ -128,14 +128,14 @@ def test_the_next_falling_edge_that_lasts_starts_a_character(edges, symbols):
         line.append(tick, level)
     line.settled_tick = UNTIL
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(line)
+    uplink.band.add(0, line)
     assert uplink.receive(UNTIL) == symbols
 
 
 def test_the_bit_error_rate_of_the_samples_is_the_one_asked_for():
     uplink = Uplink(clean(bit_error_rate=1e-2), 3, "net")
     line = Line()
-    uplink.listen(line)
+    uplink.band.add(0, line)
     received = 0
     for start in range(0, 400 * 700_000, 700_000):
         for number, level in enumerate(naive.wire_bits(bytes(range(25)))):
@@ -144,13 +144,6 @@ def test_the_bit_error_rate_of_the_samples_is_the_one_asked_for():
         received += len(uplink.receive(start + 700_000))
     assert abs(uplink.bit_errors / (10 * received) - 1e-2) < 1.5e-3
     assert len(line.edges()) < 10
-
-
-def test_a_robot_joins_before_the_start():
-    uplink = band(CLEAN, 0, [[]])
-    uplink.receive(1)
-    with pytest.raises(ValueError, match="after tick 0"):
-        uplink.listen(Line())
 
 
 def test_an_uplink_shows_where_it_is():
