@@ -130,7 +130,7 @@ class Way:
         """The frame on the air, its characters in the robot, the LM629's commands, the robot's answer."""
         at_pc = [event for _, event in network.log.since(0) if event.tick >= self.answer.tick]
         self.sent = next(event for event in at_pc if event.what == "sent")
-        self.key_up_tick = self.sent.tick - network.keyup_ticks
+        self.key_up_tick = self.sent.tick - network.outbox.lead_ticks
         log = [event for _, event in self.robot.log.since(0) if event.tick > self.sent.tick]
         self.received = [event for event in log if event.what == "received"][: len(self.sent.data)]
         last_tick = self.received[-1].tick

@@ -26,20 +26,20 @@ KEYS = {
 }
 
 
-NUMBERS = {"link": (180, 178, 2, 0, 9), "firmware": (5, 7, 2, 0), "vision": (180, 1, 2, 0, 0, 0)}
-COUNTERS = {
-    table: dict(zip([key for key in KEYS[table].split() if key != "sha256"], numbers, strict=True))
-    for table, numbers in NUMBERS.items()
-}
+SEEN = dict(zip(KEYS["vision"].split(), (180, 1, 2, 0, 0, 0), strict=True))
 
 
 def summary_of(run):
+    cpu = SimpleNamespace(instructions=5, cycles=7, idle_cycles=2)
+    robot = SimpleNamespace(board=SimpleNamespace(cpu=cpu, fault_count=0), counter=(178, 2, 0).__getitem__)
+    network = SimpleNamespace(frames_sent=180, bit_errors=9, sight=SimpleNamespace(counts=lambda: SEEN))
     world = SimpleNamespace(
         scenario=load("fig6").scenario,
         seed=7,
         image=SimpleNamespace(sha256="ab" * 32),
         tick=len(run) * CONTROL_PERIOD_TICKS,
-        counters=lambda: COUNTERS,
+        networks=[network],
+        robots=[robot],
     )
     return summarise(world, Tracks(run), 0.5)
 

@@ -9,7 +9,7 @@ from miro_host.pilot import STANDSTILL, WheelCommand
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.scenario.keys import ControlNoise
-from miro_sim.world.control_noise import noisy
+from miro_sim.world.network import noisy
 from tests.sim.world.rig import world_of
 
 WHEELS = Wheels()

@@ -14,6 +14,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_sim.radio.params import LINK_STATES
+from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
     from miro_sim.world.network import Network
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
 RESET, POWER, RADIO_DOWN, RADIO_UP = range(4)
+_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio"}
 _MOST_WAITING = 1 << 16
 
 
@@ -83,22 +85,22 @@ class Actions:
             self.waiting.append(Waiting(action.tick, POWER, action.slot, action.on))
         self.waiting.sort(key=lambda one: one.tick)
 
-    def do_due(self, network: Network, tick: int) -> list[Action]:
-        """Does what is due at `tick`; returns the actions of it that robots and PC can notice."""
-        found: list[Action] = []
+    def do_due(self, network: Network, tick: int) -> None:
+        """Does what is due at `tick`, and notes what robots and PC can notice."""
         while self.waiting and self.waiting[0].tick <= tick:
             one = self.waiting.pop(0)
-            action = self._do(network, one)
-            if action is not None:
-                found.append(action)
-        self.done += found
-        return found
+            if one.what == RADIO_DOWN:
+                for listener in network.downlink.listeners.values():
+                    listener.link_state = one.value
+                continue
+            slot = PC if one.what == RADIO_UP else one.slot
+            self.done.append(self._do(network, one))
+            event = Event(
+                tick=one.tick, what=_EVENTS[one.what], network=self.network, slot=slot, value=one.value
+            )
+            network.log.note(event)
 
-    def _do(self, network: Network, one: Waiting) -> Action | None:
-        if one.what == RADIO_DOWN:
-            for listener in network.downlink.listeners.values():
-                listener.link_state = one.value
-            return None
+    def _do(self, network: Network, one: Waiting) -> Action:
         if one.what == RADIO_UP:
             network.uplink.band.link_state = one.value
             return RadioState(one.tick, self.network, LINK_STATES[one.value])

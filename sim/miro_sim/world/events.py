@@ -22,11 +22,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from itertools import takewhile
 
 import msgspec
 
 from miro_exact.bad_input import amount
-from miro_protocol.actions import Action, RadioState, Reset
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, Message, TelemetryFrame
 from miro_protocol.transmission import Transmission
@@ -103,9 +103,7 @@ class HostLog:
         self.known_tick = known_tick
         self.end = 0
         self.kept: deque[Event | Transmission | Received | Symbol] = deque(maxlen=KEPT)
-        self.rare: deque[tuple[int, Event | Transmission | Received]] = deque(
-            maxlen=KEPT
-        )  # all but the characters
+        self.rare: deque[tuple[int, Event | Transmission | Received]] = deque(maxlen=KEPT)  # no characters
 
     @property
     def first(self) -> int:
@@ -123,20 +121,12 @@ class HostLog:
     def since(self, serial: int, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
         """(serial number, event) of those from `serial` on that are kept; `kinds`: of these alone."""
         first = self.first
-        serial = max(serial, first)
+        some: Sequence[tuple[int, Event | Transmission | Received | Symbol]]
         if kinds is None or "heard" in kinds:
-            every = [(number, self.kept[number - first]) for number in range(serial, self.end)]
-            return [
-                (number, self._event(one)) for number, one in every if kinds is None or _kind(one) in kinds
-            ]
-        found = []
-        for number, one in reversed(self.rare):
-            if number < serial:
-                break
-            if _kind(one) in kinds:
-                found.append((number, self._event(one)))
-        found.reverse()
-        return found
+            some = [(number, self.kept[number - first]) for number in range(max(serial, first), self.end)]
+        else:
+            some = list(takewhile(lambda numbered: numbered[0] >= serial, reversed(self.rare)))[::-1]
+        return [(number, self._event(one)) for number, one in some if kinds is None or _kind(one) in kinds]
 
     def _event(self, one: Event | Transmission | Received | Symbol) -> Event:
         if isinstance(one, Event):
@@ -161,7 +151,7 @@ class HostLog:
         while self.end > serial and self.kept:
             self.kept.pop()
             self.end -= 1
-        while self.rare and self.rare[len(self.rare) - 1][0] >= self.end:
+        while self.rare and self.rare[-1][0] >= self.end:
             self.rare.pop()
 
 
@@ -172,15 +162,6 @@ def _kind(one: Event | Transmission | Received | Symbol) -> str:
     if isinstance(one, Transmission):
         return "sent"
     return "answer" if isinstance(one, Received) else "heard"
-
-
-def of_action(action: Action) -> Event:
-    """The event that an action is, at its tick."""
-    if isinstance(action, RadioState):
-        value = LINK_STATES.index(action.state)
-        return Event(tick=action.tick, what="radio", network=action.network, value=value)
-    what, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
-    return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)
 
 
 class RobotLog:
@@ -233,8 +214,7 @@ class Cursor:
     @property
     def lost(self) -> int:
         """Events that were not read and are no longer kept."""
-        lost = self.log.first - self.next
-        return lost if lost > 0 else 0
+        return max(0, self.log.first - self.next)
 
     def read(self, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
         """(serial number, event) of what is new; `kinds`: of these alone."""

@@ -19,13 +19,12 @@ cdef class Network:
     cdef readonly Uplink uplink
     cdef readonly list robots, draws
     cdef readonly str host
-    cdef readonly long long compute_ticks, keyup_ticks
+    cdef readonly long long compute_ticks
     cdef public long long frames_sent
     cdef public list heard, sent, seen
 
     @cython.locals(robot=Robot)
     cpdef begin_period(self, long long tick)
-    cpdef do_due(self, long long tick)
     cpdef send_due(self, long long rendezvous_tick)
     cpdef settle(self, long long rendezvous_tick)
     @cython.locals(robot=Robot)

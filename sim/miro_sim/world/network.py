@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
 from miro_exact.rng import Stream
@@ -11,6 +11,7 @@ from miro_exact.state import TICK, Rows
 from miro_host.pilot import WheelCommand
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver
+from miro_host.wheels import Wheels
 from miro_protocol.decoder import Received, Symbol
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
@@ -20,8 +21,7 @@ from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.uplink import Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.world.actions import SETTLE_TICKS, Actions
-from miro_sim.world.control_noise import noisy
-from miro_sim.world.events import HostLog, of_action
+from miro_sim.world.events import HostLog
 from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 from miro_sim.world.sight import Sight, sight_of
@@ -29,12 +29,12 @@ from miro_sim.world.sight import Sight, sight_of
 LONGEST_TRANSMISSION_TICKS = 1 << 40
 """Twelve hours: no saved transmission ends later than so long after now."""
 
-Host = Literal["controller", "script", "silent"]
-"""Who sends: the PC's controller, once a control period; a script; or only who injects."""
-
 
 class Network:
-    """Station, radio and robots of one frequency. `script` replaces what the station would send."""
+    """Station, radio and robots of one frequency. `script` replaces what the station would send.
+
+    `host` is who sends: the PC's "controller", once a control period; a "script"; "silent", only who injects.
+    """
 
     STATE = {
         "robots": [Robot],
@@ -51,7 +51,7 @@ class Network:
     NOT_HASHED = ("outbox", "actions", "heard")
     """They depend on when input was announced and where the world stopped."""
     NOT_STATE = (
-        *("spec", "index", "host", "compute_ticks", "keyup_ticks", "draws"),
+        *("spec", "index", "host", "compute_ticks", "draws"),
         *("sent", "seen", "log"),  # records
     )
 
@@ -67,7 +67,6 @@ class Network:
         self.spec = spec
         self.index = index
         self.compute_ticks = ticks(scenario.host.compute_s)
-        self.keyup_ticks = spec.radio.keyup_ticks if spec.radio.carrier == "keyed" else 0
         self.robots = [
             Robot(robot, scenario, index, spec.robots, seed, image)
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
@@ -82,7 +81,7 @@ class Network:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
             self.uplink.band.add(robot.spec.slot, robot.board.cpu.txd)
         self.telemetry = TelemetryReceiver(spec.robots)
-        self.host: Host = "script" if script is not None else spec.host
+        self.host: str = "script" if script is not None else spec.host
         self.actions = Actions(index)
         self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
         for sent in script or ():
@@ -104,7 +103,7 @@ class Network:
             answer = self.telemetry.last[robot.slot]
             commands.append(robot.steer(measured[place], answer, tick) if steered else None)
         if steered:
-            self._transmit(tick + self.compute_ticks + self.keyup_ticks, commands)
+            self._transmit(tick + self.compute_ticks + self.outbox.lead_ticks, commands)
         self.seen = []
         for place, robot in enumerate(self.robots):
             self.seen.append(robot.record(tick, measured[place], commands[place]))
@@ -116,11 +115,6 @@ class Network:
                 return robot
         there = ", ".join(str(robot.spec.slot) for robot in self.robots)
         raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
-
-    def do_due(self, tick: int) -> None:
-        """The actions that are due, each with an event in the log."""
-        for action in self.actions.do_due(self, tick):
-            self.log.note(of_action(action))
 
     def send_due(self, rendezvous_tick: int) -> None:
         """Puts on the air what may come up before the tick up to which it is settled next, and nothing else: what may
@@ -261,3 +255,19 @@ class Network:
                 raise ValueError(
                     f"RXD is settled up to tick {cpu.rxd.settled_tick}, the radio up to {settled_tick}"
                 )
+
+
+def noisy(
+    command: WheelCommand, bounds: sc.ControlNoise, wheels: Wheels, draws: Stream, period: int
+) -> tuple[int, int]:
+    """(left, right) in 1/256 count per sample: what the paper's analogue link added to a command (Yang & Kim, section
+    V-A, disturbance 2), where that signal had it: after controller and integrator, before the frame and its CRC.
+
+    Chosen, because the paper gives neither bounds nor distribution: v and w of every robot get a draw each, once a
+    control period, uniform within +- the bound and independent. Wheel limits and rounding follow.
+    """
+    if bounds.v_m_s == 0.0 and bounds.w_rad_s == 0.0:
+        return command.left, command.right
+    v_m_s = command.v_m_s + bounds.v_m_s * (2.0 * draws.uniform(2 * period) - 1.0)
+    w_rad_s = command.w_rad_s + bounds.w_rad_s * (2.0 * draws.uniform(2 * period + 1) - 1.0)
+    return wheels.command(v_m_s, w_rad_s, command.left_factor, command.right_factor)

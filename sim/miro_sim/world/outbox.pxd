@@ -1,13 +1,7 @@
-cimport cython
-
-
 cdef class Outbox:
     cdef public list waiting
     cdef public long long dropped
     cdef readonly long long lead_ticks
     cdef readonly int network
 
-    @cython.locals(busy=cython.bint)
-    cpdef bint post(self, sent, long long free_tick) except -1
-    cdef _add(self, one)
     cpdef list due(self, long long until_tick)

@@ -9,6 +9,8 @@ is saved, but no part of the digest: a run does not depend on when it was announ
 
 from __future__ import annotations
 
+from bisect import bisect_left, insort
+
 import msgspec
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -78,13 +80,10 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        busy = sent.tick < free_tick
-        for one in self.waiting:
-            busy = busy or _overlap(one.sent, sent)
-        if busy:
+        if sent.tick < free_tick or any(_overlap(one.sent, sent) for one in self.waiting):
             self.dropped += 1
             return False
-        self._add(Waiting(sent, STATION))
+        insort(self.waiting, Waiting(sent, STATION), key=_tick)
         return True
 
     def inject(self, sent: Transmission, free_tick: int) -> None:
@@ -109,12 +108,7 @@ class Outbox:
         kept = [one for one in self.waiting if not _overlap(one.sent, sent)]
         self.dropped += len(self.waiting) - len(kept)
         self.waiting = kept
-        self._add(Waiting(sent, INJECTED))
-
-    def _add(self, one: Waiting) -> None:
-        self.waiting.append(one)
-        if len(self.waiting) > 1:
-            self.waiting.sort(key=_tick)
+        insort(self.waiting, Waiting(sent, INJECTED), key=_tick)
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
@@ -122,14 +116,9 @@ class Outbox:
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
-        if not self.waiting:
-            return []
-        taken: list[Transmission] = []
-        for one in self.waiting:
-            if one.sent.tick >= until_tick + self.lead_ticks:
-                break
-            taken.append(one.sent)
-        del self.waiting[: len(taken)]
+        count = bisect_left(self.waiting, until_tick + self.lead_ticks, key=_tick)
+        taken = [one.sent for one in self.waiting[:count]]
+        del self.waiting[:count]
         return taken
 
     def after_load(self) -> None:

@@ -29,7 +29,6 @@ cdef class SeeingSight:
     cpdef list look(self, long long tick)
     @cython.locals(robots='long long')
     cpdef tuple expose(self, long long tick)
-    cdef tuple _kept(self, list seen, long long first)
     @cython.locals(x_m=double, y_m=double)
     cdef _count(self, long long tick, tuple seen)
     @cython.locals(body=Robot, true_x_m=double, true_y_m=double, dx=double, dy=double)
@@ -40,9 +39,7 @@ cdef class GeometricSight(SeeingSight):
     cdef readonly object field
 
 
-
 cdef class PixelSight(SeeingSight):
-    cdef readonly object picture
     cdef public object watch
     cdef public list everyone
     cdef readonly Camera eye

@@ -27,13 +27,12 @@ from miro_host.eye.top import Top
 from miro_host.eye.track import Sighting
 from miro_host.eye.tracker import Tracker
 from miro_host.posture import Posture
-from miro_host.vision import Vision, VisionErrors
+from miro_host.vision import DEGREE, Vision, VisionErrors
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario import camera_keys as keys
 from miro_sim.world.robot import Robot
 
-_DEGREE = 0.017453292519943295
 _FRAMES = ("q", 0, 1 << 24)
 WRONG = 3.0
 """A measurement further off than so many times the worst case of the calibration is wrong."""
@@ -48,11 +47,9 @@ class Sight(Protocol):
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """The camera takes a frame; what reaches the PC now, for each of its robots."""
-        ...
 
     def counts(self) -> dict[str, int]:
         """For the summary, by name; empty for a camera that neither loses nor mistakes anything."""
-        ...
 
 
 class GaussianSight:
@@ -63,7 +60,7 @@ class GaussianSight:
 
     def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[Robot], seed: int) -> None:
         errors = VisionErrors(
-            camera.position_error_cm / 100.0, camera.heading_error_deg * _DEGREE, camera.pixel_cm / 100.0
+            camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
         )
         self.bodies = list(bodies)
         self.visions = [Vision(errors, camera.delay_frames) for _ in bodies]
@@ -134,17 +131,13 @@ class SeeingSight:
             self.repeated += 1
             seen = None
         else:
-            seen = self._kept(self.look(tick), first + 2)
+            share, found = camera.lost_robots, self.look(tick)
+            seen = tuple(
+                [None if chance.uniform(first + 2 + at) < share else found[at] for at in range(robots)]
+            )
             self._count(tick, seen)
         self.frame += 1
         return self.grabber.take(seen)
-
-    def _kept(self, seen: list[Sighting | None], first: int) -> Sightings:
-        """Without the robots that are lost by chance; `first`: index of the first one's draw."""
-        share, chance = self.camera.lost_robots, self.chances
-        if share > 0.0:
-            seen = [None if chance.uniform(first + at) < share else one for at, one in enumerate(seen)]
-        return tuple(seen)
 
     def _count(self, tick: int, seen: Sightings) -> None:
         """Compares with the truth, which nobody on the PC can."""
@@ -157,10 +150,8 @@ class SeeingSight:
             way_m = self._distance_m(own, tick, x_m, y_m)
             if way_m > WRONG * self.worst_m:
                 self.wrong += 1
-            for other in range(len(seen)):
-                if other != own and self._distance_m(other, tick, x_m, y_m) < way_m:
-                    self.swapped += 1
-                    break
+            if min([self._distance_m(other, tick, x_m, y_m) for other in range(len(seen))]) < way_m:
+                self.swapped += 1
 
     def _distance_m(self, own: int, tick: int, x_m: float, y_m: float) -> float:
         """From where a robot is to a place."""
@@ -227,13 +218,12 @@ class PixelSight(SeeingSight):
     """
 
     STATE = {"tracker": Tracker}
-    NOT_STATE = ("eye", "everyone", "picture", "watch")
+    NOT_STATE = ("eye", "everyone", "watch")
 
     def __init__(self, camera: keys.PixelCamera, bodies: Sequence[Robot], seed: int) -> None:
         network = bodies[0].network
         calibration, worst_m = calibration_for(camera, network, seed)
         super().__init__(camera, bodies, seed, worst_m)
-        self.picture = camera.picture
         self.everyone = list(bodies)
         self.watch: Callable[[int, int], None] | None = None
         self.eye = Camera(
@@ -295,7 +285,7 @@ def _calibration(camera: keys.SeeingCamera, network: int, seed: int) -> Calibrat
             Stream(seed, f"net{network}/calibration"),
             errors.centre_px,
             errors.focal_share,
-            errors.tilt_deg * _DEGREE,
+            errors.tilt_deg * DEGREE,
             errors.worst_cm / 100.0,
         )
     else:

@@ -45,7 +45,6 @@ MOST_PERIODS = 1 << 34
 class Mark(NamedTuple):
     """A moment of a world: its state, and the records of the period under way, which are no state."""
 
-    tick: int
     state: bytes
     records: list[Any]
     touching: list[Pair]
@@ -293,7 +292,7 @@ class World:
         """Everything on to `tick`, which is no later than the end of the period."""
         for network in self.networks:
             if network.actions.waiting:
-                network.do_due(self.tick)
+                network.actions.do_due(network, self.tick)
         for network in self.networks:
             network.send_due(tick)
         for network in self.networks:
@@ -333,7 +332,7 @@ class World:
     def mark(self) -> Mark:
         """Where the world is, to go back to within the same period."""
         records = [network.records() for network in self.networks]
-        return Mark(self.tick, self.state.save(), records, self.bodies.touching)
+        return Mark(self.state.save(), records, self.bodies.touching)
 
     def go_back(self, mark: Mark) -> None:
         """To where `mark` was given."""
@@ -341,27 +340,6 @@ class World:
         for network, records in zip(self.networks, mark.records, strict=True):
             network.put_back(records)
         self.bodies.start_again(mark.touching)
-
-    def counters(self) -> dict[str, dict[str, int | None]]:
-        """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
-        robots = self.robots
-        cpus = [robot.board.cpu for robot in robots]
-        return {
-            "link": {
-                "frames_sent": _total([network.frames_sent for network in self.networks]),
-                "frames_accepted": _total([robot.counter(0) for robot in robots]),
-                "frames_rejected": _total([robot.counter(1) for robot in robots]),
-                "frames_stale": _total([robot.counter(2) for robot in robots]),
-                "bit_errors": _total([network.bit_errors for network in self.networks]),
-            },
-            "vision": _added([network.sight.counts() for network in self.networks]),
-            "firmware": {
-                "instructions": _total([cpu.instructions for cpu in cpus]),
-                "machine_cycles": _total([cpu.cycles for cpu in cpus]),
-                "idle_cycles": _total([cpu.idle_cycles for cpu in cpus]),
-                "faults": _total([robot.board.fault_count for robot in robots]),
-            },
-        }
 
     @property
     def state(self) -> Flat:
@@ -414,21 +392,6 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
-
-
-def _added(counts: Sequence[dict[str, int]]) -> dict[str, int | None]:
-    """Counts of several cameras of one kind."""
-    return {name: _total([count[name] for count in counts]) for name in counts[0]}
-
-
-def _total(values: Sequence[int | None]) -> int | None:
-    """The sum, or None when one of the parts is not known."""
-    total = 0
-    for value in values:
-        if value is None:
-            return None
-        total += value
-    return total
 
 
 def _whole(ticks: int) -> int:

@@ -15,7 +15,7 @@ from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import tracking_of
+from mirotwin.report.summary import summarise, tracking_of
 from mirotwin.verify.steps.running import run_test
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
 
@@ -29,13 +29,13 @@ def test_a_row_says_what_the_run_itself_says(alone):
     while not world.finished:
         tracks.add(world.step())
     (track,) = tracks.robots.values()
-    tracking, counters = tracking_of(track.errors), world.counters()
+    tracking, summary = tracking_of(track.errors), summarise(world, tracks, 1.0)
     assert (row["run"], row["seed"], row["network.radio.bit_error_rate"]) == (4, 4, 0.01)
     assert (row["digest"], row["verdict"], row["error"]) == (tracks.digest, "passed", "")
     assert (row["rms_position_cm"], row["rms_x_cm"]) == (tracking.rms_position_cm, tracking.rms_x_cm)
-    link = counters["link"]
-    assert (row["frames_accepted"], row["bit_errors"]) == (link["frames_accepted"], link["bit_errors"])
-    assert row["vision_frames"] == counters["vision"]["frames"]
+    link = summary.link
+    assert (row["frames_accepted"], row["bit_errors"]) == (link.frames_accepted, link.bit_errors)
+    assert row["vision_frames"] == summary.vision.frames
     assert (row["faults"], row["settled"]) == (0, track.errors[-1].settled)
     assert row["check.no_fault"] == "passed"
 

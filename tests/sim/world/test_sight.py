@@ -148,7 +148,7 @@ def test_each_host_follows_its_own_robots_among_those_of_the_other():
                 assert off_cm((old.truth, robot.measurement)) < 0.2
         before = period
     none = dict.fromkeys(("lost", "dropped", "repeated", "wrong", "swapped"), 0)
-    assert one.counters()["vision"] == {"frames": 24, **none}
+    assert [network.sight.counts() for network in one.networks] == [{"frames": 12, **none}] * 2
 
 
 @pytest.mark.parametrize("kind", ["pixels", "geometric", "gaussian"])
