@@ -1,14 +1,14 @@
 """The band down: levels as defined, whatever the chunks, and errors and noise as often as they should be."""
 
 import struct
+from fractions import Fraction
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.clock import NEVER_TICK
+from miro_exact.clock import NEVER_TICK, ROBOT_BIT_TICKS
 from miro_exact.state import restore, snapshot
-from miro_protocol.line import LineReceiver
 from miro_protocol.transmission import Transmission
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
@@ -193,7 +193,7 @@ def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
         downlink.send(*one)
     downlink.settle(UNTIL)
     symbols = [symbol for one in sent for symbol in Transmission(one[0], ">", one[1], 0, one[2]).symbols()]
-    assert LineReceiver().feed(lines[0].edges(), UNTIL) == symbols
+    assert naive.receive(lines[0].edges(), UNTIL, Fraction(ROBOT_BIT_TICKS)) == symbols
 
 
 @pytest.mark.parametrize("stops", [b"\1", b"\1\0\0"])
