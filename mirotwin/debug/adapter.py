@@ -318,7 +318,10 @@ class Adapter:
 
     def _moment(self, frame_id: int | None) -> Moment:
         thread, frame = divmod(frame_id - 1, _MOST_FRAMES) if frame_id else (self.timeline.focus, 0)
-        return Moment(self.symbols, self.timeline.cores[thread], frame)
+        try:
+            return Moment(self.symbols, self.timeline.cores[thread], frame)
+        except IndexError:
+            raise BadInput("", f"frame {frame_id}", "is of a moment that is left") from None
 
     def on_scopes(self, given: Message) -> Message:
         found = []

@@ -297,7 +297,11 @@ class Debugger:
         if over and is_call(cpu.code_at(pc)):
             after = (pc + LENGTH[cpu.code_at(pc)]) & 0xFFFF
             return self._forward(Trap({after}, lambda core: core.cpu.sp == sp or None))
+        slept = cpu.idle
         self.timeline.step()
+        if over and cpu.sp == sp + 2 and self.frames()[0].by_interrupt:
+            why = self._out()
+            return why if slept or why != STEPPED else self._instruction(over)
         return self._at_end() or STEPPED
 
     def _instruction_back(self, over: bool) -> str:
@@ -307,7 +311,7 @@ class Debugger:
             if not over or frames[0].base <= base or len(frames) < 2:
                 return STEPPED
             self._out_back()
-            if not frames[0].by_interrupt:
+            if not frames[0].by_interrupt or self.cpu.idle:
                 return STEPPED
         return BEGINS
 
@@ -344,20 +348,22 @@ class Debugger:
     def _line(self, over: bool) -> str:
         """On to where another line begins, of this function, of its caller, or (not `over`) of one that it calls.
 
-        Code without lines, as before `main`, is passed to the next line, wherever that is.
+        Code without lines is passed to the next line, from before `main` wherever that is.
         """
-        here = self._line_of(self.cpu)
+        here = around = self._line_of(self.cpu)
         over = over and here.line is not None
-        callers = self.frames()[1:] if here.line is not None else []
-        without_lines = [frame.pc for frame in callers if self.symbols.line(frame.pc) is None]
+        begins, returns = self.symbols.line_begins, {frame.pc for frame in self.frames()[1:]}
 
         def ask(core: Core) -> object:
+            nonlocal around
             there = self._line_of(core.cpu)
-            if there.base > here.base and (over or there.level != here.level):
+            if there.level > around.level or (over and there.base > around.base):
                 return None
-            return there if there[:2] != here[:2] else None
+            if there.base < around.base:
+                around = there  # it returned
+            return there if core.cpu.pc in begins and there[:2] != here[:2] else None
 
-        return self._forward(Trap({*self.symbols.line_begins, *without_lines}, ask))
+        return self._forward(Trap(returns.union(begins), ask))
 
     def _line_back(self, over: bool) -> str:
         """Back to where a line began: this one if some of it was executed, else the one before.
@@ -366,13 +372,17 @@ class Debugger:
         """
         trap = Trap(self.symbols.line_begins, lambda core: self._line_of(core.cpu))
         here = self._line_of(self.cpu)
-        outermost = here.base - here.entered
+        outermost, level = here.base, here.level
+        if here.entered:
+            inner, *callers = self.frames()
+            outermost = callers[0].base if callers else here.base - 1
+            level &= level >> 1 if inner.by_interrupt else level  # of what was interrupted
         begin: Hit | None = None
         line: _Line | None = None
         for hit in self.timeline.hits_back({self.timeline.focus: trap}):
             there = hit.found
             assert isinstance(there, _Line)
-            if there.base > outermost and (over or there.level != here.level):
+            if there.level > level or (over and there.base > outermost):
                 continue
             if line is not None and there[:2] != line[:2]:
                 break

@@ -191,7 +191,8 @@ def test_a_step_goes_on_past_a_change_of_breakpoints_and_stops_at_new_ones(place
         ("evaluate", {"expression": ""}, "lacks a name or a number"),
         ("evaluate", {"expression": None}, "arguments that cannot be used"),
         ("readMemory", {"memoryReference": "moon:0x0", "count": 1}, "arguments that cannot be used"),
-        ("scopes", {"frameId": 999}, "arguments that cannot be used"),
+        ("scopes", {"frameId": 2009}, "frame 2009: is of a moment that is left"),
+        ("evaluate", {"expression": "age", "frameId": 9001}, "frame 9001: is of a moment that is left"),
     ],
 )
 def test_a_request_that_cannot_be_done_gets_an_error_and_the_session_goes_on(

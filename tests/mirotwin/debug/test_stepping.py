@@ -261,6 +261,88 @@ def test_a_return_address_was_written_where_the_interrupt_came(moments, debugger
 PROGRAMS = {"mix": (MIX,), "library": (LIBRARY,), "stack-auto": (LIBRARY, "--stack-auto")}
 
 
+SUMS = """unsigned char sum;
+unsigned char one(void) {
+return sum + 1;
+}
+unsigned char two(void) {
+return sum + 2;
+}
+void main(void) {
+for (;;) {
+sum = one() + two();
+sum = 0;
+}
+}
+"""
+
+
+@needs_sdcc
+def test_next_out_of_a_function_passes_what_else_the_line_of_its_caller_calls(tmp_path):
+    (tmp_path / "sums.c").write_text(SUMS)
+    debugger = debugger_of(proofs.compiled(tmp_path, tmp_path / "sums.c"))
+    debugger.add("one")
+    debugger.move("continue")
+    lines = []
+    for move in ("next", "next", "rnext", "continue", "next", "step"):
+        debugger.move(move)
+        lines.append(debugger.symbols.line(debugger.cpu.pc).line)
+    assert lines == [4, 11, 10, 3, 4, 6]
+
+
+@needs_sdcc
+def test_steps_back_undo_steps_through_functions_that_a_library_calls(tmp_path):
+    debugger = debugger_of(proofs.compiled(tmp_path, LIBRARY))
+    debugger.go_to(1_150_000)
+    stops = []
+    while len(stops) < 20:
+        debugger.move("step")
+        stops.append((debugger.timeline.tick, debugger.cpu.pc))
+    for stop in reversed(stops[:-1]):
+        debugger.move("rstep")
+        assert (debugger.timeline.tick, debugger.cpu.pc) == stop
+
+
+BUSY = """unsigned char ticks, sum;
+void tick(void) __interrupt(1) {
+ticks++;
+}
+void main(void) {
+TMOD = 2;
+IE = 0x82;
+TR0 = 1;
+for (;;)
+sum = ticks % 7 % 5 % 3 % 7 % 5 % 3 % 7 % 5 % 3 % 7 % 5 % 3;
+}
+"""
+
+
+@needs_sdcc
+@pytest.mark.parametrize("verb", ["step", "next"])
+def test_a_line_back_from_an_interrupt_goes_to_what_it_interrupted(tmp_path, verb):
+    (tmp_path / "busy.c").write_text("#include <8052.h>\n" + BUSY)
+    debugger = debugger_of(proofs.compiled(tmp_path, tmp_path / "busy.c"))
+    debugger.go_to(24_000)
+    debugger.add("tick")
+    for _ in range(20):
+        debugger.move("continue")
+        entered = debugger.timeline.tick
+        debugger.move(f"r{verb}")
+        assert debugger.symbols.place(debugger.cpu.pc) == "busy.c:11 in main"
+        debugger.go_to(entered)
+        while debugger.cpu.peripherals.interrupts.in_service:
+            debugger.move(verb)
+        assert debugger.symbols.place(debugger.cpu.pc) == "busy.c:11 in main"
+
+
+def test_next_by_instruction_passes_interrupts():
+    debugger = debugger_of(proofs.assembled(ASM))
+    debugger.go_to(600)
+    for _ in range(400):
+        debugger.move("next", by_instruction=True)
+        assert not any(one.by_interrupt for one in debugger.frames())
+
+
 @needs_sdcc
 @pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS)
 def test_stacks_of_a_program_of_sdcc_are_those_of_the_calls_and_interrupts(tmp_path, program):
