@@ -35,6 +35,7 @@ from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
+from mirotwin.verify.checks.interface import at, in_ms
 from mirotwin.verify.checks.monitors import Checks
 
 if TYPE_CHECKING:
@@ -89,8 +90,8 @@ class Stops:
             asked.insert(0, ("--to", to_tick, end_tick))
         for option, tick, last in asked:
             if not world.tick < tick <= last:
-                what = f"the run goes from tick {world.tick} to tick {last}"
-                raise BadInput("", f"{option} {tick}t", what, "give a tick between")
+                what = f"the run goes from {at(world.tick)} to {at(last)}"
+                raise BadInput("", f"{option} {tick}t ({in_ms(tick)})", what, "give a time between")
 
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""

@@ -83,7 +83,7 @@ def window(
     from_tick = 0 if from_time is None else from_time.ticks(crystal_hz)
     to_tick = None if to_time is None else to_time.ticks(crystal_hz)
     if to_tick is not None and to_tick <= from_tick:
-        place = f"--from {from_tick}t --to {to_tick}t"
+        place = f"--to {to_time}" if from_time is None else f"--from {from_time} --to {to_time}"
         raise BadInput("", place, "the window is empty", "--to must be later")
     return from_tick, to_tick
 

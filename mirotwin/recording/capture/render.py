@@ -161,7 +161,7 @@ class Totals:
     def __str__(self) -> str:
         counts = self.counts
         why = ", ".join(f"{count} {name}" for name, count in sorted(self.reasons.items()))
-        damage = f"{counts['damaged']} damaged runs of {counts['damaged_bytes']} bytes"
+        damage = f"{amount(counts['damaged'], 'damaged run')} of {amount(counts['damaged_bytes'], 'byte')}"
         frames = f"{counts['accepted']} accepted, {counts['stale']} stale, {counts['telemetry']} telemetry"
         return f"frames: {frames}; {damage}" + (f" ({why})" if why else "")
 

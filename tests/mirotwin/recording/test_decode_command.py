@@ -53,7 +53,7 @@ def test_bytes_without_times_are_told_by_their_offsets(data):
     assert columns[0][6] == "0: +100/-100  1: +0/+1  2: -32767/+32767"
     assert columns[2][6] == "slot=1 acceleration=5973"
     assert "acceleration in 1/65536 count per sample^2" in lines[1]
-    assert lines[-1] == "frames: 2 accepted, 0 stale, 0 telemetry; 1 damaged runs of 23 bytes (1 bad crc)"
+    assert lines[-1] == "frames: 2 accepted, 0 stale, 0 telemetry; 1 damaged run of 23 bytes (1 bad crc)"
 
 
 @pytest.mark.parametrize("data", [PCAPNG, STREAM])

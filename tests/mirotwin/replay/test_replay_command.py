@@ -341,7 +341,7 @@ def test_a_recording_of_another_format_is_refused_with_the_reason(
         (("--compare", "bytes", "--within-ms", "-1"), "-1.0 is not in the range"),
         (("--compare", "wheels", "--within-counts", "1.5"), "'1.5' is not a whole number"),
         (("--from", "2s", "--to", "1s"), "the window is empty; --to must be later"),
-        (("--to", "0t"), "the window is empty"),
+        (("--to", "0t"), "--to 0t: the window is empty"),
         (("--from", "1h"), "the recording ends at tick 4804800; look earlier"),
         (("--from", "1"), "'1' is not a time; it has no unit: write 1s for seconds, 1t for ticks of the crystal."),
         (("--from", "1s"), "the recording ends at tick 4804800; look earlier"),

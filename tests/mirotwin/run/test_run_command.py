@@ -419,11 +419,12 @@ def test_a_run_that_is_cut_short_does_not_fail_by_frames_to_come(
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        (("--save-at", "1s"), "--save-at 24000000t: the run goes from tick 0 to tick 4804800; give a tick between"),
-        (("--to", "0t"), "--to 0t: the run goes from tick 0 to tick 4804800; give a tick between"),
-        (("--save-at", "2s", "--to", "100ms"), "--save-at 48000000t: the run goes from tick 0 to tick 2400000"),
+        (("--save-at", "1s"), "--save-at 24000000t (1000.000 ms): the run goes from tick 0 (0.000 ms) to tick "
+         "4804800 (200.200 ms); give a time between"),
+        (("--to", "0t"), "--to 0t (0.000 ms): the run goes from tick 0 "),
+        (("--save-at", "2s", "--to", "100ms"), "the run goes from tick 0 (0.000 ms) to tick 2400000 (100.000 ms)"),
         (("--resume", "{saved}", "--seed", "6"), "cannot be resumed: the saved world has seed 5, this world has 6"),
-        (("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"), "the run goes from tick 2402400 to tick"),
+        (("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"), "goes from tick 2402400 (100.100 ms) to tick"),
         (("--resume", "{short}"), "cannot be resumed: not a saved world, or one of a version of this program"),
         (("--resume", "{saved}.none"), "no such file"),
         (("--save-at", "soon"), "'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks."),

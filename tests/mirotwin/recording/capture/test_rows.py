@@ -197,7 +197,7 @@ def test_an_answer_refused_for_one_stop_bit_even_its_last_is_listed_as_refused(m
     mirotwin.ends(0, "export", path, "--out", exported, "-q", "--force")
     for file in (path, exported):
         out = mirotwin("decode", file, "--robots", "3")[1]
-        assert "1 telemetry; 1 damaged runs of 19 bytes (1 bad stop bit)" in out
+        assert "1 telemetry; 1 damaged run of 19 bytes (1 bad stop bit)" in out
 
 
 CHARACTER = 25_000
