@@ -1,9 +1,9 @@
 """What a robot at a port answers beside what its twin answers to the same characters at the same ticks.
 
 An answer comes `delay` after the twin's: radio, adapter, operating system and scheduling. The shortest delay of a talk
-is what the way costs, and is taken off all ticks. What an answer takes longer is how well its time is known, and the
-question's too: positions and flags that this leaves open are not judged. Positions, `accepted` and `rejected` are
-compared by how they change from one answer to the next: a robot on the desk was switched on some time ago.
+is what the way costs, and is taken off all ticks. What the answers nearby take longer is how late the frames between
+them may have come to the robot: what that explains is no difference. Positions, `accepted` and `rejected` are compared
+by how they change from one answer to the next: a robot on the desk was switched on some time ago.
 """
 
 from __future__ import annotations
@@ -19,7 +19,13 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame
-from miro_protocol.table import FAILSAFE_OFF_TICKS, FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, TICKS_PER_MS
+from miro_protocol.table import (
+    FAILSAFE_OFF_TICKS,
+    FAILSAFE_STOP_TICKS,
+    FRESH_AGAIN_TICKS,
+    TICKS_PER_MS,
+    Flags,
+)
 from miro_sim.periods import Period
 from miro_sim.world.conditions import answer_of
 from mirotwin.recording.compare import CompareRule
@@ -38,10 +44,12 @@ GAP_TICKS = 2 * TICKS_PER_MS
 """So near to a limit of time, a robot and its twin may judge either way: where they count from and what they round."""
 STATUS = 0xA2
 """Command error, excessive error, motor off: bits of an LM629's status that do not depend on what was before."""
+STATUS_AT_START = 0x22
+"""The same without motor off, for a question that starts motors: the sample after it may come before the answer."""
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 """A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
-"""Answers before and after one that tell how late frames without an answer were."""
+"""Answers before and after a window that tell how late frames without an answer were."""
 
 
 class PortComparison(msgspec.Struct, frozen=True):
@@ -102,13 +110,13 @@ def _side_by_side(port: Sequence[LogEntry], twin: Sequence[LogEntry], until_tick
 
 
 class _Sent:
-    """What the host said: when each transmission ended, and the fastest wheel of each robot that was told by then."""
+    """What the host said: when each transmission ended, and the velocities of all robots by then."""
 
     def __init__(self, periods: Sequence[Period], robots: int) -> None:
         decoder = Decoder(robots)
         self.ends: list[int] = []
-        self.words: list[list[int]] = []
-        words = [0] * robots
+        self.velocities: list[Sequence[tuple[int, int]]] = []
+        velocities: Sequence[tuple[int, int]] = ((0, 0),) * robots
         for one in on_air(periods, 0, sent=True):
             for event in decoder.feed(one.data):
                 try:
@@ -116,9 +124,9 @@ class _Sent:
                 except ContentError:
                     continue
                 if isinstance(said, TeamFrame):
-                    words = [max(abs(left), abs(right)) for left, right in said.velocities]
+                    velocities = said.velocities
             self.ends.append(one.end_tick)
-            self.words.append(words)
+            self.velocities.append(velocities)
 
     def near_a_limit(self, after_tick: int, until_tick: int, unsure_ticks: int) -> bool:
         """Whether a silence in between is so long that a time limit of the robot may or may not be over."""
@@ -127,11 +135,19 @@ class _Sent:
         gaps = [other - one for one, other in pairwise(ends)]
         return any(abs(gap - limit) < GAP_TICKS + unsure_ticks for gap in gaps for limit in LIMITS_TICKS)
 
-    def fastest(self, slot: int, after_tick: int, until_tick: int) -> int:
-        """Of the velocities in force in between, in 1/256 count per sample."""
+    def rise(self, slot: int, wheel: int, after_tick: int, until_tick: int) -> float:
+        """By how much a wheel's velocity rises in all, from rest through those in force in between to rest.
+
+        So many 1/256 counts a sample, times the time by which frames may be late, is how far off a position may be.
+        """
         first = bisect_right(self.ends, after_tick - SLOWING_TICKS)
-        last = bisect_left(self.ends, until_tick)
-        return max((words[slot] for words in self.words[first:last] if slot < len(words)), default=0)
+        before_tick, words = 0, [0]
+        for at in range(first, bisect_left(self.ends, until_tick)):
+            if self.ends[at] - before_tick > FAILSAFE_STOP_TICKS:
+                words.append(0)
+            before_tick = self.ends[at]
+            words.append(self.velocities[at][slot][wheel])
+        return sum(abs(one - other) for one, other in pairwise([*words, 0])) / 2
 
 
 def _judged(
@@ -142,7 +158,6 @@ def _judged(
     def differs(tick: int, name: str, mine: int | str | None, twins: int | str | None) -> Difference:
         return Difference(tick, tick // CONTROL_PERIOD_TICKS, 0, slot, name, mine, twins)
 
-    near = [max(late[max(0, at - NEAR) : at + NEAR + 1]) for at in range(len(late))]
     before: tuple[LogEntry, LogEntry] | None = None
     full = 0
     for here, there in both:
@@ -156,14 +171,16 @@ def _judged(
             yield differs(there.tick, "answer", f"{late[full] / TICKS_PER_MS:.1f} ms late", "in time")
         if before is not None:
             window = before[1].tick, there.tick
-            unsure = near[full - 1] + near[full]
+            unsure = max(late[max(0, full - 1 - NEAR) : full + NEAR + 1])
             timely = not sent.near_a_limit(*window, unsure)
-            way = sent.fastest(slot, *window) * unsure / LM629_SAMPLE_TICKS / 256
-            for name, (take, exact) in FIELDS.items():
-                mine, twins = take(before[0].said, here.said), take(before[1].said, there.said)
+            for name, (take, wheel) in FIELDS.items():
+                mine, twins, within = take(before[0].said, here.said), take(before[1].said, there.said), 0.0
+                if wheel is not None:
+                    way = sent.rise(slot, wheel, *window) * unsure / LM629_SAMPLE_TICKS / 256
+                    within = rule.within_counts + way
                 if mine != twins and not timely:
                     yield None
-                elif abs(mine - twins) > (0 if exact else rule.within_counts + way):
+                elif abs(mine - twins) > within:
                     yield differs(there.tick, name, mine, twins)
         before = here, there
         full += 1
@@ -174,13 +191,19 @@ def _went(name: str, modulus: int, least: int) -> Callable[[TelemetryFrame, Tele
     return lambda one, other: (getattr(other, name) - getattr(one, name) - least) % modulus + least
 
 
-FIELDS: dict[str, tuple[Callable[[TelemetryFrame, TelemetryFrame], int], bool]] = {
-    "accepted": (_went("accepted", 1 << 8, 0), True),
-    "rejected": (_went("rejected", 1 << 8, 0), True),
-    "flags": (lambda one, other: int(other.flags), True),
-    "status left": (lambda one, other: other.status_left & STATUS, True),
-    "status right": (lambda one, other: other.status_right & STATUS, True),
-    "left moved": (_went("position_left", 1 << 16, -1 << 15), False),
-    "right moved": (_went("position_right", 1 << 16, -1 << 15), False),
+def _status(name: str) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
+    return lambda _, other: (
+        getattr(other, name) & (STATUS_AT_START if other.flags & Flags.MOTORS_OFF else STATUS)
+    )
+
+
+FIELDS: dict[str, tuple[Callable[[TelemetryFrame, TelemetryFrame], int], int | None]] = {
+    "accepted": (_went("accepted", 1 << 8, 0), None),
+    "rejected": (_went("rejected", 1 << 8, 0), None),
+    "flags": (lambda one, other: int(other.flags), None),
+    "status left": (_status("status_left"), None),
+    "status right": (_status("status_right"), None),
+    "left moved": (_went("position_left", 1 << 16, -1 << 15), 0),
+    "right moved": (_went("position_right", 1 << 16, -1 << 15), 1),
 }
-"""What is compared of an answer and the one before, and whether it has to be equal."""
+"""What is compared of an answer and the one before: a wheel's position within counts, all else has to be equal."""

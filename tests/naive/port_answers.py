@@ -33,12 +33,13 @@ def moved(one, other):
 
 def values(before, after):
     """What is compared, and whether it has to be equal."""
+    seen = 0b00100010 if after.flags & 0b10000 else 0b10100010  # a motor that was off is being started
     return {
         "accepted": ((after.accepted - before.accepted) % 256, True),
         "rejected": ((after.rejected - before.rejected) % 256, True),
         "flags": (after.flags, True),
-        "status left": (after.status_left & 0b10100010, True),
-        "status right": (after.status_right & 0b10100010, True),
+        "status left": (after.status_left & seen, True),
+        "status right": (after.status_right & seen, True),
         "left moved": (moved(before.position_left, after.position_left), False),
         "right moved": (moved(before.position_right, after.position_right), False),
     }
@@ -52,9 +53,17 @@ def silence_near_a_limit(sent, first_tick, last_tick, unsure):
     return any(abs(gap - limit) < 2 * MS + unsure for gap in gaps for limit in LIMITS)
 
 
-def fastest(sent, first_tick, last_tick):
-    told = [words for end, words in sent if first_tick - 8 * 800_800 < end < last_tick]
-    return max((abs(word) for pair in told for word in pair), default=0)
+def off_by(sent, first_tick, last_tick, wheel, late):
+    """How far off a position is at most, if each frame in between, and shortly before, is late by 0 to `late` ticks."""
+    told = [(end, words[wheel]) for end, words in sent if first_tick - 8 * 800_800 < end < last_tick]
+    course = [0]
+    for at, (end, word) in enumerate(told):
+        if at == 0 or end - told[at - 1][0] > 110 * MS:
+            course.append(0)
+        course.append(word)
+    course.append(0)
+    rises = sum(max(0, course[at + 1] - course[at]) for at in range(len(course) - 1))
+    return rises * late / 8192 / 256
 
 
 def compared(port, twin, sent, lost_tick, within_counts, within_ticks):
@@ -69,7 +78,6 @@ def compared(port, twin, sent, lost_tick, within_counts, within_ticks):
     questions.sort(key=lambda both: (both[0] or both[1])[0])
     full = [(one, other) for one, other in questions if one and other]
     late = [other[0] - one[0] for one, other in full]
-    near = [max(late[max(0, at - 2) : at + 3]) for at in range(len(late))]
     differences, open_values = [], 0
     for one, other in questions:
         earlier = [both for both in full if both[0][0] < (one or other)[0]]
@@ -84,13 +92,15 @@ def compared(port, twin, sent, lost_tick, within_counts, within_ticks):
         if not at:
             continue
         before = full[at - 1]
-        unsure = near[at - 1] + near[at]
-        way_off = fastest(sent, before[0][0], one[0]) * unsure / 8192 / 256
+        window = before[0][0], one[0]
+        unsure = max(late[max(0, at - 3) : at + 3])
         of_twin, of_robot = values(before[0][1], one[1]), values(before[1][1], other[1])
         for name, (value, exact) in of_twin.items():
             apart = abs(of_robot[name][0] - value)
-            if apart and silence_near_a_limit(sent, before[0][0], one[0], unsure):
+            if apart and silence_near_a_limit(sent, *window, unsure):
                 open_values += 1
-            elif apart > (0 if exact else within_counts + way_off):
+            elif apart > (
+                0 if exact else within_counts + off_by(sent, *window, name == "right moved", unsure)
+            ):
                 differences.append((one[0], name))
     return differences, open_values

@@ -1,12 +1,15 @@
 """The comparison of answers, beside the slow one of `tests.naive.port_answers`."""
 
+from itertools import pairwise
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
 from miro_sim.periods import Period
-from mirotwin.desk.compare import ANSWERS, compare
+from mirotwin.desk.compare import ANSWERS, _Sent, compare
 from tests.naive import port_answers
 
 MS = 24_000
@@ -18,10 +21,11 @@ question = st.fixed_dictionaries(
         "late_us": st.sampled_from([0, 0, 40, 900, 5000, 15_000, 21_000, 30_000]),
         "lost": st.sampled_from(["", "", "", "", "port", "twin"]),
         "went": st.tuples(st.integers(-900, 900), st.integers(-900, 900)),
-        "apart": st.tuples(st.integers(-400, 400), st.just(0)),
+        "apart": st.tuples(st.integers(-400, 400), st.sampled_from([0, 0, 60, -200])),
         "counted": st.sampled_from([0, 0, 0, 1]),
         "flags": st.sampled_from([0, 0, 8, 24]),
         "other_flags": st.sampled_from([0, 0, 0, 16]),
+        "status": st.sampled_from([0, 0, 0x80, 0x20]),
     }
 )
 
@@ -51,7 +55,7 @@ def test_the_comparison_finds_what_the_slow_one_finds(questions, way_us, offset,
         accepted += one["counted"]
         twins = TelemetryFrame(frame.seq, 0, one["flags"], 0, 0, *(at % 65536 for at in theirs), number % 256)
         said = TelemetryFrame(
-            *(frame.seq, 0, one["flags"] ^ one["other_flags"], 0, 0),
+            *(frame.seq, 0, one["flags"] ^ one["other_flags"], one["status"], 0),
             *((at + offset) % 65536 for at in mine),
             (number + accepted + count) % 256,
         )
@@ -74,3 +78,72 @@ def test_the_comparison_finds_what_the_slow_one_finds(questions, way_us, offset,
         )
     else:
         assert (found.differences, found.silent) == ([], (0,) if twin else ())
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([34, 34, 109, 112, 300]), st.integers(-9, 9)), min_size=3, max_size=12
+    ),
+    st.integers(0, 900),
+)
+def test_what_the_velocity_rises_by_is_what_the_slow_one_says(frames, length_ms):
+    tick, sent, told = 1_000_000, [], []
+    for number, (gap_ms, word) in enumerate(frames):
+        tick += gap_ms * MS
+        data = encode(TeamFrame(0, number, ((0, word), (0, 0), (0, 0))), 3)
+        sent.append(Transmission(tick, DOWN, data))
+        told.append((sent[-1].end_tick, (0, word)))
+    window = (tick - length_ms * MS, tick)
+    found = _Sent(run(sent), 3).rise(0, 1, *window)
+    assert found == port_answers.off_by(told, *window, 1, 8192 * 256)
+
+
+@pytest.mark.parametrize("late", range(3, 12))
+def test_an_answer_that_is_late_excuses_what_differs_up_to_two_answers_away(late):
+    sent, heard = [], ([], [])
+    for number in range(15):
+        frame = TeamFrame(3, number * 3, ((2000, 2000), (0, 0), (0, 0)))
+        sent.append(Transmission(1_000_000 + number * 100 * MS, DOWN, encode(frame, 3)))
+        for side, more in enumerate((100, 0)):
+            said = TelemetryFrame(frame.seq, 0, 0, 0, 0, more if number >= 7 else 0, 0, 0)
+            came = sent[-1].end_tick + 25 * MS + (10 * MS if number == late and not side else 0)
+            heard[side].append(Transmission(came - ANSWER_TICKS, UP, encode(said, 3)))
+    found = compare(run([*sent, *heard[0]], came + 30 * MS), run([*sent, *heard[1]]), 3)
+    assert (found.differences == []) == (late in (4, 5, 6, 7, 8, 9))  # answers 6 and 7 are compared
+
+
+QUESTIONS = 16
+LATE = 6 * MS
+"""By which all answers but the first come late."""
+
+
+def position(frames, tick):
+    """Of a wheel that takes each velocity at once, and stops 110 ms after a frame if no other comes."""
+    there = 0
+    for (came, word), (until, _) in pairwise([*frames, (tick, 0)]):
+        there += word * max(0, min(until, tick, came + 110 * MS) - came)
+    return there // (8192 * 256)
+
+
+@given(
+    st.lists(st.sampled_from([34, 34, 34, 200]), min_size=QUESTIONS, max_size=QUESTIONS),
+    st.lists(st.sampled_from([-8000, 8000, 1000]), min_size=QUESTIONS, max_size=QUESTIONS),
+    st.lists(st.sampled_from([0, LATE]), min_size=QUESTIONS, max_size=QUESTIONS),
+)
+def test_what_late_frames_do_to_positions_is_no_difference(gaps_ms, words, late):
+    words[0], tick, sent, heard = 0, 1_000_000, [], ([], [])
+    for number, gap_ms in enumerate(gaps_ms):
+        tick += gap_ms * MS
+        frame = TeamFrame(3, 3 + number, ((words[number], 0), (0, 0), (0, 0)))
+        sent.append(Transmission(tick, DOWN, encode(frame, 3)))
+        if number % 3 == 0:
+            for side, delays in enumerate((late[: number + 1], [0] * QUESTIONS)):
+                frames = [
+                    (one.end_tick + by, word) for one, by, word in zip(sent, delays, words, strict=False)
+                ]
+                at = position(frames, sent[-1].end_tick + MS + delays[number]) % 65536
+                came = sent[-1].end_tick + 25 * MS + (LATE if number and not side else 0)
+                said = encode(TelemetryFrame(frame.seq, 0, 0, 0, 0, at, 0, 0), 3)
+                heard[side].append(Transmission(came - ANSWER_TICKS, UP, said))
+    found = compare(run([*sent, *heard[0]], came + 30 * MS), run([*sent, *heard[1]]), 3)
+    assert found.differences == []
