@@ -45,8 +45,7 @@ class Chain:
         if slot < known:
             known = -1
             answer = 0
-        index = slot
-        while index > known:
+        for index in range(slot, known, -1):
             draw = self.stream.u32(index)
             if draw < self.enter:
                 answer = 1
@@ -54,7 +53,6 @@ class Chain:
             if draw >= self.stay:
                 answer = 0
                 break
-            index -= 1
         self.slot = slot
         self.answer = answer
         return answer

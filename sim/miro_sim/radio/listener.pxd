@@ -32,7 +32,7 @@ cdef class Listener:
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
     @cython.locals(sender=Sender, first='long long', begun='long long', number='long long', count='long long',
-                   begin='long long', place=int, levels=int, level=int, before=int)
+                   begin='long long', step='long long', place=int, levels=int, level=int, before=int)
     cdef void hear_data(self, long long tick, long long until, long long start, bytes data, bytes stops, list senders,
                         Py_ssize_t rank) except *
     cdef long long next_judged(

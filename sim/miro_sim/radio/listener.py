@@ -169,6 +169,7 @@ class Listener:
         sender = senders[rank]
         count = sender.number(until - 1 - start) + 1
         begun = sender.number(tick - start)
+        step = sender.numerator if sender.denominator == 1 else 0
         first = (start - sender.latency) // _BIT  # number of the first error draw
         place = begun % _CHARACTER
         levels = sender.levels(data, stops, begun)
@@ -182,7 +183,7 @@ class Listener:
             place += 1
             if level == before and number != judged:
                 continue
-            begin = sender.begin(start, number)
+            begin = start + number * step if step else sender.begin(start, number)
             if number == judged:
                 level = self.bit(begin, level, first, number, begin >= tick, senders, rank)
                 judged = self.next_judged(first, number + 1, count, stops, senders, rank)

@@ -114,10 +114,8 @@ class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
     rejected: Byte | None = None
 
     def met_by(self, event: Event) -> bool:
-        if not super().met_by(event):
-            return False
         wanted = {key: value for key in self.DETAILS if (value := getattr(self, key)) is not None}
-        return not wanted or wanted.items() <= answer_fields(event).items()
+        return super().met_by(event) and wanted.items() <= answer_fields(event).items()
 
 
 def answer_of(frame: events.Received) -> TelemetryFrame | None:

@@ -4,4 +4,5 @@ cdef class Outbox:
     cdef readonly long long lead_ticks
     cdef readonly int network
 
+    cpdef bint post(self, sent, long long free_tick) except -1
     cpdef list due(self, long long until_tick)

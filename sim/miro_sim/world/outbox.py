@@ -9,8 +9,6 @@ is saved, but no part of the digest: a run does not depend on when it was announ
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
-
 import msgspec
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -80,10 +78,11 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        if sent.tick < free_tick or any(_overlap(one.sent, sent) for one in self.waiting):
+        if sent.tick < free_tick or [one for one in self.waiting if _overlap(one.sent, sent)]:
             self.dropped += 1
             return False
-        insort(self.waiting, Waiting(sent, STATION), key=_tick)
+        self.waiting.append(Waiting(sent, STATION))
+        self.waiting.sort(key=_tick)
         return True
 
     def inject(self, sent: Transmission, free_tick: int) -> None:
@@ -108,7 +107,8 @@ class Outbox:
         kept = [one for one in self.waiting if not _overlap(one.sent, sent)]
         self.dropped += len(self.waiting) - len(kept)
         self.waiting = kept
-        insort(self.waiting, Waiting(sent, INJECTED), key=_tick)
+        self.waiting.append(Waiting(sent, INJECTED))
+        self.waiting.sort(key=_tick)
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
@@ -116,7 +116,9 @@ class Outbox:
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
-        count = bisect_left(self.waiting, until_tick + self.lead_ticks, key=_tick)
+        count = 0
+        while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
+            count += 1
         taken = [one.sent for one in self.waiting[:count]]
         del self.waiting[:count]
         return taken

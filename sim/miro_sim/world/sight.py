@@ -131,10 +131,12 @@ class SeeingSight:
             self.repeated += 1
             seen = None
         else:
-            share, found = camera.lost_robots, self.look(tick)
-            seen = tuple(
-                [None if chance.uniform(first + 2 + at) < share else found[at] for at in range(robots)]
-            )
+            found, share = self.look(tick), camera.lost_robots
+            if share > 0.0:
+                found = [
+                    None if chance.uniform(first + 2 + at) < share else found[at] for at in range(robots)
+                ]
+            seen = tuple(found)
             self._count(tick, seen)
         self.frame += 1
         return self.grabber.take(seen)
@@ -150,8 +152,10 @@ class SeeingSight:
             way_m = self._distance_m(own, tick, x_m, y_m)
             if way_m > WRONG * self.worst_m:
                 self.wrong += 1
-            if min([self._distance_m(other, tick, x_m, y_m) for other in range(len(seen))]) < way_m:
-                self.swapped += 1
+            for other in range(len(seen)):
+                if other != own and self._distance_m(other, tick, x_m, y_m) < way_m:
+                    self.swapped += 1
+                    break
 
     def _distance_m(self, own: int, tick: int, x_m: float, y_m: float) -> float:
         """From where a robot is to a place."""

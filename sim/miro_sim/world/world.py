@@ -211,13 +211,14 @@ class World:
         """The robot in `slot` of `network`. Raises ValueError where there is none."""
         return self._network(network).robot(slot)
 
-    def do(self, action: Action) -> None:
-        """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`.
+    def do(self, action: Action) -> int:
+        """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`; returns the tick.
 
         Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_action_tick`, a
         network or a robot that is not there, and for levels other than 0 and 1.
         """
         self._announce(action, self.earliest_action_tick)
+        return action.tick
 
     @property
     def earliest_action_tick(self) -> int:
@@ -229,22 +230,18 @@ class World:
 
         `slot`: default, the first robot of the network.
         """
-        return self._do_now(Reset(self.earliest_action_tick, network, self._slot(network, slot), level))
+        return self.do(Reset(self.earliest_action_tick, network, self._slot(network, slot), level))
 
     def set_power(self, on: int, network: int = 0, slot: int | None = None) -> int:
         """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick. `slot` as above."""
-        return self._do_now(Power(self.earliest_action_tick, network, self._slot(network, slot), on))
+        return self.do(Power(self.earliest_action_tick, network, self._slot(network, slot), on))
 
     def set_radio(self, state: LinkState, network: int = 0) -> int:
         """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
-        return self._do_now(RadioState(self.earliest_action_tick, network, state))
+        return self.do(RadioState(self.earliest_action_tick, network, state))
 
     def _slot(self, network: int, slot: int | None) -> int:
         return self._network(network).robots[0].slot if slot is None else slot
-
-    def _do_now(self, action: Action) -> int:
-        self.do(action)
-        return action.tick
 
     def _announce(self, action: Action, earliest_tick: int) -> None:
         network = self._network(action.network)
