@@ -293,7 +293,7 @@ def test_next_out_of_a_function_passes_what_else_the_line_of_its_caller_calls(tm
 @needs_sdcc
 def test_steps_back_undo_steps_through_functions_that_a_library_calls(tmp_path):
     debugger = debugger_of(proofs.compiled(tmp_path, LIBRARY))
-    debugger.go_to(1_150_000)
+    debugger.go_to(1_000_000)
     stops = []
     while len(stops) < 20:
         debugger.move("step")
