@@ -8,13 +8,9 @@ from miro_robot.plant cimport Plant
 from miro_robot.probe cimport Probe
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
-cdef int _CS, _BOTH_STROBES, _RST
-cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
-cdef int _WR, _RD, _BEHIND_TICKS
-cdef int RESET_PULSE, PORTS
-cdef long long CYCLE_TICKS
-cdef int FAULT, REACHED, RECEIVED, SENT, REPLAN
-cdef long long RESET_PULSE_TICKS, NEVER_TICK
+cdef int _CS, _BOTH_STROBES, _RST, _CHIP_PINS, _ALL_PINS, _BOTH_RST, _WR, _RD, _BEHIND_TICKS
+cdef int RESET_PULSE, PORTS, FAULT, REACHED, RECEIVED, SENT, REPLAN
+cdef long long CYCLE_TICKS, RESET_PULSE_TICKS, NEVER_TICK
 
 
 cdef class Board(Bus):

@@ -2,9 +2,7 @@ cimport cython
 
 cdef int _MOST, _MOST_RESETS, _PAIR, SEQ_MODULUS, _XOR_OUT
 cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS
-cdef int _BYTES, _FRAMES, _SESSION
-cdef int _TEAM, _SERVICE, _ASK
-cdef int _BAD_STOP, _RESET, _LONG
+cdef int _BYTES, _FRAMES, _SESSION, _TEAM, _SERVICE, _ASK, _BAD_STOP, _RESET, _LONG
 cdef bytes _WHITE
 
 

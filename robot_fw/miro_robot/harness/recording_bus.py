@@ -70,8 +70,7 @@ class BareOracle(LiveOracle):
         self.slept_tick = NEVER_TICK
 
     def begin(self, tick: int) -> None:
-        self.code = 0
-        self.tick = 0
+        LiveOracle.begin(self, tick)
         self.slept_tick = NEVER_TICK
         self.bus.begin()
 

@@ -1,9 +1,7 @@
 cimport cython
 
-cdef int _STOPS, _MODES
-cdef int _ACCELERATION, _VELOCITY, _POSITION
+cdef int _STOPS, _MODES, _ACCELERATION, _VELOCITY, _POSITION, _COMPLETED, _OUT_OF_RANGE
 cdef long long _MASK_30
-cdef int _COMPLETED, _OUT_OF_RANGE
 
 
 cpdef long long clamped(long long value, long long low, long long high) noexcept

@@ -1,9 +1,7 @@
 cimport cython
 
-cdef int _OPEN, _SOFTWARE_RESET
-cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE
-cdef int _IGNORED, _ACCEPTED, _REFUSED
-cdef int _RECORD
+cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE, _OPEN, _SOFTWARE_RESET
+cdef int _IGNORED, _ACCEPTED, _REFUSED, _RECORD
 
 
 @cython.final

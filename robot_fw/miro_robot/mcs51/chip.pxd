@@ -8,6 +8,7 @@ cdef long long NEVER_TICK
 cdef int _OUTSIDE, _MARK, _STOP_REQUESTED, _REPLAN
 cdef int _P0, _PCON, _IE, _IP, _SMOD, _PD, _IDL, _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES, _FLOATING, _ONE_INSTRUCTION
+cdef unsigned short _LINE[256]
 
 cdef class Chip:
     cdef readonly Bus bus
@@ -15,7 +16,6 @@ cdef class Chip:
     cdef readonly Line rxd, txd
     cdef unsigned char rom[65538]
     cdef unsigned int lines[65536]
-    cdef unsigned short line_of[256]
     cdef unsigned char iram[256]
     cdef public int pc, a, b, sp, dptr, cy, ac, ov, user_flags, bank
     cdef readonly long long cycles, start, at
@@ -34,7 +34,6 @@ cdef class Chip:
     cdef public int highest_sp
     cdef readonly int stack_floor, stack_end
 
-    cdef void clear(self) noexcept
     cpdef int psw(self) noexcept
     cdef void write_psw(self, int value) noexcept
     @cython.locals(address=int, first=int, end=int)

@@ -46,6 +46,7 @@ REACHED, STOPPED, BREAKPOINT, WIRE_FULL, ASLEEP, REPLAN = range(6)
 _STOP_REQUESTED, _REPLAN = STOPPED, REPLAN
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
+_LINE = list(LINE)
 _P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
@@ -90,19 +91,12 @@ class Chip:
         "peripherals": Peripherals,
     }
     NOT_STATE: tuple[str, ...] = (
-        "bus",
-        "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
-        "lines",
-        "line_of",
-        "stack_floor",  # where the image's map says that the stack is
-        "stack_end",
-        "at",
-        "start",  # the instruction in progress: snapshots are taken between two
-        "limit",
-        "until",
-        "stop",
+        *("rom", "lines"),  # the image: constant, unless code lies in RAM, whose owner then restores it
+        *("stack_floor", "stack_end"),  # where the image's map says that the stack is
+        *("at", "start"),  # the instruction in progress: snapshots are taken between two
         *("edges", "edge_mask", "edge_before", "edge_outer", "edge_depth", "highest_sp"),  # what was seen
-        *("inspector", "main_loop_limit", "next_event", "next_mark", "rxd", "stop_asleep", "txd"),
+        *("bus", "rxd", "txd", "inspector", "main_loop_limit", "stop_asleep"),
+        *("limit", "until", "stop", "next_event", "next_mark"),
     )
 
     def __init__(self, bus: Bus | None = None) -> None:
@@ -112,7 +106,6 @@ class Chip:
         self.txd = self.peripherals.uart.txd
         self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
         self.lines = [0] * 65536  # per address: `line_at`, or a special line
-        self.line_of = list(LINE)
         self.iram = bytearray(256)
         self.cycles = 0  # machine cycles since power-on; during an instruction: its end
         self.start = 0  # first cycle of the instruction in progress
@@ -139,15 +132,6 @@ class Chip:
         self.inspector: CpuInspector | None = None
         self._erase()
         self.reset()
-
-    def clear(self) -> None:
-        """Registers and PC as after reset."""
-        self.pc = 0  # while instructions are executed: as of the last `boundary`
-        self.a = 0
-        self.b = 0
-        self.sp = 7
-        self.dptr = 0
-        self.write_psw(0)
 
     def psw(self) -> int:
         """P is the parity of ACC, whatever was written."""
@@ -196,7 +180,7 @@ class Chip:
 
     def line_at(self, address: int) -> int:
         """Row and cycles of the opcode at `address` and, in the upper half, the address after its instruction."""
-        line = self.line_of[self.rom[address]]
+        line = _LINE[self.rom[address]]
         return line & 0x07FF | ((address + (line >> 13)) & 0xFFFF) << 16
 
     def write_code(self, address: int, value: int) -> None:
@@ -222,9 +206,13 @@ class Chip:
 
     def reset(self) -> None:
         """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
-        now = self.cycles
-        self.peripherals.clear(now)
-        self.clear()
+        self.peripherals.clear(self.cycles)
+        self.pc = 0  # while instructions are executed: as of the last `boundary`
+        self.a = 0
+        self.b = 0
+        self.sp = 7
+        self.dptr = 0
+        self.write_psw(0)
         self.pcon = 0
         self.idle = 0
         self.powered_down = 0
@@ -391,8 +379,7 @@ class Chip:
 
     def before_save(self) -> None:
         """Brings the peripherals up to where the core is. Marks count only while interrupts hold the CPU."""
-        self.peripherals.sync(self.cycles)
-        self.peripherals.settle()
+        self.peripherals.settle(self.cycles)
         self.peripherals.timers.store()
         if not self._taken_over():
             self.marks = 0

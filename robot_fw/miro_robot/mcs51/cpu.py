@@ -84,8 +84,7 @@ class Cpu(Chip):
 
     def end_run(self) -> None:
         """TXD is final up to now; RXD before it is no longer needed."""
-        self.peripherals.sync(self.cycles)
-        self.peripherals.settle()
+        self.peripherals.settle(self.cycles)
         now = 12 * self.cycles
         if self.txd.settled_tick < now:
             self.txd.settled_tick = now
@@ -146,13 +145,13 @@ class Cpu(Chip):
             if self.lines[self.pc] & _MARK:
                 self.stop = _BREAKPOINT
         elif self.stop_asleep:
-            self.peripherals.settle()
+            self.peripherals.settle(now)
             if self.asleep():
                 self.stop = _ASLEEP
 
     def _look_for_sleep(self, now: int) -> None:
         """Looks up again when less may be known of what ends idle mode: then nothing may be left."""
-        self.peripherals.settle()
+        self.peripherals.settle(now)
         turn = self.peripherals.serial_turn()
         if self.next_event >= NEVER_TICK:
             self.next_event = now + 1

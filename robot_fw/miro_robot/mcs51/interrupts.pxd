@@ -12,6 +12,7 @@ cdef class Interrupts:
     cpdef void clear(self) noexcept
     cpdef void ask(self, int source, long long cycle) noexcept
     cpdef void withdraw(self, int source, long long cycle) noexcept
+    cdef void follow(self, int source, int flag, long long cycle) noexcept
     cdef inline int enabled(self) noexcept
     cdef inline int open(self) noexcept
     cpdef int choose(self, long long boundary) noexcept

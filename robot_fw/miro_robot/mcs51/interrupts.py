@@ -64,6 +64,13 @@ class Interrupts:
         if self.until[source] == NEVER_TICK:
             self.until[source] = cycle
 
+    def follow(self, source: int, flag: int, cycle: int) -> None:
+        """The source's flag was written: up unless 0."""
+        if flag:
+            self.ask(source, cycle)
+        else:
+            self.withdraw(source, cycle)
+
     def enabled(self) -> int:
         """Sources that IE lets interrupt, a bit each."""
         return self.ie if self.ie & 0x80 else 0
@@ -148,10 +155,8 @@ class ExternalInterrupts:
         for number in range(2):
             if (value >> (2 * number)) & 1 == 0:
                 self._follow(number, cycle)
-            elif (value >> (2 * number)) & 2:
-                self.interrupts.ask(2 * number, cycle)
             else:
-                self.interrupts.withdraw(2 * number, cycle)
+                self.interrupts.follow(2 * number, value >> (2 * number) & 2, cycle)
 
     def taken(self, number: int, cycle: int) -> None:
         """The CPU vectors: an edge flag is cleared, a level flag stays."""
@@ -160,10 +165,6 @@ class ExternalInterrupts:
             self.interrupts.withdraw(2 * number, cycle)
 
     def _follow(self, number: int, cycle: int) -> None:
-        flag = 2 << (2 * number)
-        if (self.levels >> number) & 1:
-            self.control &= 0x0F ^ flag
-            self.interrupts.withdraw(2 * number, cycle)
-        else:
-            self.control |= flag
-            self.interrupts.ask(2 * number, cycle)
+        low = (self.levels >> number & 1) ^ 1
+        self.control = self.control & (0x0F ^ (2 << (2 * number))) | low << (2 * number + 1)
+        self.interrupts.follow(2 * number, low, cycle)

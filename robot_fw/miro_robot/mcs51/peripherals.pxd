@@ -9,15 +9,10 @@ from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
 cdef long long NEVER_TICK
-cdef int _UNIMPLEMENTED, _P0
-cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1
-cdef int _SCON, _SBUF, _IE, _IP
-cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
-cdef int _TF2, _RCLK, _TCLK
-cdef int _S5P2
-cdef int _SERIAL, _TIMER2, _BOTH_TIMERS
-cdef int _REN, _SETTINGS, _RI_TI
 cdef long long _NO_PERIOD, STOPPED_TICK
+cdef int _P0, _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1, _SCON, _SBUF, _IE, _IP
+cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2, _RCLK, _TCLK, _UNIMPLEMENTED
+cdef int _S5P2, _SERIAL, _TIMER2, _BOTH_TIMERS, _REN, _SETTINGS, _RI_TI
 
 @cython.final
 cdef class Peripherals:
@@ -45,7 +40,7 @@ cdef class Peripherals:
     cdef int _catch_up(self, long long cycle) except -1
     cdef inline void _note_quiet(self) noexcept
     cpdef void look_again(self) noexcept
-    cpdef int settle(self) except -1
+    cpdef int settle(self, long long cycle) except -1
     cdef int _settle_serial(self) except -1
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int)
@@ -60,7 +55,6 @@ cdef class Peripherals:
     cdef int apply_pushes(self, long long now) except -1
     cdef int sample_pins(self, long long cycle) except -1
     cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
-    cdef int _external_pin(self, int number, int level, long long cycle) except -1
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cdef int _read_rarely(self, int address, long long cycle) noexcept

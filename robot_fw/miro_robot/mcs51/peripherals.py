@@ -32,7 +32,7 @@ _P0 = 0x80
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
 _SCON, _SBUF, _IE, _IP = 0x98, 0x99, 0xA8, 0xB8
 _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD
-_TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
+_RCLK, _TCLK = 0x20, 0x10
 _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2, _BOTH_TIMERS = 0x10, 0x20, 0x0A  # in IE
 _REN, _SETTINGS, _RI_TI = 0x10, 0xF0, 0x03  # in SCON
@@ -80,8 +80,7 @@ class Peripherals:
 
     def clear(self, cycle: int) -> None:
         """Reset: all registers but the port latches, which `Cpu` writes."""
-        self.sync(cycle)
-        self.settle()
+        self.settle(cycle)
         self.frozen = 0
         self.now = cycle
         self.smod = 0
@@ -99,8 +98,7 @@ class Peripherals:
 
     def freeze(self, cycle: int) -> None:
         """Nothing happens from `cycle` on, until `clear`."""
-        self.sync(cycle)
-        self.settle()
+        self.settle(cycle)
         self.frozen = 1
 
     # Time
@@ -141,8 +139,9 @@ class Peripherals:
         if self.timer2.sleeps and not self.pulsed:
             self.quiet = min(self.serial_wait // 12, self.timer_wait, self.ports.next_cycle)
 
-    def settle(self) -> None:
-        """Brings timers and serial port up to where the rest is."""
+    def settle(self, cycle: int) -> None:
+        """As `sync`, and brings timers and serial port up to there."""
+        self.sync(cycle)
         if not self.frozen and not self.pulsed:
             self.timers.sync(self.now)
             self.timer2.sync(self.now)
@@ -195,7 +194,7 @@ class Peripherals:
             event = min(event, self.timer2.next_flag() + 2)
         if self.interrupts.enabled() & _SERIAL:
             if self.serial_wait < 0:
-                self.settle()
+                self.settle(self.now)
             if self.serial_wait < STOPPED_TICK:
                 event = min(event, (self.serial_wait + 2) // 12 + 2)
         return event
@@ -211,7 +210,7 @@ class Peripherals:
 
     def clock_serial(self) -> None:
         """Works out the serial port's 16x ticks again, after anything that they depend on has changed."""
-        self.settle()
+        self.settle(self.now)
         self._set_serial_clock()
 
     def _set_serial_clock(self) -> None:
@@ -284,27 +283,20 @@ class Peripherals:
     def _inputs_changed(self, changed1: int, changed3: int, cycle: int) -> None:
         p1 = self.p1
         p3 = self.p3
-        self.sync(cycle)
-        self.settle()
+        self.settle(cycle)
         for number in range(2):
             if (changed3 >> (2 + number)) & 1:
-                self._external_pin(number, (p3 >> (2 + number)) & 1, cycle)
+                self.external.sample(number, (p3 >> (2 + number)) & 1, cycle)
+                self.settle(cycle + 1)
+                self.timers.set_gates(self.external.levels)  # a gate acts on the cycle after the sample
             if (changed3 >> (4 + number)) & 1 and not (p3 >> (4 + number)) & 1:
                 self.timers.fall(number, cycle)
         if changed1 & 1 and not p1 & 1:
             self.timer2.fall(cycle)
         if changed1 & 2:
-            self.sync(cycle + 1)
-            self.settle()
+            self.settle(cycle + 1)
             self.timer2.sample_external((p1 >> 1) & 1)
         self.clock_serial()
-
-    def _external_pin(self, number: int, level: int, cycle: int) -> None:
-        """INT0, INT1: the interrupt sees the sample itself, a gate acts on the cycle after it."""
-        self.external.sample(number, level, cycle)
-        self.sync(cycle + 1)
-        self.settle()
-        self.timers.set_gates((self.timers.gates & (3 ^ (1 << number))) | (level << number))
 
     def pin_levels(self, port: int, cycle: int) -> int:
         """The pins of a port at S5P2 of `cycle`, alternate outputs included."""
@@ -312,13 +304,11 @@ class Peripherals:
         if port == 3:
             tick = 12 * cycle + _S5P2
             self.p3_reads += 1
-            self.sync(cycle + 1)
-            self.settle()
+            self.settle(cycle + 1)
             rxd = self.uart.level(tick) & self.shift.data.level_at(tick)
             levels &= 0xFC | rxd | (self.uart.tx_level << 1)
         elif port == 1 and self.timer2.drives_pin():
-            self.sync(cycle + 1)
-            self.settle()
+            self.settle(cycle + 1)
             levels &= 0xFE | self.timer2.clock_out
         return levels
 
@@ -384,7 +374,7 @@ class Peripherals:
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
         else:
-            self.settle()
+            self.settle(cycle)
             self.write_serial(address, value, cycle)
             self.clock_serial()
         return 1
@@ -392,7 +382,7 @@ class Peripherals:
     def _write_timer(self, address: int, value: int, cycle: int) -> int:
         """A register of timers 0 and 1. 0 if no event comes sooner by it."""
         if not self.timer1_free:
-            self.settle()
+            self.settle(cycle)
         self.timers.sync(cycle)
         sooner = 0
         if address == _TCON:
@@ -430,9 +420,9 @@ class Peripherals:
             else:
                 self.uart.write_sbuf(value)
         elif address == _T2CON:
-            self.timer2.write_control(value, cycle)
+            self.timer2.write(value, self.timer2.t2mod, cycle)
         elif address == _T2MOD:
-            self.timer2.write_mode(value, cycle)
+            self.timer2.write(self.timer2.control, value, cycle)
         elif address in (_RCAP2L, _RCAP2H):
             shift = 8 * (address - _RCAP2L)
             self.timer2.capture = self.timer2.capture & 0xFF00 >> shift | value << shift
@@ -448,15 +438,13 @@ class Peripherals:
         return 16 * period if self.uart.rx_next <= 12 * self.now + period else 0
 
     def write_smod(self, smod: int, cycle: int) -> None:
-        self.sync(cycle)
-        self.settle()
+        self.settle(cycle)
         self.smod = smod
         self.clock_serial()
 
     def write_p3(self, value: int, cycle: int) -> None:
         """The latch of P3 is about to change: what of it concerns the serial port."""
-        self.sync(cycle)
-        self.settle()
+        self.settle(cycle)
         self.uart.write_latch(value & 3, 12 * cycle)
         self.look_again()
 

@@ -3,10 +3,8 @@ cimport cython
 from miro_robot.mcs51.line cimport Line
 from miro_robot.mcs51.uart cimport Uart
 
-cdef int _REN, _TI, _RI
+cdef int _REN, _TI, _RI, _SAMPLE, _CLOCK_FALLS, _CLOCK_RISES
 cdef long long NEVER_TICK
-cdef int _SAMPLE
-cdef int _CLOCK_FALLS, _CLOCK_RISES
 
 @cython.final
 cdef class Shift:

@@ -3,10 +3,8 @@ cimport cython
 from miro_robot.mcs51.interrupts cimport Interrupts
 
 cdef long long NEVER_TICK, _NONE
-cdef int _TIMER2
+cdef int _TIMER2, _FELL, _STATES, _T2OE, _DCEN
 cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2
-cdef int _T2OE, _DCEN
-cdef int _FELL, _STATES
 
 @cython.final
 cdef class Timer2:
@@ -40,6 +38,4 @@ cdef class Timer2:
     cpdef int falls(self) noexcept
     cdef void _note_sleep(self) noexcept
     cdef void _external(self, long long cycle) noexcept
-    cpdef void write_control(self, int value, long long cycle) noexcept
-    cpdef void write_mode(self, int value, long long cycle) noexcept
-    cdef void _ask_or_withdraw(self, long long cycle) noexcept
+    cdef void write(self, int control, int t2mod, long long cycle) noexcept

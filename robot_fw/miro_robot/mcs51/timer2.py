@@ -189,24 +189,12 @@ class Timer2:
         self.control |= _EXF2
         self.interrupts.ask(_TIMER2, cycle)
 
-    def write_control(self, value: int, cycle: int) -> None:
-        """T2CON is written; `cycle` is the first to see it."""
-        self.control = value
+    def write(self, control: int, t2mod: int, cycle: int) -> None:
+        """T2CON or T2MOD is written, whose DCEN decides whether EXF2 interrupts; `cycle` is the first to see it."""
+        self.control = control
+        self.t2mod = t2mod & 0x03
         self._note_sleep()
-        self._ask_or_withdraw(cycle)
-
-    def write_mode(self, value: int, cycle: int) -> None:
-        """T2MOD is written: DCEN decides whether EXF2 interrupts."""
-        self.t2mod = value & 0x03
-        self._note_sleep()
-        self._ask_or_withdraw(cycle)
-
-    def _ask_or_withdraw(self, cycle: int) -> None:
-        flags = _TF2 if self.up_down() else _TF2 | _EXF2
-        if self.control & flags:
-            self.interrupts.ask(_TIMER2, cycle)
-        else:
-            self.interrupts.withdraw(_TIMER2, cycle)
+        self.interrupts.follow(_TIMER2, control & (_TF2 if self.up_down() else _TF2 | _EXF2), cycle)
 
     def after_load(self) -> None:
         self._note_sleep()

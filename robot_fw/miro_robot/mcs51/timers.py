@@ -227,10 +227,7 @@ class Timers:
         if changed & (_TF0 | _TF1):
             started |= changed & (_TF0 | _TF1)
             for timer in range(2):
-                if value & (_TF0 << (2 * timer)):
-                    self.interrupts.ask(1 + 2 * timer, cycle)
-                else:
-                    self.interrupts.withdraw(1 + 2 * timer, cycle)
+                self.interrupts.follow(1 + 2 * timer, value & (_TF0 << (2 * timer)), cycle)
         if self.mode(0) == 3:
             return _TIMER0 | _TIMER1
         return (_TIMER0 if started & (_TR0 | _TF0) else 0) | (_TIMER1 if started & (_TR1 | _TF1) else 0)

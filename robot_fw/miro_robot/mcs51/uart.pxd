@@ -5,10 +5,8 @@ from miro_robot.mcs51.interrupts cimport Interrupts
 from miro_robot.mcs51.line cimport Line
 
 cdef long long NEVER_TICK, _STOPPED, _STOPPED_PERIOD
-cdef int _SERIAL
-cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
-cdef int _ROLLOVERS, _COUNTER_BITS
-cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_BIT, _LAST_ACTION
+cdef int _SERIAL, _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
+cdef int _ROLLOVERS, _COUNTER_BITS, _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_BIT, _LAST_ACTION
 
 cdef long long _flag_tick(long long tick) noexcept
 

@@ -147,10 +147,7 @@ class Uart:
         if (value ^ self.scon) & (_SM0 | _SM1):
             self.abort(12 * cycle)
         self.scon = value
-        if self.scon & (_RI | _TI):
-            self.interrupts.ask(_SERIAL, cycle)
-        else:
-            self.interrupts.withdraw(_SERIAL, cycle)
+        self.interrupts.follow(_SERIAL, value & (_RI | _TI), cycle)
 
     def write_sbuf(self, value: int) -> None:
         """Loads the transmitter; a character on its way is cut off, the new one begins at the next rollover (U4)."""
