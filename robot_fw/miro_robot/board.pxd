@@ -8,7 +8,7 @@ from miro_robot.plant cimport Plant
 from miro_robot.probe cimport Probe
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
-cdef int _CS, _BOTH_STROBES, _RST, _CHIP_PINS, _ALL_PINS, _BOTH_RST, _WR, _RD, _BEHIND_TICKS
+cdef int _CS, _BOTH_STROBES, _CHIP_PINS, _ALL_PINS, _BOTH_RST, _WR, _RD, _BEHIND_TICKS
 cdef int RESET_PULSE, PORTS, FAULT, REACHED, RECEIVED, SENT, REPLAN
 cdef long long CYCLE_TICKS, RESET_PULSE_TICKS, NEVER_TICK
 
@@ -86,7 +86,5 @@ cdef class Board(Bus):
     cdef inline int _note_timing(self, int left, int right, long long tick) except -1
     @cython.final
     cdef int _reset_chips(self, int left, int right, long long tick) except -1
-    @cython.final
-    cdef inline bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
     cdef int _timing_fault(self, int limit, long long ticks, long long tick) except -1
     cdef int _note(self, int kind, int pc, long long tick, detail) except -1

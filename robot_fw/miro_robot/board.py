@@ -42,7 +42,7 @@ _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
 the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to its latch: rule X2."""
 _WR, _RD = 0x40, 0x80  # pins of P3
 # Inputs of an LM629 as bits, in the order of CHIP_INPUTS; those of both chips: the left one's, then the right one's.
-_CS, _BOTH_STROBES, _RST = 0x01, 0x06, 0x10
+_CS, _BOTH_STROBES = 0x01, 0x06
 _CHIP_PINS, _ALL_PINS, _BOTH_RST = 5, 0x1F, 0x210
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
@@ -334,8 +334,8 @@ class Board(Bus):
         data = self.bank[self.data_bank]
         self.left.port.ps, self.left.port.data = left, data
         self.right.port.ps, self.right.port.data = right, data
-        broken = self.left_timing.left_alone(tick, left, data)
-        self._note_timing(broken, self.right_timing.left_alone(tick, right, data), tick)
+        broken = self.left_timing.pins(tick, 1, 1, 1, left, data)
+        self._note_timing(broken, self.right_timing.pins(tick, 1, 1, 1, right, data), tick)
         return True
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
@@ -458,17 +458,16 @@ class Board(Bus):
             self._timing_fault(right, self.right_timing.ticks, tick)
 
     def _reset_chips(self, left: int, right: int, tick: int) -> None:
-        """/RST of a chip has another level."""
-        if self._reset_is_short(self.left, left & _RST, tick):
-            self._timing_fault(RESET_PULSE, tick - self.left.reset_tick, tick)
-        elif self._reset_is_short(self.right, right & _RST, tick):
-            self._timing_fault(RESET_PULSE, tick - self.right.reset_tick, tick)
+        """/RST of a chip has another level: rising less than 8 LM629 clocks after it fell is a fault, one for both."""
+        pulses = [
+            tick - chip.reset_tick
+            for chip, level in ((self.left, left >> 4), (self.right, right >> 4))
+            if level > chip.reset_level and tick - chip.reset_tick < RESET_PULSE_TICKS
+        ]
+        if pulses:
+            self._timing_fault(RESET_PULSE, pulses[0], tick)
         self.left.set_reset(tick, left >> 4)
         self.right.set_reset(tick, right >> 4)
-
-    def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:
-        """/RST rises, less than 8 LM629 clocks after it fell."""
-        return level != 0 and chip.reset_level == 0 and tick - chip.reset_tick < RESET_PULSE_TICKS
 
     def _timing_fault(self, limit: int, ticks: int, tick: int) -> None:
         self._note(FaultKind.LM629_TIMING, self.cpu.at, tick, LIMITS[limit].breach(ticks))

@@ -7,14 +7,13 @@ cdef long long _LONG_AGO
 @cython.final
 cdef class BusTiming:
     cdef int least[9]
-    cdef int writing, reading, ps, data
+    cdef int writing, reading, ps, data, broken
     cdef public long long ticks
     cdef long long begin_tick, end_tick, written_tick, ps_tick, data_tick
 
     cpdef void rest(self, int writing, int reading, int ps, int data) noexcept
     @cython.locals(moved=cython.int)
     cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data) noexcept
-    cdef int left_alone(self, long long tick, int ps, int data) noexcept
     cpdef int sampled(self, long long tick) noexcept
-    cdef int _ends(self, long long tick) noexcept
-    cdef inline int _short(self, int limit, long long ticks) noexcept
+    cdef void _strobe_ends(self, long long tick) noexcept
+    cdef inline void _require(self, int limit, long long ticks) noexcept

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import msgspec
 
-NONE, READ_ACCESS, WRITE_PULSE, DATA_SETUP, DATA_HOLD, PS_SETUP, PS_HOLD, RECOVERY, RESET_PULSE = range(9)
-
-_NONE, _READ_ACCESS, _WRITE_PULSE, _DATA_SETUP, _DATA_HOLD, _PS_SETUP, _PS_HOLD, _RECOVERY = range(8)
+_NONE, _READ_ACCESS, _WRITE_PULSE, _DATA_SETUP, _DATA_HOLD = 0, 1, 2, 3, 4
+_PS_SETUP, _PS_HOLD, _RECOVERY, RESET_PULSE = 5, 6, 7, 8
 _LONG_AGO = -(1 << 40)
 
 
@@ -65,6 +64,7 @@ class BusTiming:
     def __init__(self) -> None:
         self.least = [limit.ticks for limit in LIMITS]
         self.ticks = 0
+        self.broken = _NONE
         self.rest(0, 0, 1, 0xFF)
 
     def rest(self, writing: int, reading: int, ps: int, data: int) -> None:
@@ -80,61 +80,45 @@ class BusTiming:
         self.data_tick = _LONG_AGO
 
     def pins(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> int:
-        """Levels from `tick` on. Returns the first limit that this breaks, or NONE."""
+        """Levels from `tick` on. Returns the place in LIMITS of the first that this breaks, or 0."""
         writing = 1 if cs == 0 and wr == 0 else 0
         reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
-        if not (writing or reading or self.writing or self.reading):
-            return self.left_alone(tick, ps, data)
-        broken = _NONE
+        self.broken = _NONE
         moved = writing != self.writing or reading != self.reading
         if moved and (self.writing or self.reading):
-            broken = self._ends(tick)
+            self._strobe_ends(tick)
         if ps != self.ps:
-            within = self.writing or self.reading
-            broken = broken or self._short(_PS_HOLD, 0 if within else tick - self.end_tick)
-            self.ps_tick = tick
-        if data != self.data:
-            broken = broken or self._short(_DATA_HOLD, tick - self.written_tick)
-            self.data_tick = tick
-        if moved and (writing or reading):
-            broken = broken or self._short(_RECOVERY, tick - self.end_tick)
-            broken = broken or self._short(_PS_SETUP, tick - self.ps_tick)
-            self.begin_tick = tick
-        self.writing = writing
-        self.reading = reading
-        self.ps = ps
-        self.data = data
-        return broken
-
-    def left_alone(self, tick: int, ps: int, data: int) -> int:
-        """As `pins`, where no strobe is on its way and none begins."""
-        broken = _NONE
-        if ps != self.ps:
-            broken = self._short(_PS_HOLD, tick - self.end_tick)
+            self._require(_PS_HOLD, 0 if self.writing or self.reading else tick - self.end_tick)
             self.ps = ps
             self.ps_tick = tick
         if data != self.data:
-            broken = broken or self._short(_DATA_HOLD, tick - self.written_tick)
+            self._require(_DATA_HOLD, tick - self.written_tick)
             self.data = data
             self.data_tick = tick
-        return broken
+        if moved and (writing or reading):
+            self._require(_RECOVERY, tick - self.end_tick)
+            self._require(_PS_SETUP, tick - self.ps_tick)
+            self.begin_tick = tick
+        self.writing = writing
+        self.reading = reading
+        return self.broken
 
     def sampled(self, tick: int) -> int:
-        """The CPU takes what this chip drives at `tick`. Returns READ_ACCESS if that is too early, or NONE."""
-        return self._short(_READ_ACCESS, tick - self.begin_tick) if self.reading else _NONE
+        """The CPU takes what this chip drives at `tick`. Returns the place of a limit as `pins` does."""
+        self.broken = _NONE
+        if self.reading:
+            self._require(_READ_ACCESS, tick - self.begin_tick)
+        return self.broken
 
-    def _ends(self, tick: int) -> int:
-        """The strobe in progress is over."""
-        broken = _NONE
+    def _strobe_ends(self, tick: int) -> None:
         if self.writing:
-            broken = self._short(_WRITE_PULSE, tick - self.begin_tick)
-            broken = broken or self._short(_DATA_SETUP, tick - self.data_tick)
+            self._require(_WRITE_PULSE, tick - self.begin_tick)
+            self._require(_DATA_SETUP, tick - self.data_tick)
             self.written_tick = tick
         self.end_tick = tick
-        return broken
 
-    def _short(self, limit: int, ticks: int) -> int:
-        if ticks >= self.least[limit]:
-            return _NONE
-        self.ticks = ticks
-        return limit
+    def _require(self, limit: int, ticks: int) -> None:
+        """Notes the limit if it is the first that is broken."""
+        if ticks < self.least[limit] and self.broken == _NONE:
+            self.broken = limit
+            self.ticks = ticks

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE, disassemble
-from miro_robot.mcs51.vectors import REGISTERS, State, Vector, VectorRunner, table_address
+from miro_robot.mcs51.vectors import MOVC, MOVX, PORTS, REGISTERS, State, Vector, VectorRunner, table_address
 
 Draw = Callable[[int], int]
 
 _P0, _SP, _DPL, _DPH, _PCON, _TCON, _TMOD, _P1 = 0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89, 0x90
 _SCON, _P2, _IE, _P3, _IP, _T2CON, _PSW, _ACC, _B = 0x98, 0xA0, 0xA8, 0xB0, 0xB8, 0xC8, 0xD0, 0xE0, 0xF0
-_PORTS = (_P0, _P1, _P2, _P3)
 _ALWAYS = (_P0, _SP, _DPL, _DPH, _P1, _P2, _P3, _PSW, _ACC, _B)
 _HIGH = {_P0: 0x00, _P1: 0x03, _P2: 0x00, _P3: 0x3D}  # pins with a second function rest high
 _MAY = {  # bits of the other registers that may be set while everything rests; default: all
@@ -27,8 +26,6 @@ _MAY = {  # bits of the other registers that may be set while everything rests; 
     _T2CON: 0xF3,
 }
 _OPERANDS = {row[0]: row[4].split(",") for row in TABLE}
-_MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
-_MOVC = (0x83, 0x93)
 _CALLS = (0x11, 0x12)  # rows
 _RETURNS = (0x22, 0x32)
 _PUSH, _POP = 0xC0, 0xD0
@@ -66,12 +63,12 @@ class _Drawing:
             pins=sorted(self.pins.items()),
             code=sorted(((pc + offset) & 0xFFFF, value) for offset, value in enumerate(code)),
         )
-        return state if self.opcode not in _MOVC else self._with_table(state)
+        return state if self.opcode not in MOVC else self._with_table(state)
 
     def _core(self) -> None:
         for address in _ALWAYS:
             self.sfr[address] = self.draw(256) | _HIGH.get(address, 0)
-        if self.opcode in _MOVX:
+        if self.opcode in MOVX:
             self.sfr[_P3] |= 0xC0  # else there are no strobes
         if self.draw(8) == 0:
             self.sfr[_B] = 0
@@ -113,7 +110,7 @@ class _Drawing:
         return self._special(addressable[self.draw(len(addressable))]) | self.draw(8)
 
     def _special(self, address: int) -> int:
-        if address in _PORTS:
+        if address in PORTS:
             self.pins[address] = self.draw(256) | _HIGH[address]
         elif address not in self.sfr:
             value = self.draw(256) & _MAY.get(address, 0xFF)
@@ -145,11 +142,11 @@ class _Drawing:
         elif "@Ri" in self.operands:
             pointer = bank + (self.opcode & 1)
             address = self._byte(pointer)
-            if self.opcode not in _MOVX and address != pointer:
+            if self.opcode not in MOVX and address != pointer:
                 self._byte(address)
 
     def _external(self) -> None:
-        if self.opcode in _MOVX:
+        if self.opcode in MOVX:
             if self.opcode in (0xE0, 0xF0):
                 address = self.sfr[_DPH] << 8 | self.sfr[_DPL]
             else:

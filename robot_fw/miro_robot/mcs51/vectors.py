@@ -16,12 +16,12 @@ Cells = list[tuple[int, int]]  # (address, value), ascending
 Access = tuple[int, int, str]  # (address, value, kind)
 
 FETCH, DISCARD, TABLE, READ, WRITE, LATCH = "fetch", "discard", "table", "read", "write", "latch"
-_MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
-_MOVC = (0x83, 0x93)
+MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
+MOVC = (0x83, 0x93)
 _SLOTS = 2  # program fetches in a machine cycle, at S1 and S4 (4316E section 2.4)
-_PORTS = (0x80, 0x90, 0xA0, 0xB0)
+PORTS = (0x80, 0x90, 0xA0, 0xB0)
 _ACC = 0xE0
-RESET = {0x81: 0x07, **dict.fromkeys(_PORTS, 255)}  # the other registers: 00
+RESET = {0x81: 0x07, **dict.fromkeys(PORTS, 255)}  # the other registers: 00
 REGISTERS = (
     *(0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D, 0x90, 0x98, 0xA0, 0xA8, 0xB0, 0xB8),
     *(0xC8, 0xCA, 0xCB, 0xCC, 0xCD, 0xD0, 0xE0, 0xF0),
@@ -82,7 +82,7 @@ class _VectorBus(Bus):
         self.accesses.append((address, value, WRITE))
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
-        self.latches.append((_PORTS[port], latch, LATCH))
+        self.latches.append((PORTS[port], latch, LATCH))
 
 
 class VectorRunner:
@@ -118,7 +118,13 @@ class VectorRunner:
             iram=[(address, iram[address]) for address, _ in initial.iram],
             xram=sorted(self.bus.memory.items()),
         )
-        return final, self._cycles(initial)
+        cycles = fetches(
+            initial
+        )  # by rule; then external memory in the second cycle, then latches in the last
+        if self.bus.accesses:
+            cycles[1] += self.bus.accesses
+        cycles[-1] += self.bus.latches
+        return final, cycles
 
     def prepare(self, state: State) -> None:
         """Registers are written by instructions, ACC last; then PC is set."""
@@ -128,7 +134,7 @@ class VectorRunner:
         for address in range(256):
             cpu.poke_iram(address, content.get(address, 0))
         pins = dict(state.pins)
-        for number, port in enumerate(_PORTS):
+        for number, port in enumerate(PORTS):
             cpu.set_external(number, pins.get(port, 0xFF), 12 * cpu.cycles)
         for address, value in sorted(state.sfr, key=lambda cell: cell[0] == _ACC):
             self._execute(bytes((0x75, address, value)))
@@ -147,14 +153,6 @@ class VectorRunner:
     def _registers(self) -> dict[int, int]:
         return {address: self.cpu.sfr(address) for address in REGISTERS}
 
-    def _cycles(self, initial: State) -> list[list[Access]]:
-        """Fetches by rule, then external memory in the second cycle, then latches in the last."""
-        cycles = fetches(initial)
-        if self.bus.accesses:
-            cycles[1] += self.bus.accesses
-        cycles[-1] += self.bus.latches
-        return cycles
-
 
 def fetches(state: State) -> list[list[Access]]:
     """The program fetches of each machine cycle: two, at S1 and S4; those not needed are repeated at the byte
@@ -169,10 +167,10 @@ def fetches(state: State) -> list[list[Access]]:
     for offset in range(LENGTH[opcode]):
         address = (state.pc + offset) & 0xFFFF
         accesses[offset] = (address, code[address], FETCH)
-    if opcode in _MOVC:
+    if opcode in MOVC:
         address = table_address(state)
         accesses[_SLOTS] = (address, code[address], TABLE)
-    elif opcode in _MOVX:
+    elif opcode in MOVX:
         return [accesses[:_SLOTS], []]
     return [accesses[first : first + _SLOTS] for first in range(0, slots, _SLOTS)]
 
