@@ -1,5 +1,6 @@
 # C types of miro_exact.dmath.
 cimport cython
+from libc cimport math
 
 cdef double _INV_PIO2, _PIO2_1, _PIO2_1T, _PIO2_2, _PIO2_2T, _PIO2_3, _PIO2_3T, _TWO_PI_1, _TWO_PI_2
 cdef double _TWO_PI_2T, _S1, _S2, _S3, _S4, _S5, _S6, _C1, _C2, _C3, _C4, _C5, _C6, _A0, _A1, _A2, _A3, _A4
@@ -20,6 +21,5 @@ cpdef double exp(double x) except? -7.5
 @cython.locals(k=cython.int)
 cdef double exp_within(double x) noexcept
 cdef double _scaled(double y, int k) noexcept
-cdef double _power_of_two(int k) noexcept
 cpdef double log(double x) except? -7.5
 cdef double log_within(double x) noexcept

@@ -4,7 +4,7 @@
 
 The method is that of fdlibm (Sun Microsystems 1993): reduce the argument by a split constant, evaluate a
 polynomial on the small interval, carry the low part of the reduced argument. Coefficients are fdlibm's
-published ones. Bit tricks are replaced by comparisons and by products with powers of two, which are exact.
+published ones. Bit tricks are replaced by comparisons and by products with powers of two, which are exact (`ldexp`).
 """
 
 import math
@@ -272,28 +272,10 @@ def exp_within(x: float) -> float:
 def _scaled(y: float, k: int) -> float:
     """y * 2**k for y near 1, rounded once: only the last product can be subnormal."""
     if k < -960:
-        return y * _power_of_two(k + 960) * 1.0261342003245941e-289  # 2**-960
+        return y * math.ldexp(1.0, k + 960) * 1.0261342003245941e-289  # 2**-960
     if k > 960:
-        return y * _power_of_two(k - 960) * 9.7453140114e288  # 2**960
-    return y * _power_of_two(k)
-
-
-def _power_of_two(k: int) -> float:
-    """2**k, exact, for |k| <= 960."""
-    power = 1.0
-    while k <= -16:
-        power = power * 1.52587890625e-05
-        k += 16
-    while k < 0:
-        power = power * 0.5
-        k += 1
-    while k >= 16:
-        power = power * 65536.0
-        k -= 16
-    while k > 0:
-        power = power * 2.0
-        k -= 1
-    return power
+        return y * math.ldexp(1.0, k - 960) * 9.7453140114e288  # 2**960
+    return y * math.ldexp(1.0, k)
 
 
 def log(x: float) -> float:
