@@ -17,8 +17,6 @@ POLYNOMIAL = 0x5935
 POLYNOMIAL_REFLECTED = int(f"{POLYNOMIAL:016b}"[::-1], 2)
 INITIAL = 0xFFFF
 XOR_OUT = 0xFFFF
-CHECK_TEXT = b"123456789"
-CHECK_VALUE = 0xCD72
 
 # crcmod states its start value after the final XOR: 0 here is a register of FFFFh.
 _crc = cast("Callable[..., int]", mkCrcFun(0x10000 | POLYNOMIAL, initCrc=0, rev=True, xorOut=XOR_OUT))

@@ -12,11 +12,9 @@ Written by hand: three kinds of block (draft-ietf-opsawg-pcapng, section 4) are 
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterable, Iterator
 
-from miro_exact.inputs import replace_file
 from miro_protocol.table import TICKS_PER_MS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission
 
@@ -41,11 +39,6 @@ MAX_DATA = 0x40000 - RTAC.size  # Wireshark refuses packets of more than 262 144
 def render(packets: Iterable[Transmission]) -> bytes:
     """The whole file; ValueError naming field, value and limits when a packet cannot be written."""
     return b"".join(blocks(packets))
-
-
-def write(path: str | os.PathLike[str], packets: Iterable[Transmission]) -> None:
-    """Writes the whole file or none; OSError when it cannot be written."""
-    replace_file(path, render(packets))
 
 
 def blocks(packets: Iterable[Transmission]) -> Iterator[bytes]:

@@ -99,7 +99,7 @@ class Reader:
             self._close_header()
             if entry.what.tick < last:
                 remedy = f"put the lines in the order of their ticks; the line before has {last}"
-                raise line.error(line.first_column(), f"tick {entry.what.tick} goes backwards", remedy)
+                raise line.error(line.tokens[0], f"tick {entry.what.tick} goes backwards", remedy)
             last = entry.what.tick
             yield entry
         self._close_header()

@@ -109,19 +109,22 @@ def _check(name: str, value: int, high: int) -> None:
         raise ValueError(f"{name} = {value}: must be 0..{high}")
 
 
-@dataclass(frozen=True, slots=True)
 class StreamLine:
     """Line `number` of the file `source`, to be read."""
 
-    source: str
-    number: int
-    text: str
+    def __init__(self, source: str, number: int, text: str) -> None:
+        self.source = source
+        self.number = number
+        self.text = text
+        body, _, comment = text.partition("#")
+        self.tokens = list(_TOKEN.finditer(body))
+        self.end = len(body.rstrip()) + 1
+        self.comment = comment.strip()
 
-    def error(self, column: int, reason: str, remedy: str) -> StreamError:
+    def error(self, at: int | re.Match[str], reason: str, remedy: str) -> StreamError:
+        """`at`: a column, or a token."""
+        column = at if isinstance(at, int) else at.start() + 1
         return StreamError(self.source, self.number, column, reason, remedy)
-
-    def first_column(self) -> int:
-        return len(self.text) - len(self.text.lstrip()) + 1
 
     def version(self) -> int:
         """What the first line of a file says; 1 if it says nothing."""
@@ -137,65 +140,54 @@ class StreamLine:
 
     def parse(self, version: int) -> Entry | None:
         """What the line says, or None for a line that says nothing."""
-        body, _, comment = self.text.partition("#")
-        tokens = list(_TOKEN.finditer(body))
-        if not tokens:
+        if not self.tokens:
             return None
-        end = len(body.rstrip()) + 1
-        tick = self._tick(tokens[0])
-        kind, network, slot = self._place(tokens, end, version)
+        tick = self._tick(self.tokens[0])
+        kind, network, slot = self._place(version)
         if kind == HAND:
-            what: StreamItem = self._read_action(tick, network, slot, tokens, end)
+            what: StreamItem = self._read_action(tick, network, slot)
         else:
-            what = self._read_characters(tick, kind, network or 0, tokens, end, version)
-        return Entry(what, comment.strip(), self.number)
+            what = self._read_characters(tick, kind, network or 0, version)
+        return Entry(what, self.comment, self.number)
 
     def _tick(self, token: re.Match[str]) -> int:
         if not _TICK.fullmatch(token[0]) or int(token[0]) > MAX_TICK:
-            reason = f"{brief(token[0])} is not a tick"
-            raise self.error(token.start() + 1, reason, f"a line starts with a whole number 0..{MAX_TICK}")
+            remedy = f"a line starts with a whole number 0..{MAX_TICK}"
+            raise self.error(token, f"{brief(token[0])} is not a tick", remedy)
         return int(token[0])
 
-    def _place(
-        self, tokens: list[re.Match[str]], end: int, version: int
-    ) -> tuple[str, int | None, int | None]:
+    def _place(self, version: int) -> tuple[str, int | None, int | None]:
         """Direction or `*`, network, slot."""
         remedy = f"write {DOWN} for host to robot or {UP} for robot to host after the tick"
-        if len(tokens) == 1:
-            raise self.error(end, "no direction", remedy)
-        token = tokens[1]
+        if len(self.tokens) == 1:
+            raise self.error(self.end, "no direction", remedy)
+        token = self.tokens[1]
         found = _PLACE.fullmatch(token[0])
         if found is None or (found[3] is not None and found[1] != HAND):
-            raise self.error(token.start() + 1, f"{brief(token[0])} is not a direction", remedy)
+            raise self.error(token, f"{brief(token[0])} is not a direction", remedy)
         if version == 1 and token[0] not in DIRECTIONS:
             raise self._too_new(token)
-        network = None if found[2] is None else self._number(token, found[2], "network", MAX_NETWORK)
-        return (
-            found[1],
-            network,
-            None if found[3] is None else self._number(token, found[3], "slot", MAX_SLOT),
-        )
+        network = self._number(token, found[2], "network", MAX_NETWORK)
+        return found[1], network, self._number(token, found[3], "slot", MAX_SLOT)
 
-    def _number(self, token: re.Match[str], digits: str, name: str, high: int) -> int:
-        if int(digits) > high:
-            raise self.error(token.start() + 1, f"{name} {digits}", f"there are {name}s 0..{high}")
-        return int(digits)
+    def _number(self, token: re.Match[str], digits: str | None, name: str, high: int) -> int | None:
+        if digits is not None and int(digits) > high:
+            raise self.error(token, f"{name} {digits}", f"there are {name}s 0..{high}")
+        return None if digits is None else int(digits)
 
     def _too_new(self, token: re.Match[str]) -> StreamError:
         reason = f"{brief(token[0])} is not known in stream version 1"
-        return self.error(token.start() + 1, reason, f"begin the file with `{FIRST_LINE.format(2)}`")
+        return self.error(token, reason, f"begin the file with `{FIRST_LINE.format(2)}`")
 
-    def _read_characters(
-        self, tick: int, direction: str, network: int, tokens: list[re.Match[str]], end: int, version: int
-    ) -> Transmission:
-        if len(tokens) == 2:
-            raise self.error(end, "no characters", "write at least one as two hex digits")
+    def _read_characters(self, tick: int, direction: str, network: int, version: int) -> Transmission:
+        if len(self.tokens) == 2:
+            raise self.error(self.end, "no characters", "write at least one as two hex digits")
         data, bad_stop = bytearray(), []
-        for token in tokens[2:]:
+        for token in self.tokens[2:]:
             found = _CHARACTER.fullmatch(token[0])
             if found is None:
                 reason = f"{brief(token[0])} is not a character"
-                raise self.error(token.start() + 1, reason, "write two hex digits each, with blanks between")
+                raise self.error(token, reason, "write two hex digits each, with blanks between")
             if found[2]:
                 if version == 1:
                     raise self._too_new(token)
@@ -203,20 +195,15 @@ class StreamLine:
             data.append(int(found[1], 16))
         return Transmission(tick, direction, bytes(data), network, tuple(bad_stop))
 
-    def _read_action(
-        self, tick: int, network: int | None, slot: int | None, tokens: list[re.Match[str]], end: int
-    ) -> Action | PinLevel:
-        if len(tokens) != 4:
-            raise self.error(end, "not an action", _ACTIONS)
-        word, value = tokens[2][0], tokens[3][0]
+    def _read_action(self, tick: int, network: int | None, slot: int | None) -> Action | PinLevel:
+        if len(self.tokens) != 4:
+            raise self.error(self.end, "not an action", _ACTIONS)
+        place, word, value = self.tokens[1], self.tokens[2][0], self.tokens[3][0]
         if word in ("reset", "power") and slot is not None and network is not None and value in ("0", "1"):
             return (Reset if word == "reset" else Power)(tick, network, slot, int(value))
         if word == "radio" and slot is None and network is not None and value in RADIO_STATES:
             return RadioState(tick, network, value)  # type: ignore[arg-type]
         if _PIN.fullmatch(word) and network is None and value in ("0", "1"):
             return PinLevel(tick, word, int(value))
-        raise self.error(
-            tokens[1].start() + 1,
-            f"{brief(self.text[tokens[1].start() : end - 1])} is not an action",
-            _ACTIONS,
-        )
+        said = brief(self.text[place.start() : self.end - 1])
+        raise self.error(place, f"{said} is not an action", _ACTIONS)

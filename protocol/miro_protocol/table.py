@@ -138,6 +138,7 @@ DOWNLINK = {
 # -- Payloads ------------------------------------------------------------------------------------------------
 
 _SPEED = "1/256 count per LM629 sample"
+_ACCELERATION = "1/65536 count per sample^2"
 VELOCITY = (
     Field("left", 2, -32767, 32767, _SPEED, "left wheel"),
     Field("right", 2, -32767, 32767, _SPEED, "right wheel"),
@@ -154,14 +155,7 @@ SERVICE_DATA: dict[int, tuple[Field, ...]] = {
     ),
     # 0 would take the failsafe's smooth stop away.
     Opcode.ACCELERATION: (
-        Field(
-            "acceleration",
-            4,
-            1,
-            0x3FFF_FFFF,
-            "1/65536 count per sample^2",
-            "in motion it waits for standstill",
-        ),
+        Field("acceleration", 4, 1, 0x3FFF_FFFF, _ACCELERATION, "in motion it waits for standstill"),
     ),
 }
 TELEMETRY_FIELDS = (
@@ -173,14 +167,8 @@ TELEMETRY_FIELDS = (
     Field("accepted", 1, 0, 0xFF, "", "fresh frames, wraps"),
     Field("rejected", 1, 0, 0xFF, "", "frames with bad CRC, wraps"),
 )
-TELEMETRY = Format(
-    "robot to host",
-    b"\x55" * 4 + b"\xff",
-    SYNC,
-    0x1E,
-    sum(field.size for field in TELEMETRY_FIELDS),
-    ROBOT_BIT_TICKS,
-)
+_TELEMETRY_SIZE = sum(field.size for field in TELEMETRY_FIELDS)
+TELEMETRY = Format("robot to host", b"\x55" * 4 + b"\xff", SYNC, 0x1E, _TELEMETRY_SIZE, ROBOT_BIT_TICKS)
 SEQ = Field(
     "seq", 1, 0, SEQ_MODULUS - 1, "", "one counter for all types; telemetry repeats the frame it answers"
 )

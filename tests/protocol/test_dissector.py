@@ -11,7 +11,7 @@ import pytest
 from miro_protocol import dissector
 from miro_protocol.decoder import Damaged, Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.pcapng import write
+from miro_protocol.pcapng import render
 from miro_protocol.transmission import Transmission
 from tests import children
 
@@ -45,7 +45,7 @@ def test_the_committed_dissector_is_the_generated_one():
 
 def tshark(packets, folder, *options):
     """tshark's fields of each packet."""
-    write(folder / "run.pcapng", packets)
+    (folder / "run.pcapng").write_bytes(render(packets))
     return dissected(folder / "run.pcapng", *options)
 
 

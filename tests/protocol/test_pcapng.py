@@ -161,8 +161,3 @@ def test_what_is_no_capture_of_a_serial_line_is_named_with_its_remedy(capture, r
     found, error = read(capture)
     assert found == []
     assert reason in str(error)
-
-
-def test_a_file_is_written_whole(tmp_path):
-    pcapng.write(tmp_path / "a.pcapng", SOME)
-    assert (tmp_path / "a.pcapng").read_bytes() == render(SOME)
