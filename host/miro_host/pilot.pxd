@@ -1,5 +1,6 @@
 cimport cython
 from miro_host.integrator cimport Integrator
+from miro_host.wheels cimport wheel_command
 
 
 cdef class Pilot:

@@ -23,7 +23,7 @@ from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Reference, Trajectory
 from miro_host.telemetry_receiver import LastTelemetry
-from miro_host.wheels import Wheels
+from miro_host.wheels import Wheels, wheel_command
 
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
@@ -132,7 +132,7 @@ class Pilot:
         else:
             z.go_to(answer.v_m_s, answer.w_rad_s)
         left_factor, right_factor = estimate.left_factor, estimate.right_factor
-        left, right = self.wheels.command(z.v_m_s, z.w_rad_s, left_factor, right_factor)
+        left, right = wheel_command(self.wheels, z.v_m_s, z.w_rad_s, left_factor, right_factor)
         named = _in_order(estimate.inner, self.estimator.INNER)
         wheels = float(left), float(right), left_factor, right_factor
         self.numbers = [*wheels, z.v_m_s, z.w_rad_s, *inner.values(), *named.values()]

@@ -7,14 +7,13 @@ own limit.
 
 import msgspec
 
+from miro_exact.clock import LM629_SAMPLE_TICKS, TICKS_PER_SECOND
 from miro_exact.dmath import PI
 from miro_exact.domain import DomainError
 
-TICKS_PER_S = 24_000_000
-TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
 COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1
 UNITS_PER_COUNT = 256
-_PER_TURN = UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / (TICKS_PER_S / TICKS_PER_SAMPLE)
+_PER_TURN = UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / (TICKS_PER_SECOND / LM629_SAMPLE_TICKS)
 MIN_WORD_BITS = 5
 MAX_WORD_BITS = 16
 
@@ -69,15 +68,6 @@ class Wheels(msgspec.Struct, frozen=True):
         """
         return _counts(speed_m_s, self.limit_m_s, self.units_per_m_s, self.word_bits)
 
-    def command(
-        self, v_m_s: float, w_rad_s: float, left_factor: float = 1.0, right_factor: float = 1.0
-    ) -> tuple[int, int]:
-        """(left, right) for the team frame: split, corrected, limited, quantised.
-
-        A wheel whose radius is the nominal one times a factor has to turn slower by that factor.
-        """
-        return _words(self, v_m_s, w_rad_s, left_factor, right_factor)
-
 
 def _units_per_m_s(radius_m: float) -> float:
     return _PER_TURN / (2.0 * PI * radius_m)
@@ -92,16 +82,18 @@ def _counts(speed_m_s: float, limit_m_s: float, units_per_m_s: float, word_bits:
     return step * max(-most, min(most, nearest(units / step)))
 
 
-def _words(
-    wheels: Wheels, v_m_s: float, w_rad_s: float, left_factor: float, right_factor: float
+def wheel_command(
+    wheels: Wheels, v_m_s: float, w_rad_s: float, left_factor: float = 1.0, right_factor: float = 1.0
 ) -> tuple[int, int]:
+    """(left, right) for the team frame: split, corrected, limited, quantised.
+
+    A wheel whose radius is the nominal one times a factor has to turn slower by that factor.
+    """
     limit_m_s, half = wheels.limit_m_s, 0.5 * wheels.track_m * w_rad_s
     left, right = (v_m_s - half) / left_factor, (v_m_s + half) / right_factor
     greatest = max(abs(left), abs(right))
     if not greatest <= limit_m_s:  # one factor for both: the path keeps its curvature
         # The quotient first: the greater one becomes +-1 exactly, hence never above the limit.
         left, right = limit_m_s * (left / greatest), limit_m_s * (right / greatest)
-    units = _units_per_m_s(wheels.radius_m)
-    return _counts(left, limit_m_s, units, wheels.word_bits), _counts(
-        right, limit_m_s, units, wheels.word_bits
-    )
+    units, bits = _units_per_m_s(wheels.radius_m), wheels.word_bits
+    return _counts(left, limit_m_s, units, bits), _counts(right, limit_m_s, units, bits)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
 from miro_host.pilot import STANDSTILL, WheelCommand
-from miro_host.wheels import Wheels
+from miro_host.wheels import Wheels, wheel_command
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.scenario.keys import ControlNoise
 from miro_sim.world.network import noisy
@@ -31,7 +31,7 @@ wheel_radius_mismatch = 0.0
 
 
 def command(v_m_s, w_rad_s):
-    return WheelCommand(*WHEELS.command(v_m_s, w_rad_s), v_m_s, w_rad_s)
+    return WheelCommand(*wheel_command(WHEELS, v_m_s, w_rad_s), v_m_s, w_rad_s)
 
 
 @given(st.integers(0, 2**63 - 1), st.integers(0, 10**6), st.floats(0, 1), st.floats(0, 40))

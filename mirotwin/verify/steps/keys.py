@@ -13,8 +13,13 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.bad_input import amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
-from miro_host.wheels import TICKS_PER_S, TICKS_PER_SAMPLE, UNITS_PER_COUNT, Wheels, nearest
+from miro_exact.clock import (
+    CONTROL_PERIOD_TICKS,
+    HOST_CHARACTER_TICKS,
+    LM629_SAMPLE_TICKS,
+    TICKS_PER_SECOND,
+)
+from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
 from miro_sim.world.conditions import Edge, Network, Reached, Recorded, Slot, SpeedMS, WheelSpeeds
@@ -204,8 +209,8 @@ class SendAcceleration(SendFrame, frozen=True, kw_only=True, tag="acceleration")
 
 def acceleration_units(acceleration_m_s2: float) -> int:
     """1/65536 count per sample squared, rounded: 5973 for 6 m/s^2."""
-    counts_per_m = Wheels().units_per_m_s / UNITS_PER_COUNT * (TICKS_PER_S / TICKS_PER_SAMPLE)
-    sample_s = TICKS_PER_SAMPLE / TICKS_PER_S
+    counts_per_m = Wheels().units_per_m_s / UNITS_PER_COUNT * (TICKS_PER_SECOND / LM629_SAMPLE_TICKS)
+    sample_s = LM629_SAMPLE_TICKS / TICKS_PER_SECOND
     return nearest(65536.0 * counts_per_m * sample_s * sample_s * acceleration_m_s2)
 
 

@@ -11,7 +11,7 @@ from miro_exact.state import TICK, Rows
 from miro_host.pilot import WheelCommand
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver
-from miro_host.wheels import Wheels
+from miro_host.wheels import Wheels, wheel_command
 from miro_protocol.decoder import Received, Symbol
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
@@ -270,4 +270,4 @@ def noisy(
         return command.left, command.right
     v_m_s = command.v_m_s + bounds.v_m_s * (2.0 * draws.uniform(2 * period) - 1.0)
     w_rad_s = command.w_rad_s + bounds.w_rad_s * (2.0 * draws.uniform(2 * period + 1) - 1.0)
-    return wheels.command(v_m_s, w_rad_s, command.left_factor, command.right_factor)
+    return wheel_command(wheels, v_m_s, w_rad_s, command.left_factor, command.right_factor)
