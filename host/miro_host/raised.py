@@ -37,30 +37,24 @@ def raised_at(error: BaseException) -> str:
     """`FILE:LINE in FUNCTION` of the plug-in's code that raised it; "" where none of that was running."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{_shown(error.filename)}:{error.lineno}"
-    found, file = "", ""
-    trace = error.__traceback__
-    while trace is not None:
-        code = trace.tb_frame.f_code
-        if not file and _foreign(trace.tb_frame):
-            file = code.co_filename
-        if file and code.co_filename == file:
-            found = _place(code, trace.tb_lineno)
-        trace = trace.tb_next
-    return found
+    steps = _steps(error)
+    file = next((frame.f_code.co_filename for frame, _ in steps if _foreign(frame)), None)
+    places = [_place(frame.f_code, line) for frame, line in steps if frame.f_code.co_filename == file]
+    return places[-1] if places else ""
 
 
 def _raised_by_ours(error: BaseException) -> str:
     """Where our own code raised it, below who caught it: in a plug-in of this tree."""
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    if (
-        trace is None
-        or trace is error.__traceback__
-        or not _is_ours(trace.tb_frame.f_globals.get("__name__"))
-    ):
-        return ""
-    return _place(trace.tb_frame.f_code, trace.tb_lineno)
+    below = _steps(error)[1:]
+    ours = bool(below) and _is_ours(below[-1][0].f_globals.get("__name__"))
+    return _place(below[-1][0].f_code, below[-1][1]) if ours else ""
+
+
+def _steps(error: BaseException) -> list[tuple[FrameType, int]]:
+    """Frames and lines from who caught it to who raised it."""
+    from traceback import walk_tb  # only an error needs it
+
+    return list(walk_tb(error.__traceback__))
 
 
 def defined_at(function: Any) -> str:

@@ -1,5 +1,6 @@
 """The radio end of the PC: one frame per control period for all robots of a network."""
 
+import struct
 from collections import deque
 from collections.abc import Sequence
 
@@ -9,7 +10,6 @@ from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, VELOCITY, FrameType, downlink
 from miro_protocol.whitening import STRING
 
-_WIDE = 8  # bytes of a value in a saved service frame
 _LOWEST, _HIGHEST = VELOCITY[0].low, VELOCITY[0].high
 _SEQ_MODULUS = SEQ_MODULUS
 _XOR_OUT = crc.XOR_OUT
@@ -18,18 +18,14 @@ assert all((field.size, field.low, field.high) == (2, _LOWEST, _HIGHEST) for fie
 
 def _split_service(frame: ServiceFrame) -> tuple[int, int, bytes]:
     """Slot, opcode and values, as a saved state holds them; every frame gets its number when it is sent."""
-    values = b"".join(int(value).to_bytes(_WIDE, "little", signed=True) for value in frame.values)
-    return frame.slot, frame.opcode, values
+    return frame.slot, frame.opcode, struct.pack(f"<{len(frame.values)}q", *frame.values)
 
 
 def _make_service(cells: tuple[int, int, bytes]) -> ServiceFrame:
     slot, opcode, data = cells
-    if len(data) % _WIDE:
+    if len(data) % 8:
         raise ValueError(f"holds a service frame with {len(data)} bytes of values")
-    pieces = [data[place : place + _WIDE] for place in range(0, len(data), _WIDE)]
-    return ServiceFrame(
-        0, slot, opcode, tuple(int.from_bytes(piece, "little", signed=True) for piece in pieces)
-    )
+    return ServiceFrame(0, slot, opcode, struct.unpack(f"<{len(data) // 8}q", data))
 
 
 class Station:

@@ -9,6 +9,8 @@ robot boots at 0. This is right as long as a wheel turns by less than 32768 coun
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from msgspec.structs import astuple
+
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
@@ -82,16 +84,10 @@ class TelemetryReceiver:
             return
         before = self.last[message.slot]
         left, right = (0, 0) if before is None else (before.position_left, before.position_right)
-        self.last[message.slot] = LastTelemetry(
-            event.start_tick,
-            message.seq,
-            message.flags,
-            message.status_left,
-            message.status_right,
-            unwrapped(message.position_left, left),
-            unwrapped(message.position_right, right),
-            message.accepted,
-            message.rejected,
+        seq, slot, flags, *status, low_left, low_right, accepted, rejected = astuple(message)
+        left, right = unwrapped(low_left, left), unwrapped(low_right, right)
+        self.last[slot] = LastTelemetry(
+            *(event.start_tick, seq, flags, status[0], status[1], left, right, accepted, rejected)
         )
 
     def after_load(self) -> None:

@@ -63,13 +63,10 @@ def parse(text: str, kind: type[T], origin: str) -> T:
     """The struct in TOML text. Raises EyeError with the key for unknown keys, wrong types and values out of range."""
     try:
         table = tables(text)
-    except TomlError as error:
-        raise EyeError(origin, error.place, error.what, error.remedy or "mend the text") from None
-    try:
         check_numbers(table)
         return struct_of(table, kind)
     except TomlError as error:
-        raise EyeError(origin, error.place, error.what, error.remedy) from None
+        raise EyeError(origin, error.place, error.what, error.remedy or "mend the text") from None
 
 
 def text(struct: msgspec.Struct) -> str:
