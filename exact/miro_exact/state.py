@@ -45,7 +45,7 @@ from miro_exact import engine
 from miro_exact.domain import DomainError
 from miro_exact.fields import FLAG, MEMORY, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
 
-__all__ = ["FLAG", "TICK", "Flat", "Items", "Octets", "Queue", "Row", "Rows", "restore", "snapshot", "values"]
+__all__ = ["FLAG", "TICK", "Flat", "Items", "Octets", "Queue", "Row", "Rows"]
 
 CODES = {
     "int": "i",
@@ -230,12 +230,6 @@ class Flat:
             self._tables = hashlib.sha256(text.encode()).hexdigest()
         return self._tables
 
-    def difference(self, one: bytes, other: bytes) -> tuple[str, Any, Any] | None:
-        """Path and both values of the first field that differs between two states, None if none does."""
-        first, second = self.decode(one), self.decode(other)
-        found = ((path, first[path], second[path]) for path in first if first[path] != second[path])
-        return next(found, None)
-
     def _check(self, data: bytes) -> None:
         at = 0
         for block in self._blocks:
@@ -386,19 +380,3 @@ def _attributes(field: StateField) -> list[tuple[Any, ...]] | None:
 
 def _pack_each(blocks: Sequence[Any]) -> bytes:
     return b"".join([block.pack() for block in blocks])
-
-
-def snapshot(part: Any) -> bytes:
-    """The state of a part and of all below it. To take it often, keep a `Flat`."""
-    return Flat(part).save()
-
-
-def restore(part: Any, data: bytes) -> None:
-    """Puts back what `snapshot` gave of a part built alike. Raises ValueError and changes nothing for anything else."""
-    Flat(part).load(data)
-
-
-def values(part: Any) -> dict[str, Any]:
-    """Path -> value of every field of a part and of all below it."""
-    flat = Flat(part)
-    return flat.decode(flat.save())

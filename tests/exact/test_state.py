@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from miro_exact import engine, fields, places, state
 from miro_exact.state import FLAG, TICK, Flat, Items, Octets, Queue, Row, Rows
 from miro_robot.mcs51.line import Line
+from tests.states import difference, restore, snapshot
 
 
 class Wheel:
@@ -201,8 +202,8 @@ def test_a_difference_is_told_by_the_name_of_the_field_and_both_values():
     cart = Cart()
     flat = Flat(cart)
     cart.wheels["right"].turns = 5
-    assert flat.difference(LAYOUT, flat.save()) == ("wheels[right].turns", -1, 5)
-    assert flat.difference(LAYOUT, LAYOUT) is None
+    assert difference(flat, LAYOUT, flat.save()) == ("wheels[right].turns", -1, 5)
+    assert difference(flat, LAYOUT, LAYOUT) is None
 
 
 def test_a_class_without_a_table_has_no_state():
@@ -232,9 +233,9 @@ def test_a_wire_is_written_as_its_live_edges_whatever_engine_runs(ticks, forget,
     kept = [tick for tick, _ in line.edges()]
     before = level ^ len(kept) & 1
     expected = struct.pack(f"<qiI{len(kept)}q", 0, before, len(kept), *kept)
-    assert state.snapshot(line) == expected
+    assert snapshot(line) == expected
     other = Line()
-    state.restore(other, expected)
+    restore(other, expected)
     assert other.edges() == line.edges()
 
 
@@ -242,20 +243,20 @@ def test_a_wire_is_written_as_its_live_edges_whatever_engine_runs(ticks, forget,
 def test_a_wire_takes_any_bytes_or_refuses_them_without_a_change(data):
     line = Line()
     line.append(5, 0)
-    before = state.snapshot(line)
+    before = snapshot(line)
     try:
-        state.restore(line, data)
+        restore(line, data)
     except ValueError:
-        assert state.snapshot(line) == before
+        assert snapshot(line) == before
     else:
-        assert state.snapshot(line) == data
+        assert snapshot(line) == data
 
 
 def test_a_wire_whose_edges_go_back_is_refused():
     line = Line()
     line.append(5, 0)
     with pytest.raises(ValueError, match="ticks is not in order"):
-        state.restore(line, struct.pack("<qiI2q", 0, 1, 2, 4, 3))
+        restore(line, struct.pack("<qiI2q", 0, 1, 2, 4, 3))
     assert line.edges() == [(5, 0)]
 
 

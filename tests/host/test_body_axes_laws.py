@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import values
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.dynamic_feedback import DynamicFeedbackParameters
 from miro_host.laws.interface import LawInput, errors
@@ -18,6 +17,7 @@ from miro_host.references.arc import StraightLine
 from miro_host.references.interface import Reference
 from tests.host.driving import ANY_PATH, PATHS, POSTURES, SPEEDS, TIMES, TURNS, apart, drive, later, starts
 from tests.naive import host_laws as naive
+from tests.states import values
 
 ALL = [BodyFrameParameters, KanayamaParameters, DynamicFeedbackParameters]
 HERE = Posture(0.0, 0.0, 0.0)

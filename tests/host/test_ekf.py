@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from msgspec import Meta
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
-from miro_exact.state import restore, snapshot
 from miro_host.estimators.ekf import REFUSED, SEEN_NOISE, TOLD_NOISE, EkfParameters
 from miro_host.estimators.ekf_telemetry import METRES_PER_COUNT, EkfTelemetryParameters
 from miro_host.estimators.interface import DEAD_S, EstimatorInput
@@ -25,6 +24,7 @@ from miro_host.pilot import PERIOD_S
 from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels
+from tests.states import restore, snapshot
 
 TRACK_M = Wheels().track_m
 P = EkfParameters()

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
 from miro_host.estimators.predict import NoEstimator, PredictParameters, moved
 from miro_host.laws.kanayama import KanayamaParameters
@@ -17,6 +16,7 @@ from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from miro_host.wheels import Wheels
+from tests.states import restore, snapshot
 
 HERE = Posture(0.07, 0.02, -0.38)
 COMMANDS = st.lists(st.tuples(st.floats(-0.9, 0.9), st.floats(-4.0, 4.0)), min_size=20, max_size=20)

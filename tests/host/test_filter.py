@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from miro_exact import engine
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.rng import Stream
-from miro_exact.state import snapshot
 from miro_host.estimators.ekf import EkfParameters
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.estimators.filter import Filter
@@ -22,6 +21,7 @@ from miro_host.pilot import PERIOD_S
 from miro_host.telemetry_receiver import LastTelemetry
 from tests.children import uncompiled
 from tests.naive import kalman
+from tests.states import snapshot
 
 
 def bits(periods=300):

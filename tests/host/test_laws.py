@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot, values
 from miro_host.integrator import Integrator, Limits
 from miro_host.laws.epsilon_tracking import RETUNED
 from miro_host.laws.interface import Law, LawParameters, Velocities
@@ -18,6 +17,7 @@ from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from miro_host.telemetry_receiver import LastTelemetry
 from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
+from tests.states import restore, snapshot, values
 
 HERE = Posture(0.07, 0.02, -0.38)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_host.integrator import AdamsBashforth, Integrator, Limits, integrator_of
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
+from miro_host.wheels import wheel_command
+from tests.states import restore, snapshot
 
 LAW = YangKim(Gains())
 START = Posture(0.07, 0.02, -0.38)
@@ -59,7 +60,7 @@ def test_the_lead_shifts_the_reference_and_nothing_else():
 def test_the_wheel_commands_are_those_of_the_integrator():
     one = pilot()
     command = one.update(START, 2.0)
-    assert (command.left, command.right) == one.wheels.command(command.v_m_s, command.w_rad_s)
+    assert (command.left, command.right) == wheel_command(one.wheels, command.v_m_s, command.w_rad_s)
 
 
 @given(st.lists(st.tuples(ACCELERATIONS, ACCELERATIONS), max_size=30))

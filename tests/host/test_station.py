@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver, unwrapped
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode, seal
 from miro_protocol.table import TELEMETRY, FrameType, Opcode
+from tests.states import restore, snapshot
 
 SIZES = st.sampled_from([3, 5])
 VALUES = st.integers(-32767, 32767)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from benchmarks.codec import best_time, own_jobs
 from miro_exact import engine
-from miro_exact.state import restore, snapshot, values
 from miro_protocol import decoder as module
 from miro_protocol import table
 from miro_protocol.decoder import TICK_LIMIT, Damaged, Decoder, Reason, Received, Scanner
@@ -20,6 +19,7 @@ from miro_protocol.hypothesis_frames import damaged_streams, team_frames, valid_
 from miro_protocol.whitening import whiten
 from tests.exact.uncompiled import uncompiled
 from tests.naive.decoder import NaiveDecoder
+from tests.states import restore, snapshot, values
 
 Twin = uncompiled(module).Scanner
 FORMATS = (*table.DOWNLINK.values(), table.TELEMETRY)

@@ -3,10 +3,10 @@
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_protocol.robot_receiver import Freshness
 from miro_protocol.robot_rules import TO_TI_TICKS, AnswerRule, DrivingRule, OriginRule, SilenceRule
 from tests.naive import robot_rules as naive
+from tests.states import restore, snapshot
 
 MS = 24_000
 TICKS = st.integers(0, 40).map(lambda half: half * MS // 2)

@@ -18,6 +18,7 @@ from collections import Counter
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.world.saved import opened, sealed
 from tests.sim.world.rig import world_of
+from tests.states import difference
 
 LIMIT_S = 120
 """So long a load and a period may take; then the process ends with a traceback and exit code 1."""
@@ -143,7 +144,7 @@ def outcome(world, saved):
         world.load(saved)
     except ValueError as error:
         if world.state.save() != before:
-            return f"refused with a change: {world.state.difference(before, world.state.save())}"
+            return f"refused with a change: {difference(world.state, before, world.state.save())}"
         return "refused" if "\n" not in str(error) and len(str(error)) < 300 else f"said {str(error)!r}"
     except Exception as error:
         return f"load raised {error!r}"

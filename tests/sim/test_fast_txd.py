@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.state import snapshot
 from miro_robot.image import Image, Symbols
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.bodies import Bodies
 from miro_sim.world.network import Network
 from miro_sim.world.world import World
 from tests.robot.mcs51.asm import assemble
+from tests.states import snapshot
 
 SCENARIO = """
 name = "fast"

@@ -7,7 +7,6 @@ import msgspec
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.state import snapshot
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawParameters, Velocities
@@ -18,6 +17,7 @@ from miro_sim.world.world import World
 from tests.host.own_laws import LeakyParameters, WrongParameters
 from tests.sim.mutated_worlds import with_field
 from tests.sim.world.rig import finished, image, world_of
+from tests.states import snapshot
 
 PERIODS = 24
 NOTHING_HEARD = struct.pack("<q4B2q2B", -1, 0, 0, 0, 0, 0, 0, 0, 0)

@@ -8,12 +8,12 @@ import pytest
 from click.testing import CliRunner
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.state import snapshot
 from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import ScenarioError, parse
 from mirotwin.commands import main
 from tests.sim.world.rig import world_of
+from tests.states import snapshot
 
 README = Path(__file__).parents[2] / "sim/miro_sim/radio/README.md"
 NETWORK = """

@@ -1,7 +1,6 @@
 """What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
 from miro_exact.bad_input import BadInput
-from miro_exact.state import snapshot
 from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent, read_pins
@@ -11,6 +10,7 @@ from miro_robot.plant import Plant
 from miro_robot.wiring import WiringError, load_wiring
 from tests.fuzz.target import Draws, Target, always, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
+from tests.states import snapshot
 
 _NAME = "fuzz.ihx"
 

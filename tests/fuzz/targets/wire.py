@@ -1,6 +1,5 @@
 """The wire: the window decoder by each way of feeding it, frames, the PC's receiver of telemetry."""
 
-from miro_exact.state import snapshot
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol import decoder
 from miro_protocol.decoder import Scanner
@@ -8,6 +7,7 @@ from miro_protocol.frames import ContentError, describe, encode, format_of, seal
 from miro_protocol.table import TELEMETRY, downlink
 from tests.exact.uncompiled import uncompiled
 from tests.fuzz.target import Draws, Target, always, pieces, refused
+from tests.states import snapshot
 
 _LIMITS = (1, 7, 64, 4096)
 _SEEN = "python"  # the decoder is a hot module: coverage sees the source

@@ -5,13 +5,13 @@ import math
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_exact.rng import Stream
-from miro_exact.state import snapshot
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.colours import classes_of
 from miro_host.eye.tracker import Tracker
 from miro_host.posture import Posture
 from tests.naive.painted_frame import PaintedFrame, PaintedRobot, sampled
+from tests.states import snapshot
 
 FRAME = 800_800
 CAMERA = CameraParameters()

@@ -9,7 +9,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
-from miro_exact.state import restore, snapshot
 from miro_host.eye import self_calibration
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.calibration_kinds import drawn_1997, worst_error_m
@@ -22,6 +21,7 @@ from miro_host.eye.self_calibration import LEARNT, SPREADS, STRIDE, SelfCalibrat
 from miro_host.eye.track import Sighting, Track
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.picture_settings import PictureSettings
+from tests.states import restore, snapshot
 
 FRAME = 800_800
 TRUE = CameraParameters()

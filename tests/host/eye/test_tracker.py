@@ -3,7 +3,6 @@
 import pytest
 
 from miro_exact import engine
-from miro_exact.state import restore, snapshot
 from miro_host.eye.calibration_kinds import none
 from miro_host.eye.colours import classes_of
 from miro_host.eye.eye_file import EyeError
@@ -12,6 +11,7 @@ from miro_host.posture import Posture
 from tests.children import uncompiled
 from tests.host.eye.scenes import CAMERA, FRAME, beside, drawn, errors, session, tracker
 from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
+from tests.states import restore, snapshot
 
 MIDDLE = Posture(0.5, 0.35, 0.4)
 

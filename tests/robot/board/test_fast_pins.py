@@ -2,10 +2,10 @@
 
 import itertools
 
-from miro_exact.state import snapshot
 from miro_robot.bare.machine import BareMachine
 from miro_robot.mcs51.cpu import REACHED, WIRE_FULL
 from tests.robot.board.rig import board_with, image_of
+from tests.states import snapshot
 
 TOGGLE = "\n".join(["loop:", "CPL TXD", *(f"XRL P{port},#0FDh" for port in range(4)), "SJMP loop"])
 EVERY_CYCLE = "\n".join(["loop:", *["CPL TXD"] * 60, "SJMP loop"])

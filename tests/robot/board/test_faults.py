@@ -10,11 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from miro_exact.state import restore, snapshot, values
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.wiring import Latch, load_wiring
 from tests import children
 from tests.robot.board.rig import CYCLE, MS, RESET, START, board_with, raw_movx_wiring
+from tests.states import restore, snapshot, values
 
 COMMAND_LEFT = "MOV P0,#2\nCLR P2.0\nCLR P2.3\nCLR P2.2\nSETB P2.2\n"  # 2 cycles, then 4 of one cycle
 TIMER_0 = "MOV TMOD,#01h\nMOV TH0,#0FFh\nMOV TL0,#0F0h\nMOV IE,#82h\nSETB TR0\nidle:\nSJMP idle"

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import NEVER_TICK
-from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
@@ -18,6 +17,7 @@ from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Bridge, Chassis, DriveParams, OpticalEncoder
 from tests.robot.board.rig import CYCLE, RESET, START, board_with
 from tests.robot.firmware.rig import IMAGE, MS, Rig
+from tests.states import snapshot
 
 MSKI, RSTI, LTRJ, STT = 0x1C, 0x1D, 0x1F, 0x01
 DRIVES = st.builds(

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import FastOracle
@@ -15,6 +14,7 @@ from miro_robot.plant import Plant
 from miro_robot.probe import Probe
 from miro_robot.wiring import load_wiring
 from tests.robot.mcs51.asm import image_of
+from tests.states import snapshot
 
 BIT_TICKS = 2500
 FRAME = b"\x00\x10\x00\x20\x00"

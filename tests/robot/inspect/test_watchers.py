@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_robot.inspect.counters import Activity, Counters
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from tests.naive import watching
 from tests.robot.mcs51.rig import cpu_with
+from tests.states import snapshot
 
 # Two timers at two priorities, a serial port, sleep, and a busy main loop with branches.
 BUSY = """

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot import inspect
 from miro_robot.board import Board
@@ -23,6 +22,7 @@ from tests.naive.waveform import Sampler, Treadmill
 from tests.robot.inspect.reading import read, tick_of
 from tests.robot.mcs51.asm import assemble
 from tests.robot.mcs51.rig import cpu_with
+from tests.states import restore, snapshot
 
 MS = 24_000
 BIT = 2500

@@ -46,8 +46,8 @@ def play(bench, step):
 
 
 def digest(seed, count):
-    from miro_exact.state import snapshot  # a hot module: not before the engine was chosen
     from tests.robot.lm629.bench import Bench
+    from tests.states import snapshot  # a hot module: not before the engine was chosen
 
     bench = Bench()
     bench.chip.set_encoder(0, 0, 0)

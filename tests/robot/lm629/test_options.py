@@ -6,10 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import CHOICES, LENGTHS, Lm629Options
 from tests.robot.lm629.bench import Bench
+from tests.states import restore, snapshot, values
 
 MOTOR_OFF, BREAKPOINT, EXCESS, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x04, 0x02
 ACQUIRE_INDEX = 0x0001

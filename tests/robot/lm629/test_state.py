@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact import engine
-from miro_exact.state import restore, snapshot
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from tests import children
 from tests.example_count import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.session import play, steps
+from tests.states import restore, snapshot
 
 ROOT = Path(__file__).parents[3]
 

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from miro_exact.state import restore, snapshot
 from miro_robot.bare.input import InputPiece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.faults import FaultKind
 from tests.robot.mcs51.asm import assemble, image_of
+from tests.states import restore, snapshot
 
 SERIAL = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV T2CON,#34h\nMOV SCON,#50h\n"
 ECHO = SERIAL + "loop:\nJNB RI,$\nMOV A,SBUF\nCLR RI\nMOV SBUF,A\nJNB TI,$\nCLR TI\nSJMP loop"

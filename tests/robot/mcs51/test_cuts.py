@@ -2,9 +2,9 @@
 
 import pytest
 
-from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT
 from tests.robot.mcs51.rig import cpu_with, sfr, whole_and_cut
+from tests.states import restore, snapshot
 
 T2EX_LOW, T2_AND_T2EX_LOW = 0xFD, 0xFC  # on P1
 INT0_LOW, T0_LOW = 0xFB, 0xEF  # on P3

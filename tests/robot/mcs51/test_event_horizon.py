@@ -9,10 +9,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
 from tests.robot.mcs51.asm import assemble
 from tests.robot.mcs51.rig import RecordingBus
+from tests.states import restore, snapshot
 
 BYTE = st.sampled_from([0, 1, 2, 0x7F, 0x80, 0xF0, 0xFA, 0xFD, 0xFE, 0xFF])
 WRITES = st.one_of(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from miro_exact.state import snapshot
 from tests.robot.mcs51.rig import cpu_with, sfr, whole_and_cut
+from tests.states import snapshot
 
 TIMER_WAKES = """
 LJMP main

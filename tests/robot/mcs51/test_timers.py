@@ -7,11 +7,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.robot.mcs51.asm import SFRS, assemble
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped, whole_and_cut
+from tests.states import snapshot
 
 REGISTERS = ("TMOD", "TCON", "TL0", "TH0", "TL1", "TH1", "T2CON", "T2MOD", "TL2", "TH2", "RCAP2L", "RCAP2H")
 

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
 from tests import children
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.naive.mcs51_uart import NaiveUart
 from tests.robot.mcs51.asm import SFRS
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr, whole_and_cut
+from tests.states import snapshot
 
 BIT = 2496  # ticks, with timer 2 reloading 65536 - 78
 TIMER1_9600 = "MOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nORL PCON,#80h\nSETB TR1\n"

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.params import Chassis, DriveParams, Motor
 from tests.sim.plant.runs import kinetic_energy_j
+from tests.states import snapshot
 
 SMOOTH = DriveParams(motor=Motor(friction_nm=0.0), chassis=Chassis(rolling_resistance=0.0))
 ROUGH = DriveParams(chassis=Chassis(left_radius_factor=0.985, right_radius_factor=1.015))

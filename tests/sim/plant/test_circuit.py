@@ -4,10 +4,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_sim.plant.drive import Winding
 from miro_sim.plant.params import Bridge, DriveParams
 from tests.naive.plant import NaiveBridge, winding_run
+from tests.states import restore, snapshot
 
 PARAMS = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))
 LATE = DriveParams()

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
 from miro_sim.plant.drive import DifferentialDrive, Winding
 from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor, OpticalEncoder
@@ -15,6 +14,7 @@ from tests.children import uncompiled
 from tests.naive.plant import NaiveDrive
 from tests.robot.lm629.bench import Bench
 from tests.sim.plant.runs import TRACED, kinetic_energy_j, pwm, trace
+from tests.states import restore, snapshot, values
 
 PARAMS = DriveParams()
 PROMPT = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))  # a bridge without delays

@@ -6,12 +6,12 @@ from itertools import accumulate
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from miro_exact.state import snapshot
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_sim.plant.drive import Quadrature
 from tests.example_count import examples
 from tests.naive.plant import quadrature_edges
+from tests.states import snapshot
 
 MOVES = st.floats(-40.0, 40.0)
 TICKS = st.integers(64, 2048)

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
-from miro_exact.state import snapshot, values
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, OpticalEncoder, RollingBall, Tyre
 from miro_sim.plant.rough import DisturbingForce, RoughBody
 from tests.naive.plant import NaiveRoughDrive
 from tests.sim.plant.runs import kinetic_energy_j, pwm
+from tests.states import snapshot, values
 
 BALL = RollingBall(friction=0.3)
 ALL = DriveParams(

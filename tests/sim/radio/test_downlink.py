@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import NEVER_TICK, ROBOT_BIT_TICKS
-from miro_exact.state import restore, snapshot
 from miro_protocol.transmission import Transmission
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
 from tests.naive import radio as naive
 from tests.sim.radio.radios import clean, cuts, flawed, neighbours, params, seeds
+from tests.states import restore, snapshot
 
 UNTIL = 1_500_000
 

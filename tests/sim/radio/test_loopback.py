@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
-from miro_exact.state import snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
@@ -15,6 +14,7 @@ from miro_sim.radio.uplink import Uplink
 from tests.children import uncompiled
 from tests.naive.radio import wire_bits
 from tests.sim.radio.radios import clean, seeds, transmissions
+from tests.states import snapshot
 
 ROBOTS = 3
 PERIOD = 800_800

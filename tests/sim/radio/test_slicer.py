@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_exact.state import values
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.params import SlicerParams
@@ -13,6 +12,7 @@ from miro_sim.radio.slicer import Slicer
 from tests.naive import radio as naive
 from tests.sim.radio.noise import listen
 from tests.sim.radio.radios import clean, signals_db, slicers
+from tests.states import values
 
 BIT = 2500
 EB_N0_DB = 11.0

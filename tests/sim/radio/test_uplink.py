@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.uplink import Uplink
 from tests.naive import radio as naive
 from tests.sim.radio.radios import clean, cuts, params, seeds, transmissions
+from tests.states import restore, snapshot
 
 UNTIL = 1_500_000
 CLEAN = clean()

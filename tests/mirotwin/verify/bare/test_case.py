@@ -5,7 +5,6 @@ import sys
 import pytest
 
 from miro_exact.bad_input import BadInput
-from miro_exact.state import restore, snapshot
 from miro_protocol.actions import Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.bare.machine import BareMachine
@@ -17,6 +16,7 @@ from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.bare.run import BarePlayback
 from tests.host import distribution
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
+from tests.states import restore, snapshot
 
 WRONG = 'def short(run):\n    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None\n'
 
