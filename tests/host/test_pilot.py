@@ -6,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_host.integrator import AdamsBashforth, Integrator, Limits, integrator_of
-from miro_host.laws.yang_kim import Gains, YangKim
+from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from miro_host.wheels import wheel_command
+from tests.host.theory.paper_law import YangKim
 from tests.states import restore, snapshot
 
 LAW = YangKim(Gains())

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from miro_host.laws.yang_kim import Gains, YangKim, guarded_inverse, saturation, sign
+from miro_host.laws.yang_kim import Gains, guarded_inverse, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TIMES, TURNS
+from tests.host.theory.paper_law import YangKim
 from tests.naive import host_control as naive
 
 SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)

@@ -120,17 +120,6 @@ class YangKim(Law[Gains]):
         inner = {"u1": u1, "u2": u2, "s1": c.s1, "s2": c.s2}
         return Accelerations(r.v_dot_m_s2 + u1, r.w_dot_rad_s2 + u2, inner)
 
-    def control(
-        self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float
-    ) -> "YangKimControl":
-        """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
-
-        ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
-        """
-        control = YangKimControl(self.parameters)
-        control.work_out(reference, measured, v_m_s, w_rad_s)
-        return control
-
 
 class YangKimControl:
     """What the law saw and what it answers, with one set of gains.
@@ -157,7 +146,10 @@ class YangKimControl:
         return f"YangKimControl(s1={self.s1!r}, s2={self.s2!r}, u1={self.u1!r}, u2={self.u2!r})"
 
     def work_out(self, r: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> None:
-        """See `YangKim.control`."""
+        """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
+
+        ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
+        """
         x, y, theta = measured.x_m, measured.y_m, measured.theta_rad
         rho_r, phi_r, theta_r = r.rho_m, r.phi_rad, r.posture.theta_rad
         rho_r_rate, phi_r_rate, w_r = r.rho_rate_m_s, r.phi_rate_rad_s, r.w_rad_s

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import msgspec
 
 from miro_exact.dmath import wrap_pi
-from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
+from miro_host.laws.yang_kim import Gains, curvature_term, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from mirotwin.recording.theory_track import across, radius
+from tests.host.theory.paper_law import YangKim
 
 NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
 SLOPED = msgspec.structs.replace(NO_GUARD, layer_derivative=True)

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from miro_host.laws.yang_kim import YangKim, sign
+from miro_host.laws.yang_kim import sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc, StraightLine
 from mirotwin.recording.theory_track import HALF_PI, across, radius
 from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TURNS, later
 from tests.host.theory import stability
 from tests.host.theory.ideal import PRINTED
+from tests.host.theory.paper_law import YangKim
 from tests.host.theory.stability import NO_GUARD, SLOPED, rates, rising, states
 
 TIMES = st.floats(0.1, 0.4) | st.floats(0.6, 5.8)  # not on the corner of the ramp

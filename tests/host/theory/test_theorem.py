@@ -9,7 +9,6 @@ from itertools import pairwise
 import pytest
 
 from miro_host.integrator import Limits
-from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc, StraightLine
 from tests.host.theory import stability
@@ -29,6 +28,7 @@ from tests.host.theory.ideal import (
     run_parallel_to_the_line,
     simulated,
 )
+from tests.host.theory.paper_law import YangKim
 from tests.naive.host_ideal_loop import drive
 
 ERRORS = [(StraightLine(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
