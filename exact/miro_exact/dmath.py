@@ -288,12 +288,6 @@ def log(x: float) -> float:
 def log_within(x: float) -> float:
     """`log` for whoever has seen that x is finite and positive."""
     k = 0
-    while x < 2.3283064365386963e-10:  # 2**-32
-        x = x * 4294967296.0
-        k -= 32
-    while x >= 4294967296.0:
-        x = x * 2.3283064365386963e-10
-        k += 32
     while x < 0.5 * _SQRT2:
         x = x * 2.0
         k -= 1
