@@ -27,8 +27,8 @@ _NONE = b"\0\0\0\0"
 _ROOM = 1 << 16
 
 
-NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY = range(6)
-"""How `memory.Attributes` packs a field; the last one is that of a `Memory`."""
+NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY, BLOCK = range(7)
+"""How `memory.Attributes` packs a field; the last two are those of a `Memory`, and of what packs itself."""
 
 
 class Kind:

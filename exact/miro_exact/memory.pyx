@@ -15,7 +15,7 @@ from libc.string cimport memcpy
 import sys
 
 from miro_exact.domain import DomainError
-from miro_exact.fields import ITEMS, MEMORY, NUMBER, OCTETS, ROW
+from miro_exact.fields import BLOCK, ITEMS, MEMORY, NUMBER, OCTETS, ROW
 
 
 cdef struct Place:
@@ -304,15 +304,16 @@ cdef class Memory:
             source += span.size * count
 
 
-cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW, _MEMORY = MEMORY
+cdef int _NUMBER = NUMBER, _ITEMS = ITEMS, _OCTETS = OCTETS, _ROW = ROW, _MEMORY = MEMORY, _BLOCK = BLOCK
 
 
 cdef class Attributes:
     """Fields that are Python objects, and a Memory wherever some are not, packed in one go.
 
     Each is (part, name, shape, codes, number of items, split): the shape is NUMBER or one of its neighbours, the codes
-    are those of the cells, a number that is no array has 0 items. A Memory is the part of a field of shape MEMORY,
-    which has no name. `slow` packs the same fields, and says what is wrong with one: where a value is odd, it is asked.
+    are those of the cells, a number that is no array has 0 items. A Memory is the part of a field of shape MEMORY, and
+    anything with a method `pack` of one of shape BLOCK; these have no name. `slow` packs the same fields, and says what
+    is wrong with one: where a value is odd, it is asked.
     """
 
     cdef list fields
@@ -331,12 +332,16 @@ cdef class Attributes:
         """The fields as flat bytes. Raises what `slow` raises."""
         cdef tuple field
         cdef Memory memory
+        cdef bytes packed
         self.used = 0
         try:
             for field in self.fields:
                 if field[2] == _MEMORY:
                     memory = field[0]
                     memory.write(self.room(memory.size()))
+                elif field[2] == _BLOCK:
+                    packed = field[0].pack()
+                    memcpy(self.room(len(packed)), PyBytes_AS_STRING(packed), len(packed))
                 elif self.add(getattr(field[0], field[1]), field[2], field[3], field[4], field[5]):
                     return self.slow()
         except Exception:

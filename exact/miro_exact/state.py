@@ -43,7 +43,7 @@ from typing import Any, NamedTuple
 
 from miro_exact import engine
 from miro_exact.domain import DomainError
-from miro_exact.fields import FLAG, MEMORY, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
+from miro_exact.fields import BLOCK, FLAG, MEMORY, TICK, Items, Kind, Number, Octets, Queue, Row, Rows
 
 __all__ = ["FLAG", "TICK", "Flat", "Items", "Octets", "Queue", "Row", "Rows"]
 
@@ -167,11 +167,11 @@ class Flat:
         self._walk(root, "", True)
         if not self._pieces:
             raise TypeError(f"{type(root).__name__} declares no state")
-        known = _blocks(self._pieces)
-        self._blocks = [one.block for one in known]
+        blocks = _blocks(self._pieces)
+        self._blocks = [block for block, _ in blocks]
         self._steps = [*(block.put for block in self._blocks), *self._after]
-        self._packed = _together(known)
-        self._hashed = _together([one for one in known if one.counts])
+        self._packed = _together(self._blocks)
+        self._hashed = _together([block for block, counts in blocks if counts])
 
     @cached_property
     def fields(self) -> list[StateField]:
@@ -324,58 +324,45 @@ def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[i
 # ---- blocks
 
 
-class Known(NamedTuple):
-    """A block, whether it enters a digest, and its fields for `memory.Attributes`, None where that packs none.
+def _blocks(pieces: list[Piece]) -> list[tuple[Any, bool]]:
+    """The blocks of a state, in order, and whether they enter a digest.
 
-    Blocks are a `One` or a `memory.Memory`: neighbouring fields with `pack`, `check` and `put`.
+    A block is a `One` or a `memory.Memory`: neighbouring fields with `pack`, `check` and `put`.
     """
-
-    block: Any
-    counts: bool
-    attributes: list[tuple[Any, ...]] | None
-
-
-def _blocks(pieces: list[Piece]) -> list[Known]:
-    """Of a state, in order."""
-    found: list[Known] = []
+    found: list[tuple[Any, bool]] = []
     for (is_compiled, counts), group in groupby(
         pieces, lambda one: (one.group.layout is not None, one.counts)
     ):
         if is_compiled:
             from miro_exact.memory import Memory
 
-            memory = Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group])
-            found.append(Known(memory, counts, [(memory, "", MEMORY, b"", 0, None)]))
+            found.append(
+                (Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group]), counts)
+            )
             continue
         for (field,) in map(Piece.fields, group):
-            before = found[len(found) - 1].block if found else None
-            found.append(Known(One(field, before), counts, _attributes(field)))
+            found.append((One(field, found[len(found) - 1][0] if found else None), counts))
     return found
 
 
-def _together(known: list[Known]) -> list[Any]:
-    """The same blocks for packing alone: neighbours become one, but for those that only `fields` can pack."""
-    found: list[Any] = []
-    for is_slow, group in groupby(known, lambda one: one.attributes is None):
-        together = list(group)
-        blocks = [one.block for one in together]
-        if is_slow:
-            found += blocks
-        else:
-            from miro_exact.memory import Attributes
+def _together(blocks: list[Any]) -> list[Any]:
+    """The same blocks for packing alone: one block, if compiled code is there to pack it."""
+    if engine.active() != "compiled":
+        return blocks
+    from miro_exact.memory import Attributes
 
-            attributes = [field for one in together for field in one.attributes or ()]
-            found.append(Attributes(attributes, partial(_pack_each, blocks)))
-    return found
+    return [Attributes(list(map(_attributes, blocks)), partial(_pack_each, blocks))]
 
 
-def _attributes(field: StateField) -> list[tuple[Any, ...]] | None:
-    """What `memory.Attributes` has to know of a field that is a Python object; None where it cannot pack it."""
-    packed = field.kind.packed
-    if engine.active() != "compiled" or packed is None or not set(field.kind.form) <= _PACKED_CODES:
-        return None
+def _attributes(block: Any) -> tuple[Any, ...]:
+    """What `memory.Attributes` has to know of a block."""
+    if not isinstance(block, One):
+        return block, "", MEMORY, b"", 0, None
+    packed = block.kind.packed
+    if packed is None or not set(block.kind.form) <= _PACKED_CODES:
+        return block, "", BLOCK, b"", 0, None
     shape, codes, count, split = packed
-    return [(field.part, field.name, shape, codes.encode(), count, split)]
+    return block.part, block.name, shape, codes.encode(), count, split
 
 
 def _pack_each(blocks: Sequence[Any]) -> bytes:
