@@ -379,9 +379,8 @@ class _PortWaits(Waits):
         self._gather(watch)
 
 
-def _check_address(url: str) -> None:
+def _check_address(url: str, scheme: str) -> None:
     """Refuses a network address without a port: what pyserial says of it is a fault of its own."""
-    scheme = url.partition("://")[0].lower()
     with suppress(ValueError):  # letters, or beyond 65535
         if scheme not in ("socket", "rfc2217") or urlsplit(url).port is not None:
             return
@@ -390,18 +389,15 @@ def _check_address(url: str) -> None:
 
 
 def _opened(url: str) -> Any:
-    _check_address(url)
-    more: dict[str, Any] = {"write_timeout": BLOCKED_S}
-    address = url
-    if url.lower().startswith("rfc2217:"):  # ser2net says nothing of a DTR that is not there
-        more["write_timeout"] = None  # the only one that pyserial has there
+    scheme = url.partition("://")[0].lower()
+    _check_address(url, scheme)
+    address, blocked_s = url, None if scheme == "rfc2217" else BLOCKED_S  # pyserial has no other there
+    if scheme == "rfc2217":  # ser2net says nothing of a DTR that is not there
         address += "&ign_set_control" if "?" in url else "?ign_set_control"
         realtime_priority()  # of the thread that reads there, too
     try:
-        port = serial.serial_for_url(address, BAUD, timeout=0, exclusive=True, **more)
-        if url.lower().startswith(
-            "socket:"
-        ):  # or a frame waits until the one before is acknowledged, up to 40 ms
+        port = serial.serial_for_url(address, BAUD, timeout=0, exclusive=True, write_timeout=blocked_s)
+        if scheme == "socket":  # or a frame waits until the one before is acknowledged, up to 40 ms
             with socket.socket(fileno=os.dup(port.fileno())) as same:
                 same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return port
