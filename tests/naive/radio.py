@@ -10,7 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 from miro_exact.clock import ticks
-from miro_sim.radio.probability import margin_table, threshold
+from miro_sim.radio.params import margin_table, threshold
 from tests.naive import rng
 
 Symbol = tuple[int, bool, int]

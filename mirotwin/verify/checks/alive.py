@@ -20,8 +20,7 @@ from miro_protocol.robot_receiver import Freshness
 from miro_protocol.table import downlink
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
-from miro_sim.radio.params import UP, Radio
-from miro_sim.radio.probability import ONE, threshold
+from miro_sim.radio.params import ONE, UP, Radio, threshold
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, ms_ticks

@@ -1,11 +1,8 @@
 """The band down: one transmitter, and one receiver per robot of the network.
 
-What is on the air is in `sender`, what a robot receives of it in `listener`.
-
 A transmission handed over for tick s arrives at s + latency + jitter, or when the one before it is over.
 The jitter is drawn from `NAME/jitter` at index s // 2500: 0 .. jitter_ticks, all alike. A transmission that
 `NAME/lost_frames` loses at that index is never on the air: the PC takes it for sent, robots hear no carrier.
-
 Networks on one frequency hear each other (`overhear`); the bands up stay apart.
 """
 
@@ -16,8 +13,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.listener import Listener
-from miro_sim.radio.params import Radio
-from miro_sim.radio.probability import threshold
+from miro_sim.radio.params import Radio, threshold
 from miro_sim.radio.sender import Sender
 
 _BIT = HOST_BIT_TICKS

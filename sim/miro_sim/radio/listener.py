@@ -1,18 +1,8 @@
-"""One robot's receiver: from what is on the air to the level on its RXD wire.
+"""One robot's receiver: from what is on the air to the level on its RXD wire, by the chain in the README.
 
-    collision   another carrier on the frequency has another level: a fair coin           `NAME/collision`
-    carrier     lost in a drop-out: noise, or mark if squelched          `NAME/dropouts`, `NAME/noise`
-    slicer      its threshold gives the chance of an error
-    channel     a burst, or else the Gaussian errors, turn the bit over    `NAME/bursts`, `NAME/errors`
-    module      a character is lost and its bits are mark                                 `NAME/lost`
-
-Idle carrier goes through the same chain, in slots of 2500 ticks of absolute time, with `NAME/idle` for its
-errors: a false start bit, a burst, a slicer that has drifted off. What does not belong here: what is on the
-air (`sender`), the UART behind the wire.
-
-Error draws of a bit are numbered by the time at its transmitter, so that no two bits share one; all others by
-the slot (tick // 2500) in which the bit begins here. So everything depends on what was sent and on the tick
-alone, not on how often or up to where one asked.
+Idle carrier goes through the same chain, in slots of 2500 ticks of absolute time. Error draws of a bit are numbered by
+the time at its transmitter, so that no two bits share one; all others by the slot (tick // 2500) in which the bit
+begins here. So everything depends on what was sent and on the tick alone, not on how often or up to where one asked.
 """
 
 from __future__ import annotations
@@ -22,8 +12,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.params import DOWN, NOISE, UP, Radio
-from miro_sim.radio.probability import threshold
+from miro_sim.radio.params import DOWN, NOISE, UP, Radio, threshold
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
 

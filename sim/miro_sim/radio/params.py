@@ -1,6 +1,6 @@
 """What a radio network is like: the keys of a scenario's `[network.radio]`, and the ticks and chances they stand for.
 
-Chances are thresholds of a 32-bit draw: a probability times 2^32.
+Chances are thresholds of a 32-bit draw: a probability times 2^32. Bit errors are those of non-coherent FSK.
 """
 
 from fractions import Fraction
@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import msgspec
 
 from miro_exact import clock
-from miro_sim.radio.probability import fsk_threshold, threshold
 from miro_sim.ranges import Ranged, Within
 
 LinkState = Literal["up", "down", "noise"]
@@ -22,6 +21,11 @@ down    the transmitters are off: receivers hear no carrier, which is mark if sq
 noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
 """
 
+ONE = 1 << 32
+"""The threshold that every draw is below."""
+LN10_TENTH = 0.23025850929940458
+MARGIN_STEPS = 128
+"""Entries of `margin_table` in a margin of 1."""
 BIT_S = Fraction(clock.HOST_BIT_TICKS, clock.TICKS_PER_SECOND)
 BIT_ERROR_RATE = 1e-4
 """What holds when a scenario names neither a bit-error rate nor Eb/N0."""
@@ -170,3 +174,39 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
 def bit_ticks(baud_offset_ppm: int, crystal_offset_ppm: int) -> Fraction:
     """The time of a bit sent at 9600 (1 + baud offset) baud on a clock of 24 MHz (1 + crystal offset)."""
     return Fraction(clock.HOST_BIT_TICKS * (1_000_000 + crystal_offset_ppm), 1_000_000 + baud_offset_ppm)
+
+
+def threshold(probability: float | Fraction) -> int:
+    """A probability as the number of the 2^32 values of a draw that mean "yes", rounded half up.
+
+    The float stands for the decimal number that it prints as, as in `clock.ticks`. Raises ValueError outside 0 .. 1.
+    """
+    exact = clock.exact(probability)
+    if not 0 <= exact <= 1:
+        raise ValueError(f"the probability {probability} is outside 0 .. 1")
+    return (2 * exact * ONE + 1) // 2
+
+
+def fsk_threshold(eb_n0_db: float, margin: float = 1.0) -> int:
+    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0), of a signal of `margin` the amplitude.
+
+    Source: J. G. Proakis, Digital Communications, non-coherent detection of binary orthogonal FSK.
+    """
+    from miro_exact.dmath import exp  # a hot module: not before the engine was chosen
+
+    exponent = 0.5 * exp(eb_n0_db * LN10_TENTH)
+    return int(2147483648.0 * exp(-(exponent * (margin * margin))) + 0.5)
+
+
+def margin_table(eb_n0_db: float) -> tuple[int, ...]:
+    """Thresholds of a wrong decision at margins -1, -1 + 1/128, .. 3.
+
+    The margin is the distance of the signal from the slicer's threshold, 1 when that is in the middle. A
+    margin m has the errors of a signal of m times the amplitude, 0.5 exp(-m^2 Eb/2N0). A negative one means
+    that the decision is wrong unless noise turns it over: 1 - that.
+    """
+    table = []
+    for step in range(-MARGIN_STEPS, 3 * MARGIN_STEPS + 1):
+        wrong = fsk_threshold(eb_n0_db, float(step) / float(MARGIN_STEPS))
+        table.append(ONE - wrong if step < 0 else wrong)
+    return tuple(table)

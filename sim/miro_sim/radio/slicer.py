@@ -5,16 +5,12 @@ there is a carrier (the crystals of the two ends differ), and noise of mean 0 wi
 that, smoothed with one time constant (AC coupling): at rest it is at 0, so after key-up it has to climb to
 `offset` first, and a run of equal bits draws it towards their level. A mark is decided with the margin
 1 - threshold + offset, a space with 1 + threshold - offset.
-
-Chosen, not taken from a data sheet: one time constant, in Euler steps of one bit time, rounded down; the
-decision about a bit is taken with the threshold at its beginning.
 """
 
 from __future__ import annotations
 
 from miro_exact.state import TICK
-from miro_sim.radio.params import SlicerParams
-from miro_sim.radio.probability import margin_table
+from miro_sim.radio.params import SlicerParams, margin_table
 
 _BIT = 2500
 _ONE = 65536

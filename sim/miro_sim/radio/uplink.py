@@ -1,10 +1,8 @@
 """The PC's end of the band up: a UART that turns the level into symbols.
 
 It waits for a falling edge, samples the start bit in its middle (1250 ticks on; mark there is a false start), then
-eight data bits and the stop bit 2500 ticks apart, and waits for the next falling edge after the stop bit's sample. A
-symbol is known at that sample. With an offset of the PC's baud rate or the robots' crystals the bit is another
-fraction of ticks (`params`). How the level comes about is the business of `band`, what the symbols mean that of
-`miro_protocol`.
+eight data bits and the stop bit 2500 ticks apart (another fraction of ticks where baud rate or crystals are off), and
+waits for the next falling edge after the stop bit's sample. A symbol is known at that sample.
 """
 
 from __future__ import annotations

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_sim.radio.params import Dropouts, Radio
-from miro_sim.radio.probability import ONE, fsk_threshold, margin_table, threshold
+from miro_sim.radio.params import ONE, Dropouts, Radio, fsk_threshold, margin_table, threshold
 
 
 def test_units_become_ticks_and_a_threshold():

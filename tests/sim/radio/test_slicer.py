@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.downlink import Downlink
-from miro_sim.radio.params import SlicerParams
-from miro_sim.radio.probability import fsk_threshold, margin_table
+from miro_sim.radio.params import SlicerParams, fsk_threshold, margin_table
 from miro_sim.radio.slicer import Slicer
 from tests.naive import radio as naive
 from tests.sim.radio.noise import listen
