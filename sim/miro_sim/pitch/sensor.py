@@ -135,7 +135,7 @@ class Sensor:
 
     def _shown(self, total: int, light: int) -> int:
         value = ((total * light >> 12) * self.scale >> 24) + self.offset
-        return self.gamma[0 if value < 0 else (value if value < _FULL else _FULL)]
+        return self.gamma[min(value, _FULL)]
 
     def write(self, row: int, left: int, width: int, out: bytearray, at: int) -> None:
         """The bytes of the line's pixels from `left` on into `out` from `at` on; `side` more were put on each side."""
