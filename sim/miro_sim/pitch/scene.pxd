@@ -20,20 +20,21 @@ cdef class Scene:
     cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y, falloff
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
     cdef readonly bint has_ball
+    cdef long long slope_x[16]
+    cdef long long slope_y[16]
 
-    cdef bint _near_ball(self, int pixel) noexcept
+    cdef inline bint _near_ball(self, int pixel) noexcept
     @cython.locals(paint=int)
     cdef bint shows_ball(self, int pixel) noexcept
     cdef void show(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef void _light_up(self, sensor.Sensor sensor, int row, int first, int end, int instants) noexcept
     cdef inline int behind(self, int pixel) noexcept
     cdef void look(self, int pixel) noexcept
-    cdef int sample(self, int pixel, int sample) noexcept
-    cdef int ball_above(self, int pixel, int sample, long long above) noexcept
-    @cython.locals(slopes='int[::1]', above='long long', below='long long')
-    cdef long long _slope(self, bint along_x, int pixel, int sample) noexcept
-    cdef int _ball(self, long long slope_x, long long slope_y, long long above) noexcept
-    cdef int _paint_of(self, long long slope_x, long long slope_y) noexcept
+    @cython.locals(x='long long', y='long long', right_x='long long', right_y='long long')
+    cdef void spread(self, int pixel) noexcept
+    cdef inline int sample(self, int sample) noexcept
+    cdef int ball_above(self, int sample, long long above) noexcept
+    cdef inline int _paint_of(self, long long slope_x, long long slope_y) noexcept
     cdef int _sure(self, int pixel) noexcept
-    cdef bint _inside(self, long long x, long long y, long long more) noexcept
-    cdef bint _on_line(self, long long x, long long y, long long more) noexcept
+    cdef inline bint _inside(self, long long x, long long y, long long more) noexcept
+    cdef inline bint _on_line(self, long long x, long long y, long long more) noexcept

@@ -83,6 +83,7 @@ class Scene:
         self.ball_rim = NUMBERS["ball rim"]
         self.has_ball = ball is not None
         self.ball_x, self.ball_y = ball or (0, 0)
+        self.slope_x, self.slope_y = [0] * 16, [0] * 16
 
     def __repr__(self) -> str:
         return f"Scene({self.rays!r}, ball={(self.ball_x, self.ball_y) if self.has_ball else None})"
@@ -141,42 +142,44 @@ class Scene:
             self.paint[pixel] = paint
             self.total[pixel] = 16 * self.packed[paint]
             return
-        first = self.sample(pixel, 0)
+        self.spread(pixel)
+        first = self.sample(0)
         self.paint[pixel] = first
         self.total[pixel] = self.packed[first]
         for sample in range(1, 16):
-            paint = self.sample(pixel, sample)
+            paint = self.sample(sample)
             self.total[pixel] += self.packed[paint]
             if paint != first:
                 self.paint[pixel] = _MIXED
 
-    def sample(self, pixel: int, sample: int) -> int:
-        """The paint that sample 0 to 15 of a pixel hits, row by row."""
-        x, y = self._slope(True, pixel, sample), self._slope(False, pixel, sample)
-        paint = self._ball(x, y, 0) if self.has_ball else -1
-        return paint if paint >= 0 else self._paint_of(x, y)
-
-    def _slope(self, along_x: bool, pixel: int, sample: int) -> int:
-        """Between the corners of a pixel, at sample 0 to 15, row by row."""
-        slopes = self.rays.slope_x if along_x else self.rays.slope_y
+    def spread(self, pixel: int) -> None:
+        """Turns to the samples of a pixel: their slopes, between its corners, row by row."""
+        rays = self.rays
         a = pixel + pixel // _WIDTH
         c = a + _CORNERS
-        p, q = 2 * (sample & 3) + 1, 2 * (sample >> 2) + 1
-        above = slopes[a] * (8 - p) + slopes[a + 1] * p
-        below = slopes[c] * (8 - p) + slopes[c + 1] * p
-        return (above * (8 - q) + below * q) >> 6
+        for line in range(0, 16, 4):
+            down = line // 2 + 1
+            x = 8 * rays.slope_x[a] + down * (rays.slope_x[c] - rays.slope_x[a])
+            y = 8 * rays.slope_y[a] + down * (rays.slope_y[c] - rays.slope_y[a])
+            right_x = 8 * rays.slope_x[a + 1] + down * (rays.slope_x[c + 1] - rays.slope_x[a + 1])
+            right_y = 8 * rays.slope_y[a + 1] + down * (rays.slope_y[c + 1] - rays.slope_y[a + 1])
+            for column in range(4):
+                self.slope_x[line + column] = (8 * x + (2 * column + 1) * (right_x - x)) >> 6
+                self.slope_y[line + column] = (8 * y + (2 * column + 1) * (right_y - y)) >> 6
 
-    def ball_above(self, pixel: int, sample: int, above: int) -> int:
-        """The paint of the ball if that sample sees it at this height or above, or -1."""
-        return self._ball(self._slope(True, pixel, sample), self._slope(False, pixel, sample), above)
+    def sample(self, sample: int) -> int:
+        """The paint that sample 0 to 15 of this pixel hits."""
+        paint = self.ball_above(sample, 0) if self.has_ball else -1
+        return paint if paint >= 0 else self._paint_of(self.slope_x[sample], self.slope_y[sample])
 
-    def _ball(self, slope_x: int, slope_y: int, above: int) -> int:
-        """The paint of the ball's ring that a ray sees; -1 if it misses the ball or passes it below `above`.
+    def ball_above(self, sample: int, above: int) -> int:
+        """The paint of the ball's ring that a sample sees; -1 if it misses the ball or passes it below `above`.
 
         With e from the centre to the ray in the plane of the centre, and s the slopes: the ray passes the centre at the
         distance d, d^2 (1 + s^2) = e^2 (1 + s^2) - (e s)^2; it is nearest to it e s / (1 + s^2) below that plane.
         """
         rays = self.rays
+        slope_x, slope_y = self.slope_x[sample], self.slope_y[sample]
         drop = rays.height_um - _BALL_UM
         x = rays.x_um + (drop * slope_x >> 22) - self.ball_x
         y = rays.y_um + (drop * slope_y >> 22) - self.ball_y
