@@ -106,29 +106,29 @@ def _part(value: Value, kind: CType, offset: int) -> Value:
     return msgspec.structs.replace(value, kind=kind, address=value.address + offset)
 
 
-def _member(value: Value, name: str) -> Value:
+def _member(value: Value, name: str, text: str) -> Value:
     there = {} if value.kind is not None and value.kind.kind == "array" else dict(children(value))
     if name not in there:
-        raise NoValue(f"has no member {name}", f"it has {', '.join(there)}" if there else "")
+        raise NoValue(f"{text} has no member {name}", f"it has {', '.join(there)}" if there else "")
     return there[name]()
 
 
-def _element(value: Value, index: int) -> Value:
+def _element(value: Value, index: int, text: str = "") -> Value:
     kind = value.kind
     if kind is None or kind.element is None or kind.kind != "array":
-        raise NoValue("is no array and no pointer")
+        raise NoValue(f"{text} is no array and no pointer")
     if not 0 <= index < kind.count:
         raise NoValue(f"[{index}] is outside of {kind}", f"give 0 to {kind.count - 1}")
     return _part(value, kind.element, index * kind.element.size)
 
 
-def _pointed(value: Value, index: Any) -> Value:
+def _pointed(value: Value, index: Any, text: str) -> Value:
     """What a pointer points to, or so many elements after it; of an array its element."""
     if not isinstance(index, int):
         raise NoValue(f"[{index}] is no whole number")
     kind = value.kind
     if kind is None or kind.kind != "pointer":
-        return _element(value, index)
+        return _element(value, index, text)
     address = number(value)
     space = MEMORY_OF_POINTER.get(kind.tag) or _GENERIC.get(address >> 16, "")
     element = kind.element
@@ -206,6 +206,7 @@ class _Reader:
     def __init__(self, text: str, known: Collection[str]) -> None:
         self.text = text
         self.known = known
+        self.taken: list[str] = []
         self.tokens = _TOKEN.findall(text)
         if len(self.tokens) > _MOST_TOKENS:
             raise self.refused("is too long")
@@ -221,6 +222,7 @@ class _Reader:
     def take(self) -> str:
         taken = self.token
         del self.tokens[:1]
+        self.taken.append(taken)
         return taken
 
     def expect(self, wanted: str) -> None:
@@ -239,26 +241,28 @@ class _Reader:
         return left
 
     def unary(self) -> Term:
-        sign = self.token
+        sign, first = self.token, len(self.taken)
         if sign not in (*_SIGNS, "*", "&"):
-            return self.postfix(self.primary())
+            return self.postfix(self.primary(), first)
         self.take()
         term = self.unary()
         if sign == "*":
-            return _indexed(term, lambda moment: _ZERO)
+            return _indexed(term, lambda moment: _ZERO, "".join(self.taken[first + 1 :]))
         if sign == "&":
             return lambda moment: _address(term(moment))
         return _applied(_SIGNS[sign], sign, term)
 
-    def postfix(self, term: Term) -> Term:
+    def postfix(self, term: Term, first: int) -> Term:
+        """What follows a term, whose own text begins with the token `first`."""
         while self.token in (".", "->", "["):
+            text = "".join(self.taken[first:])
             how = self.take()
             if how == "[":
-                term = _indexed(term, self.binary(0))
+                term = _indexed(term, self.binary(0), text)
                 self.expect("]")
             else:
-                target = _indexed(term, lambda moment: _ZERO) if how == "->" else term
-                term = _member_of(target, self.take())
+                target = _indexed(term, lambda moment: _ZERO, text) if how == "->" else term
+                term = _member_of(target, self.take(), text)
         return term
 
     def primary(self) -> Term:
@@ -287,14 +291,21 @@ def _constant(token: str) -> int | float | None:
     return None
 
 
-def _indexed(term: Term, index: Term) -> Term:
-    return lambda moment: _pointed(term(moment), number(index(moment)))
+def _indexed(term: Term, index: Term, text: str) -> Term:
+    return lambda moment: _pointed(term(moment), number(index(moment)), text)
 
 
-def _member_of(term: Term, name: str) -> Term:
-    """A member, or by a number a bit."""
+def _member_of(term: Term, name: str, text: str) -> Term:
+    """A member, or by a number a bit. `text` is the term's own."""
     if not name.isdecimal():
-        return lambda moment: _member(term(moment), name)
-    if int(name) > 31:
-        raise NoValue(f"has no bit {name}")
-    return _applied(lambda bits: bits >> int(name) & 1, f".{name}", term)
+        return lambda moment: _member(term(moment), name, text)
+    index = int(name)
+
+    def bit(moment: Moment) -> Value:
+        value = term(moment)
+        bits = 32 if value.kind is None else 1 if value.kind.kind == "bit" else 8 * value.kind.size
+        if index >= bits:
+            raise NoValue(f"{text} has no bit {name}", f"give 0 to {bits - 1}")
+        return value
+
+    return _applied(lambda word: word >> index & 1, f".{name}", bit)
