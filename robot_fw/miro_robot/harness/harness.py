@@ -100,8 +100,7 @@ class Moment:
         self.passed = array("i", [n for index, count in enumerate(edges) if count for n in (index, count)])
         self.edge_before = cpu.edge_before
         self.edge_depth = cpu.edge_depth
-        for depth in range(8):
-            self.edge_outer[depth] = cpu.edge_outer[depth]
+        self.edge_outer[:] = cpu.edge_outer
         self.highest_sp = cpu.highest_sp
 
     def put(self) -> None:
@@ -113,8 +112,7 @@ class Moment:
             cpu.edges[self.passed[place]] = (count & 0xFF) + (count >> 8)
         cpu.edge_before = self.edge_before
         cpu.edge_depth = self.edge_depth
-        for depth in range(8):
-            cpu.edge_outer[depth] = self.edge_outer[depth]
+        cpu.edge_outer[:] = self.edge_outer
         cpu.highest_sp = self.highest_sp
 
     def tell(self) -> None:

@@ -224,6 +224,5 @@ class FilterBuffer:
 
     def take(self) -> None:
         """UDF was accepted: it will act on the registers as they are now."""
-        for place in range(4):
-            self.taken[place] = self.coefficients[place]
+        self.taken[:] = self.coefficients
         self.taken_ds = self.ds

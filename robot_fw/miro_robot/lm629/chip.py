@@ -190,7 +190,8 @@ class Lm629:
             kept = self.signals.word & _STOP_ON_ERROR
         if self.encoder.armed:
             kept |= _ACQUIRE_INDEX
-        self.signals.during_reset(kept)
+        self.signals.word = kept
+        self.signals.mask = 0
         self.excessive = 0
         self.real_position = 0
         self.real_velocity = 0
@@ -618,15 +619,12 @@ class Lm629:
 
     def _words_due(self) -> int:
         """Words that the command in progress may still want from the host."""
-        command = BY_OPCODE.get(self.port.command)
-        if command is None:
-            return 0
         begun = self.port.recorded >= 2
-        if begun and command.name == "LTRJ":
+        if begun and self.port.command == _LTRJ:
             return self.trajectory_buffer.words_due()
-        if begun and command.name == "LFIL":
+        if begun and self.port.command == _LFIL:
             return self.filter_buffer.words_due()
-        return command.words_in
+        return _WORDS_IN[self.port.command]
 
     def check_times(self, earliest_tick: int) -> None:
         """Raises ValueError unless a restored chip goes on at `earliest_tick` or soon after."""

@@ -1,5 +1,3 @@
-cimport cython
-
 cdef int ACCELERATION, FORWARD, MOTOR_OFF, STOP_ABRUPTLY, STOPS, VELOCITY, VELOCITY_MODE
 cdef int _RESET, _STT, _LTRJ, _NO_WORD
 
@@ -17,7 +15,3 @@ cdef class WheelOrder:
     cpdef int word(self) noexcept
     cdef int _start(self) except -1
     cdef int _load(self, bytes data) except -1
-
-
-@cython.locals(value='long long')
-cdef long long _number(bytes data, int at) noexcept

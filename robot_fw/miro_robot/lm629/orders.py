@@ -82,17 +82,9 @@ class WheelOrder:
         self._control = control
         at = 2
         if control & ACCELERATION and at + 4 <= len(data):
-            relative = control & ACCELERATION >> 1
-            self._acceleration = _number(data, at) + (self._acceleration if relative else 0)
+            loaded = int.from_bytes(data[at : at + 4], "big", signed=True)
+            self._acceleration = loaded + (self._acceleration if control & ACCELERATION >> 1 else 0)
             at += 4
         if control & VELOCITY and at + 4 <= len(data):
-            relative = control & VELOCITY >> 1
-            self._velocity = _number(data, at) + (self._velocity if relative else 0)
-
-
-def _number(data: bytes, at: int) -> int:
-    """Four bytes with sign, the first of which is byte `at`."""
-    value = (data[at] ^ 0x80) - 0x80
-    for place in range(at + 1, at + 4):
-        value = value * 256 + data[place]
-    return value
+            loaded = int.from_bytes(data[at : at + 4], "big", signed=True)
+            self._velocity = loaded + (self._velocity if control & VELOCITY >> 1 else 0)

@@ -8,7 +8,6 @@ cdef class Signals:
     cdef readonly int level, reset_raises
     cdef public int word, mask
 
-    cpdef void during_reset(self, int kept) noexcept
     cpdef void after_reset(self) noexcept
     cpdef void raise_flags(self, int flags) noexcept
     cpdef void reset_interrupts(self, int keep) noexcept

@@ -40,11 +40,6 @@ class Signals:
         self.word = 0
         self.mask = 0
 
-    def during_reset(self, kept: int) -> None:
-        """Nothing but the bits of `kept` survives."""
-        self.word = kept
-        self.mask = 0
-
     def after_reset(self) -> None:
         """All but the breakpoint may interrupt. Motor off counts as a trajectory that is complete."""
         self.mask = 0x3E

@@ -26,7 +26,6 @@ cdef class ExternalInterrupts:
     cdef readonly int control
     cdef public int levels
 
-    cpdef void clear(self, long long cycle) noexcept
     cpdef void sample(self, int number, int level, long long cycle) noexcept
     cpdef void write(self, int value, long long cycle) noexcept
     cpdef void taken(self, int number, long long cycle) noexcept

@@ -135,10 +135,6 @@ class ExternalInterrupts:
         self.control = 0  # TCON.3:0 = IE1 IT1 IE0 IT0
         self.levels = 3  # pins INT1, INT0 as last sampled
 
-    def clear(self, cycle: int) -> None:
-        """TCON as after reset; the pins stay what they are."""
-        self.write(0, cycle)
-
     def sample(self, number: int, level: int, cycle: int) -> None:
         """The pin of INT`number` changed to `level` for the sample at S5P2 of `cycle`."""
         bit = 1 << number

@@ -86,7 +86,7 @@ class Peripherals:
         self.smod = 0
         self.interrupts.clear()
         self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
-        self.external.clear(cycle)
+        self.external.write(0, cycle)
         self.timers.clear(cycle)
         self.timer2.clear(cycle)
         self.uart.clear(cycle)
