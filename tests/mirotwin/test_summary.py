@@ -29,9 +29,11 @@ KEYS = {
 SEEN = dict(zip(KEYS["vision"].split(), (180, 1, 2, 0, 0, 0), strict=True))
 
 
-def summary_of(run):
+def summary_of(run, counters=((178, 2, 0),)):
+    """Of a run in which each robot's firmware has counted so many frames."""
     cpu = SimpleNamespace(instructions=5, cycles=7, idle_cycles=2)
-    robot = SimpleNamespace(board=SimpleNamespace(cpu=cpu, fault_count=0), counter=(178, 2, 0).__getitem__)
+    board = SimpleNamespace(cpu=cpu, fault_count=0)
+    robots = [SimpleNamespace(board=board, counter=counted.__getitem__) for counted in counters]
     network = SimpleNamespace(frames_sent=180, bit_errors=9, sight=SimpleNamespace(counts=lambda: SEEN))
     world = SimpleNamespace(
         scenario=load("fig6").scenario,
@@ -39,7 +41,7 @@ def summary_of(run):
         image=SimpleNamespace(sha256="ab" * 32),
         tick=len(run) * CONTROL_PERIOD_TICKS,
         networks=[network],
-        robots=[robot],
+        robots=robots,
     )
     return summarise(world, Tracks(run), 0.5)
 
@@ -53,6 +55,16 @@ def test_the_file_has_exactly_the_keys_that_others_read():
     for table, keys in KEYS.items():
         found = written[table] if table else written
         assert list(found) == keys.split()
+
+
+def test_frames_are_added_over_the_robots_and_unknown_where_one_counts_none():
+    link = summary_of([], [(178, 2, 0), (5, None, 0)]).link
+    assert (link.frames_sent, link.frames_accepted, link.frames_rejected, link.frames_stale) == (
+        180,
+        183,
+        None,
+        0,
+    )
 
 
 def test_several_robots_are_listed_beside_the_first():
