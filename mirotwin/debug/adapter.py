@@ -223,7 +223,7 @@ class Adapter:
 
     def _move(self, command: str, given: Message) -> Message | None:
         thread = self._thread(given)
-        if thread != self.timeline.focus:
+        if thread != self.timeline.focus and not _MOVES[command].endswith("continue"):
             self.timeline.focus = thread
             self.timeline.go_to(self.timeline.tick)
         by_instruction = given.get("granularity") == "instruction"

@@ -18,7 +18,7 @@ from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import LENGTH, SFRS, is_call
+from miro_robot.mcs51.opcodes import LENGTH, SFRS, byte_of_bit, is_call
 from miro_sim.world.conditions import Condition
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
@@ -88,6 +88,7 @@ class Debugger:
         self.changed = False
         self._numbers = 0
         self._told_there: list[LogOutput] = []
+        self._stopped_at: Position = (-1, 0)
 
     # Where it stands
 
@@ -135,8 +136,7 @@ class Debugger:
         value = place or expression(text)(self.moment())
         space, address, size = value.space, value.address, value.kind.size if value.kind else 0
         if space == "bit":
-            sfr = address >= 0x80
-            space, address = ("sfr", address & 0xF8) if sfr else ("iram", 0x20 + (address >> 3))
+            space, address = "sfr" if address >= 0x80 else "iram", byte_of_bit(address)
         if not size or space not in ("iram", "sfr", "xram") or not 0 <= address <= SIZES[space] - size:
             raise NoValue(
                 f"{text} lies in no memory that can be watched", "name a variable: `print` says what it is"
@@ -253,6 +253,8 @@ class Debugger:
     ) -> Hit | None:
         """To what stops, by `seek`."""
         here, interrupted = self.timeline.here, self.timeline.interrupted
+        if step is not None and here[0] == self._stopped_at[0]:
+            here = max(here, self._stopped_at)  # of another processor, in the same cycle
         hit, self.changed = None, True
         with self.timeline.interrupted_by(lambda: interrupted() or self.changed):
             while hit is None and self.changed:
@@ -272,6 +274,7 @@ class Debugger:
         if hit is None:
             return self._at_end() or INTERRUPTED
         self._told_there = [one for one in self.told if one[:2] == hit[:2]]
+        self._stopped_at = hit[:2]
         return _named(hit)
 
     def _back(self) -> str:

@@ -138,6 +138,8 @@ class Moment:
             remedy = did_you_mean(name, self.symbols.known)
             if owners:
                 remedy = f"it is a local variable of {', '.join(sorted(owners))}"
+            elif name == "lm629":
+                remedy = "it is a robot's, and this is the bare processor"
             raise NoValue(f"there is no {name} here", remedy)
         if symbol.space == "code":
             return Value(number=symbol.address, note="an address of code")

@@ -387,6 +387,20 @@ def test_robots_are_threads_that_stop_together(adapter, short):
     assert stopped == {1, 2}
 
 
+@pytest.mark.parametrize("move", ["continue", "next"])
+def test_a_move_of_another_thread_does_not_stop_again_where_it_stopped(adapter, short, move):
+    _, client = adapter
+    client.begin(subject=str(short), at="100ms")
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "uart_interrupt"}])
+    stops = []
+    for _ in range(6):
+        client.send(move, threadId=1)
+        thread = client.until(event="stopped")["body"]["threadId"]
+        tick = client.ask("evaluate", expression="tick")["body"]["result"]
+        stops.append((int(tick.split()[0]), thread))
+    assert stops == sorted(set(stops))
+
+
 def test_each_thread_shows_the_memory_of_its_own_robot(adapter, short):
     _, client = adapter
     client.begin(subject=str(short), at="100ms")

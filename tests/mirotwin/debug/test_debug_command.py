@@ -93,6 +93,11 @@ def test_an_image_without_symbols_has_addresses_and_says_so(console, bare):
     assert " #1  0x003b in " in out
 
 
+def test_a_bare_processor_has_no_chips_and_says_so(mirotwin, bare):
+    err = mirotwin.ends(2, "debug", bare, *commands("print lm629.left"))
+    assert "there is no lm629 here; it is a robot's, and this is the bare processor" in err
+
+
 def test_a_case_stands_at_its_failed_check(mirotwin, console, tmp_path):
     scenario = tmp_path / "late.scenario.toml"
     text = 'scenario = "fig6"\nname = "late"\nset.duration_s = 0.3\nexpect.frames_accepted_min = 50\n'
