@@ -38,7 +38,6 @@ from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import Answer, Condition, Heard, Sent, answer_of
 from miro_sim.world.events import Cursor, Event, HostLog
 from miro_sim.world.waits import Waits
-from miro_sim.world.watch import Watch
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.recording.recorder import Recorder
 from mirotwin.shell.held_signals import held_signals
@@ -185,8 +184,20 @@ class RobotPort:
         return self.waits.until([condition, *others], within)
 
     def run_piece(self, tick: int) -> None:
-        """Until then, but no longer than to the next characters that come."""
+        """For `Waits`: until then, but no longer than to the next characters that come."""
         self._take(self._read(max(0, tick - self.tick)))
+
+    def begin_period(self) -> None:
+        """For `Waits`, as the next three: time only goes on here, and what came is in the log."""
+
+    def rendezvous(self, tick: int) -> int:
+        return tick
+
+    def mark(self) -> RobotPort:
+        return self
+
+    def go_back(self, mark: RobotPort) -> None:
+        pass
 
     # ---- sending -----------------------------------------------------------------------------------------
 
@@ -253,7 +264,7 @@ class RobotPort:
             if counted := self._who_answers(robots, sent):
                 self.slots, self._counted = tuple(sorted(counted)), counted
                 self.began_tick = self._now
-                self.waits = _PortWaits(cast("World", self))
+                self.waits = Waits(cast("World", self))
                 return robots
         self._keep(self._decoder.flush(), self._heard_tick)
         raise BadInput(self.url, "", *self._why_nobody(sizes, first))
@@ -369,14 +380,6 @@ class RobotPort:
         if name.startswith("_"):
             raise AttributeError(name)
         raise NotObservable(f"`{name}` of a robot's world")
-
-
-class _PortWaits(Waits):
-    """Time only goes on at a port: what came is in the log, and no piece is run again."""
-
-    def _run_piece(self, watch: Watch, until_tick: int) -> None:
-        self.world.run_piece(until_tick)
-        self._gather(watch)
 
 
 def _check_address(url: str, scheme: str) -> None:

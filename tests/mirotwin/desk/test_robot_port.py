@@ -21,8 +21,10 @@ from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
+from mirotwin import Telemetry
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PortError, RobotPort
+from mirotwin.testing.link import Link
 from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.desk.rig import ROBOT, stream_text
@@ -124,6 +126,14 @@ def test_characters_come_with_the_time_at_which_they_were_there(pty):
         before = port.tick
     assert [one.data for one in port.wire] == [b"abc"]
     assert port.wire[0].end_tick <= before
+
+
+def test_a_link_waits_for_an_answer_at_a_port():
+    with robots_at(ROBOT) as port:
+        port.greet()
+        link = Link(port)
+        link.poll(slot=0)
+        assert link.expect(Telemetry, within=80 * MS).accepted == 1
 
 
 def test_a_frame_over_tcp_does_not_wait_until_the_one_before_is_acknowledged():
