@@ -1,4 +1,4 @@
-"""The house rules: ruff, mypy --strict, the layering contract, the length of files, and tests without annotations."""
+"""The house rules: ruff, mypy --strict, layers, the length of files, tests without types, indices that compile."""
 
 import ast
 import sys
@@ -75,3 +75,22 @@ def test_no_test_is_annotated():
 )
 def test_an_annotated_test_is_found(source):
     assert annotated_tests(source) == ["test_a"]
+
+
+def from_the_end(source):
+    """Lines that index from the end. Compiled code does not: it reads what lies before the first item."""
+    indices = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Subscript))
+    return [index.lineno for index in indices if isinstance(index.slice, ast.UnaryOp)]
+
+
+def test_no_hot_module_indexes_from_the_end():
+    hot = [path.with_suffix(".py") for path in SOURCES if path.suffix == ".pxd"]
+    found = {
+        str(path.relative_to(ROOT)): from_the_end(path.read_text("utf-8")) for path in hot if path.exists()
+    }
+    assert not {path: lines for path, lines in found.items() if lines}
+    assert len(found) > 50
+
+
+def test_an_index_from_the_end_is_found():
+    assert from_the_end("a = b[-1]\nc = d[:-1], d[0]\n") == [1]
