@@ -73,7 +73,7 @@ def _print_instruction(what: str, found: InstructionDifference, words: tuple[str
     ]
     if values:
         more = f"; {len(values) - LISTED} more" if len(values) > LISTED else ""
-        complain(f"  behind it {'; '.join(values[:LISTED])}{more}")
+        complain(f"  after it {'; '.join(values[:LISTED])}{more}")
 
 
 def _print_variable(found: VariableDifference, words: tuple[str, str]) -> None:

@@ -195,7 +195,7 @@ def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(mirotw
     assert "failsafe.c:" in changed
     assert "`if (age == FAILSAFE_STOP_MS) {`: MOV A,#6Eh" in changed
     assert "`if (age == FAILSAFE_STOP_MS + 15) {`: MOV A,#7Dh" in err
-    assert "behind it ACC: recorded 110, replayed 125" in err
+    assert "  after it ACC: recorded 110, replayed 125" in err
     assert "they go on at different places after tick " in err
     assert "CJNE A,_age," in err
     assert "/net0/robot0/lm629 right command" in out
