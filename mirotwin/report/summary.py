@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -17,7 +17,6 @@ from mirotwin.report.theory import SlidingGains, Theory, gains_of, rms, theory_o
 from mirotwin.verify.checks.interface import Expectation
 
 if TYPE_CHECKING:
-    from miro_sim.world.robot import Robot
     from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
 
@@ -205,9 +204,7 @@ def settling_text(samples: Sequence[ErrorSample]) -> str:
 def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) -> Summary:
     """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
     gains = gains_of(world.scenario)
-    networks, robots = world.networks, world.robots
-    cpus = [robot.board.cpu for robot in robots]
-    seen = [network.sight.counts() for network in networks]  # by cameras of one kind
+    counters: Mapping[str, Mapping[str, Any]] = world.counters()
     everyone = tuple(
         RobotTracking(*id, tracking_of(track.errors), theory_of(track.theory, gains.get(id, SlidingGains())))
         for id, track in tracks.robots.items()
@@ -221,34 +218,13 @@ def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) 
         wall_s=wall_s,
         realtime_factor=seconds(world.tick - begin_tick) / wall_s if wall_s > 0.0 else 0.0,
         tracking=everyone[0].tracking if everyone else tracking_of([]),
-        link=LinkCounts(
-            frames_sent=sum(network.frames_sent for network in networks),
-            frames_accepted=_counted(robots, 0),
-            frames_rejected=_counted(robots, 1),
-            frames_stale=_counted(robots, 2),
-            bit_errors=sum(network.bit_errors for network in networks),
-        ),
-        firmware=FirmwareCounts(
-            sha256=world.image.sha256 or "",
-            instructions=sum(cpu.instructions for cpu in cpus),
-            machine_cycles=sum(cpu.cycles for cpu in cpus),
-            idle_cycles=sum(cpu.idle_cycles for cpu in cpus),
-            faults=sum(robot.board.fault_count for robot in robots),
-        ),
-        vision=VisionCounts(**{name: sum(one[name] for one in seen) for name in seen[0]})
-        if seen[0]
-        else None,
+        link=LinkCounts(**counters["link"]),
+        firmware=FirmwareCounts(sha256=world.image.sha256 or "", **counters["firmware"]),
+        vision=VisionCounts(**counters["vision"]) if counters["vision"] else None,
         theory=everyone[0].theory if everyone else None,
         robots=everyone if len(everyone) > 1 else (),
         resumed_s=seconds(begin_tick) if begin_tick else None,
     )
-
-
-def _counted(robots: Sequence[Robot], index: int) -> int | None:
-    """The sum of a counter, or None where one of the robots exports none."""
-    counts = [robot.counter(index) for robot in robots]
-    known = [count for count in counts if count is not None]
-    return sum(known) if len(known) == len(counts) else None
 
 
 def off_pitch_text(summary: Summary) -> str:

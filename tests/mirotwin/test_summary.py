@@ -26,22 +26,20 @@ KEYS = {
 }
 
 
-SEEN = dict(zip(KEYS["vision"].split(), (180, 1, 2, 0, 0, 0), strict=True))
+NUMBERS = {"link": (180, 178, 2, 0, 9), "firmware": (5, 7, 2, 0), "vision": (180, 1, 2, 0, 0, 0)}
+COUNTERS = {
+    table: dict(zip([key for key in KEYS[table].split() if key != "sha256"], numbers, strict=True))
+    for table, numbers in NUMBERS.items()
+}
 
 
-def summary_of(run, counters=((178, 2, 0),)):
-    """Of a run in which each robot's firmware has counted so many frames."""
-    cpu = SimpleNamespace(instructions=5, cycles=7, idle_cycles=2)
-    board = SimpleNamespace(cpu=cpu, fault_count=0)
-    robots = [SimpleNamespace(board=board, counter=counted.__getitem__) for counted in counters]
-    network = SimpleNamespace(frames_sent=180, bit_errors=9, sight=SimpleNamespace(counts=lambda: SEEN))
+def summary_of(run):
     world = SimpleNamespace(
         scenario=load("fig6").scenario,
         seed=7,
         image=SimpleNamespace(sha256="ab" * 32),
         tick=len(run) * CONTROL_PERIOD_TICKS,
-        networks=[network],
-        robots=robots,
+        counters=lambda: COUNTERS,
     )
     return summarise(world, Tracks(run), 0.5)
 
@@ -55,16 +53,6 @@ def test_the_file_has_exactly_the_keys_that_others_read():
     for table, keys in KEYS.items():
         found = written[table] if table else written
         assert list(found) == keys.split()
-
-
-def test_frames_are_added_over_the_robots_and_unknown_where_one_counts_none():
-    link = summary_of([], [(178, 2, 0), (5, None, 0)]).link
-    assert (link.frames_sent, link.frames_accepted, link.frames_rejected, link.frames_stale) == (
-        180,
-        183,
-        None,
-        0,
-    )
 
 
 def test_several_robots_are_listed_beside_the_first():

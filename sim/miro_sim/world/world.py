@@ -338,6 +338,28 @@ class World:
             network.put_back(records)
         self.bodies.start_again(mark.touching)
 
+    def counters(self) -> dict[str, dict[str, int | None]]:
+        """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
+        robots = self.robots
+        cpus = [robot.board.cpu for robot in robots]
+        seen = [network.sight.counts() for network in self.networks]  # by cameras of one kind
+        return {
+            "link": {
+                "frames_sent": _total([network.frames_sent for network in self.networks]),
+                "frames_accepted": _total([robot.counter(0) for robot in robots]),
+                "frames_rejected": _total([robot.counter(1) for robot in robots]),
+                "frames_stale": _total([robot.counter(2) for robot in robots]),
+                "bit_errors": _total([network.bit_errors for network in self.networks]),
+            },
+            "vision": {name: _total([one[name] for one in seen]) for name in seen[0]},
+            "firmware": {
+                "instructions": _total([cpu.instructions for cpu in cpus]),
+                "machine_cycles": _total([cpu.cycles for cpu in cpus]),
+                "idle_cycles": _total([cpu.idle_cycles for cpu in cpus]),
+                "faults": _total([robot.board.fault_count for robot in robots]),
+            },
+        }
+
     @property
     def state(self) -> Flat:
         """All that can change in a run, as flat bytes: to save, load, compare and name what differs."""
@@ -389,6 +411,12 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
+
+
+def _total(values: Sequence[int | None]) -> int | None:
+    """The sum, or None when one of the parts is not known."""
+    known = [value for value in values if value is not None]
+    return sum(known) if len(known) == len(values) else None
 
 
 def _whole(ticks: int) -> int:
