@@ -21,7 +21,7 @@ from tests.mirotwin.desk.rig import QUIET, as_hardware, moved_at, stream_text
 from tests.mirotwin.ports.rig import served
 
 FRAMES = 20
-MOVED_TICKS = 3 * 24_000
+MOVED_TICKS = 2 * 24_000
 """A slice of a live session, and a little more."""
 BRIDGE = """
 import socket, sys, threading, serial, serial.rfc2217
