@@ -100,10 +100,7 @@ class Camera:
         self.span_first, self.span_end = 0, 0
         self.worked = self.times = 1  # instants that are worked out, and how often each of them counts
         self.corner = [0] * 8448
-        self.line_least, self.line_most = (
-            [0] * 1408,
-            [0] * 1408,
-        )  # of two corners beside each other, at all instants
+        self.line_least, self.line_most = [0] * 1408, [0] * 1408  # of corners side by side, at all instants
         self.least_u, self.most_u, self.least_v, self.most_v = 0, 0, 0, 0  # of all corners of a pixel
         self.place_of = [0] * 192  # of each sample
         self.spread = [-1] * 2  # of which pixel, along u and along v
