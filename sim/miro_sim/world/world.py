@@ -415,8 +415,12 @@ class World:
 
 def _total(values: Sequence[int | None]) -> int | None:
     """The sum, or None when one of the parts is not known."""
-    known = [value for value in values if value is not None]
-    return sum(known) if len(known) == len(values) else None
+    total = 0
+    for value in values:
+        if value is None:
+            return None
+        total += value
+    return total
 
 
 def _whole(ticks: int) -> int:
