@@ -290,7 +290,7 @@ def test_any_state_steps_like_the_slow_twin(a, limit, target, position, velocity
     ours = generator(a, limit, target, velocity_mode=int(activity == "velocity"), forward=forward)
     ours.position, ours.velocity = position, velocity
     if activity == "stop":
-        ours.stop_smoothly()
+        ours.start(stopping=1)
     theirs = NaiveLm629(DEFAULT_OPTIONS)
     theirs.a, theirs.limit, theirs.target, theirs.activity = a, limit, target, activity
     theirs.mode_bits = forward << 12
