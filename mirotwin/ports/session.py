@@ -22,7 +22,7 @@ FASTEST = 1000.0
 LATE_TICKS = ticks(0.020)
 """What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
 SLICE_S = 0.0005
-"""Longer ones leave less to tell at a port that robot and twin are different: positions are known to what time is."""
+"""By up to so much answers come late. A comparison at a port allows positions what that lateness explains."""
 LONGEST_SLICE_TICKS = ticks(0.020)
 
 

@@ -69,7 +69,7 @@ def run_test(
     """Runs a file to its verdict; whatever cannot be run is an outcome, too.
 
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
-    file that saves needs one. `again`: the command that gives the verdict again, of a file that saves or does not.
+    file that saves needs one. `again`: makes the command that gives the verdict again, told whether the file saves.
     """
     return outcome_of(path, artifacts, lambda folder: _run(path, image, seed, settings, folder, again), seed)
 

@@ -74,7 +74,7 @@ class ProfileGenerator:
         self.target = place
 
     def follow(self, real_position: int) -> None:
-        """The desired position is the real one (motor off), or another one where it rests."""
+        """Rests at this position: the real one (motor off), or the target that was reached."""
         self.position = real_position * 65536
         self.velocity = 0
         self.moving = 0

@@ -66,7 +66,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     @property
     def command(self) -> str:
-        """The name of an LM629 command; its opcode where that is none."""
+        """The name of the LM629 command (`STT`); of an opcode without a name the number (`7Fh`)."""
         known = BY_OPCODE.get(self.opcode)
         return f"{self.opcode:02X}h" if known is None else known.name
 
