@@ -146,13 +146,19 @@ def test_a_watch_stops_at_each_change_in_both_directions(moments, debugger):
     assert backward == forward[-2::-1]
 
 
-def test_hits_are_counted_from_the_begin_of_the_run_in_both_directions(debugger):
+def first_hits(debugger, count):
+    """The cycles of a breakpoint's first hits; it is removed at the last of them."""
     debugger.add("failsafe_tick")
     cycles = []
-    for _ in range(7):
+    for _ in range(count):
         debugger.move("continue")
         cycles.append(debugger.cpu.cycles)
     debugger.breakpoints.clear()
+    return cycles
+
+
+def test_hits_are_counted_from_the_begin_of_the_run_in_both_directions(debugger):
+    cycles = first_hits(debugger, 7)
     debugger.add("failsafe_tick", count="% 3")
     assert debugger.move("rcontinue") == "breakpoint 2"
     assert debugger.cpu.cycles == cycles[5]
@@ -189,12 +195,7 @@ def test_a_log_where_another_breakpoint_stops_tells_each_time_once(debugger, log
 
 
 def test_counted_hits_are_those_of_the_whole_run_after_an_interruption(debugger):
-    debugger.add("failsafe_tick")
-    cycles = []
-    for _ in range(60):
-        debugger.move("continue")
-        cycles.append(debugger.cpu.cycles)
-    debugger.breakpoints.clear()
+    cycles = first_hits(debugger, 60)
     debugger.add("failsafe_tick", count="5")
     debugger.timeline.interrupted = lambda: True
     assert debugger.move("rcontinue") == "interrupted"
