@@ -290,7 +290,8 @@ class BuildHot(build_ext):
 
 CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples": "mirotwin/testing/examples"}
 """Folders outside of the packages that a wheel carries, and where: `mirotwin init` and `examples` write them."""
-LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache"}
+LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", "GNUmakefile"}
+"""What tools leave, and the firmware's make file of this tree, which writes outside of its folder."""
 
 
 class BuildCarrying(build_py):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -247,13 +247,9 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     """
     check_file(path, option)
     target = path.resolve()
-    import tempfile  # slow to load
-
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
     with _refused(path, f"choose another file with {option}"):
-        handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)
-    os.close(handle)
-    staging = Path(name)
+        staging = _staging(target)
     try:
         with told_when_full(path, option, "file"):
             yield staging
@@ -261,6 +257,54 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
             os.replace(staging, target)
     finally:
         staging.unlink(missing_ok=True)
+
+
+def write_files(folder: Path, files: Mapping[str, bytes], remedy: str) -> None:
+    """Writes files into `folder`, which is made, by name (`a/b` is in a folder of it): all of them, or none.
+
+    Follows no link below `folder`. Raises OutputError with `remedy`, which names another folder.
+    """
+    inner = sorted({folder / parent for name in files for parent in Path(name).parents} - {folder})
+    if link := next(filter(Path.is_symlink, inner), None):
+        raise OutputError(link, f"is a symbolic link to {os.readlink(link)}", f"remove it, or {remedy}")
+    made: list[Path] = []
+    staged: dict[Path, Path] = {}
+    try:
+        for path in (*reversed(folder.parents), folder, *inner):
+            if not path.is_dir():
+                path.mkdir()
+                made.append(path)
+        for name, content in files.items():
+            target = folder / name
+            if target.is_dir():  # which renaming would refuse when other files have their names already
+                raise OutputError(
+                    target, "is a folder where a file is to be written", f"remove it, or {remedy}"
+                )
+            staged[target] = staging = _staging(target)
+            staging.write_bytes(content)
+            staging.chmod(0o666 & ~_umask())
+        for target, staging in staged.items():
+            os.replace(staging, target)
+    except BaseException as error:
+        with suppress(OSError):  # what is being reported says more
+            for staging in staged.values():
+                staging.unlink(missing_ok=True)
+            for path in reversed(made):
+                path.rmdir()
+        if not isinstance(error, OSError):
+            raise
+        place = Path(error.filename) if isinstance(error, FileExistsError) else folder
+        room = "make room, or " if error.errno in FULL else ""
+        raise OutputError(place, reason_of(error), f"{room}{remedy}") from None
+
+
+def _staging(target: Path) -> Path:
+    """A new empty file beside `target`, under another name."""
+    import tempfile  # slow to load
+
+    handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)
+    os.close(handle)
+    return Path(name)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.firmware import image_path, source_folder
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, PATH
+from mirotwin.shell.outputs import reason_of, some, write_files
 
 _IN_WHEEL = Path(__file__).parent / "examples"
 _IN_TREE = Path(__file__).parents[2] / "examples"
@@ -84,7 +85,8 @@ def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
     yield from sorted(one for one in found if firmware or one[0] != OF_FIRMWARE)
 
 
-_LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv"}
+_LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv", "GNUmakefile"}
+"""What tools leave, and the firmware's make file of a checkout, which writes outside of its folder."""
 
 
 def all_files(folder: Path) -> Iterator[Path]:
@@ -97,27 +99,22 @@ def all_files(folder: Path) -> Iterator[Path]:
 
 
 def write(target: Path, wanted: Iterable[tuple[str, Path]], remedy: str, force: bool = False) -> list[str]:
-    """Writes (name, file) into `target`, which is made, and returns the names.
+    """Writes (name, file) into `target`, which is made, and returns the names. All of them are written, or none.
 
     Raises BadInput with `remedy`, before anything is written, if a file of that name has other content: not if
     `force`, unless it is no regular file. A file with the same content stays.
     """
-    files = [(name, path.read_bytes()) for name, path in wanted]
+    files = {name: path.read_bytes() for name, path in wanted}
     if target.exists() and not target.is_dir():
         raise BadInput(target, "", "is no folder", "name one that is new or empty")
     try:
-        present = [name for name, content in files if _is_in_the_way(target / name, content, force)]
-        if present:
-            some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
-            raise BadInput(target, "", f"holds {some} already", remedy)
-        for name, content in files:
-            path = target / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+        present = [name for name, content in files.items() if _is_in_the_way(target / name, content, force)]
     except OSError as error:
-        what = error.strerror or type(error).__name__
-        raise BadInput(error.filename or target, "", what, "choose another folder") from None
-    return [name for name, _ in files]
+        raise BadInput(error.filename or target, "", reason_of(error), "choose another folder") from None
+    if present:
+        raise BadInput(target, "", f"holds {some(present)} already", remedy)
+    write_files(target, files, "choose another folder")
+    return list(files)
 
 
 def _is_in_the_way(path: Path, content: bytes, force: bool) -> bool:

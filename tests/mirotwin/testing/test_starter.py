@@ -11,6 +11,7 @@ import pytest
 from miro_robot.firmware import image_path
 from mirotwin.testing import starter
 from tests import children
+from tests.mirotwin import program
 from tests.mutants import build
 from tests.mutants.planted import PLANTED
 
@@ -76,11 +77,89 @@ def test_the_late_image_is_the_shipped_firmware_with_one_mistake():
     assert late.read_bytes() == built.image.read_bytes(), f"cp {built.image} {late}"
 
 
-# A project
-
-
 def tree(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+COMMANDS = [("init",), *(("examples", name) for name in starter.EXAMPLES)]
+of_each_command = pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[-1])
+
+
+@of_each_command
+@pytest.mark.parametrize("size", [0, 700, 2500])
+def test_on_a_full_disk_nothing_is_left(tmp_path, words, size):
+    done = program.run(*words, "mine/here", cwd=tmp_path, preexec_fn=program.full_disk(size))
+    if done.returncode == 0:  # its longest file is as short as that
+        assert size
+        return
+    said = "mirotwin: error: mine/here: File too large; make room, or choose another folder\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+    assert os.listdir(tmp_path) == []
+
+
+@of_each_command
+def test_no_link_leads_out_of_the_folder(mirotwin, tmp_path, words):
+    """Each folder in turn is a link, to a folder that has the same files."""
+    mirotwin(*words, tmp_path / "whole")
+    folders = [path for path in (tmp_path / "whole").rglob("*") if path.is_dir()]
+    for number, path in enumerate(folders):
+        name = path.relative_to(tmp_path / "whole")
+        outside, mine = tmp_path / f"outside{number}", tmp_path / f"mine{number}"
+        shutil.copytree(path, outside)
+        for file in outside.rglob("*"):
+            if file.is_file():
+                os.utime(file, (0, 0))
+        (mine / name).parent.mkdir(parents=True)
+        (mine / name).symlink_to(outside)
+        said = mirotwin.refuses(*words, mine)
+        assert said.startswith(
+            f"{mine / name}: is a symbolic link to {outside}; remove it, or choose another"
+        )
+        assert tree(mine) == set()
+        assert all(file.stat().st_mtime == 0 for file in outside.rglob("*") if file.is_file())
+
+
+SDCC = """#!/bin/sh
+# Stands in for SDCC: leaves what it would leave, empty.
+[ "$1" = --version ] && exec echo "$VERSION"
+while [ "$1" != -o ]; do shift; done
+for suffix in ihx rel map cdb rst; do echo "      000000 00" > "${2%.*}.$suffix"; done
+"""
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@of_each_command
+def test_no_makefile_writes_or_removes_anything_outside_of_its_folder(mirotwin, tmp_path, words):
+    """As it is called, and with variables of its names in the environment."""
+    mine = tmp_path / "a" / "b" / "mine"
+    mirotwin(*words, mine)
+    sdcc = tmp_path / "sdcc"
+    sdcc.write_text(SDCC)
+    sdcc.chmod(0o755)
+    outside = ("build/x", "a/build/x", "a/build/firmware/x", "a/b/build/x", "a/b/build/firmware/x", "env/x")
+    for name in outside:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("kept")
+    before = tree(tmp_path)
+    version = (starter.source_folder() / "sdcc.version").read_text("utf-8").strip()
+    environment = {**os.environ, "SDCC": str(sdcc), "VERSION": version}
+    for makefile in mine.rglob("*akefile"):
+        for more in {}, dict.fromkeys(("BUILD", "OUT", "FAILED", "IMAGE"), str(tmp_path / "env")):
+            for goal in "all", "clean":
+                children.run(
+                    ["make", "-s", goal],
+                    cwd=makefile.parent,
+                    env=environment | more,
+                    check=True,
+                    capture_output=True,
+                )
+                new = tree(tmp_path) - before
+                assert all(name.startswith("a/b/mine/") for name in new)
+                assert before <= tree(tmp_path)
+                assert bool(new) is (goal == "all")
+
+
+# A project
 
 
 def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_path):
