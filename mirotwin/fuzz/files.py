@@ -19,12 +19,20 @@ from __future__ import annotations
 import glob
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import replace_file
-from mirotwin.shell.outputs import OutputError, entries, not_empty, some, told_when_full
+from mirotwin.shell.outputs import (
+    OutputError,
+    entries,
+    locked_folder,
+    not_empty,
+    reason_of,
+    some,
+    told_when_full,
+)
 
 FOLDERS = ("crashes", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
@@ -34,37 +42,40 @@ OPTION = "--out"
 
 
 class CampaignFolder:
-    """`path` as the folder of a campaign.
+    """`path` as the folder of a campaign, which has it for itself while it writes there (`filled`).
 
-    Raises OutputError for one that holds something, unless `force`: then what an earlier campaign left is taken away,
-    and a folder that holds anything else is refused all the same.
+    Raises OutputError for one that another process writes to, and for one that holds something, unless `force`: then
+    what an earlier campaign left is taken away, and a folder that holds anything else is refused all the same.
     """
 
     def __init__(self, path: Path, force: bool = False) -> None:
         self.path = path
-        present = entries(path, OPTION)
+        self._force = force
+        entries(path, OPTION)
+        if path.is_dir():
+            with locked_folder(path):
+                pass
+        self._replaceable()
+
+    def _replaceable(self) -> list[str]:
+        """Names of what an earlier campaign left. Raises OutputError where that must stay."""
+        present = entries(self.path, OPTION)
         others = [name for name in present if name not in (*FOLDERS, *FILES)]
-        if present and not force:
+        if present and not self._force:
             remedy = f"choose another with {OPTION}, or replace an earlier campaign with --force"
-            raise not_empty(path, present, remedy)
+            raise not_empty(self.path, present, remedy)
         if others:
             what = f"holds what no campaign leaves ({some(others)})"
-            raise OutputError(path, what, f"choose another folder with {OPTION}")
-        self._present = present
+            raise OutputError(self.path, what, f"choose another folder with {OPTION}")
+        return present
 
-    def make(self) -> None:
-        """Takes away what an earlier campaign left, and makes the folder. Raises OutputError."""
-        try:
-            for name in self._present:
-                if (self.path / name).is_dir() and not (self.path / name).is_symlink():
-                    shutil.rmtree(self.path / name)
-                else:
-                    (self.path / name).unlink()
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                self.path, error.strerror or str(error), f"choose another folder with {OPTION}"
-            ) from None
+    def _empty(self) -> None:
+        """Takes away what an earlier campaign left."""
+        for name in self._replaceable():  # again: another campaign may have filled it since
+            if (self.path / name).is_dir() and not (self.path / name).is_symlink():
+                shutil.rmtree(self.path / name)
+            else:
+                (self.path / name).unlink()
 
     def folder(self, name: str) -> Path:
         """One of its folders, which is made."""
@@ -81,19 +92,34 @@ class CampaignFolder:
 
     @contextmanager
     def filled(self) -> Iterator[None]:
-        """While the campaign writes there. A full disk is an OutputError, and leaves crashes only, or no folder."""
-        try:
-            with told_when_full(self.path, OPTION):
-                yield
-        except OutputError:
-            for name in SCRATCH:
-                shutil.rmtree(self.path / name, ignore_errors=True)
-            for name in FILES:
-                (self.path / name).unlink(missing_ok=True)
-            for path in (*self.path.rglob("*"), self.path):
-                with suppress(OSError):  # a folder with crashes in it, or a crash
-                    path.rmdir()
-            raise
+        """Makes the folder, and holds it while the campaign writes there. Raises OutputError.
+
+        A full disk leaves crashes only, or no folder.
+        """
+        with ExitStack() as held:
+            try:
+                self.path.mkdir(parents=True, exist_ok=True)
+                held.enter_context(locked_folder(self.path))
+                self._empty()
+            except OSError as error:
+                raise OutputError(
+                    self.path, reason_of(error), f"choose another folder with {OPTION}"
+                ) from None
+            try:
+                with told_when_full(self.path, OPTION):
+                    yield
+            except OutputError:
+                self._leave_crashes()
+                raise
+
+    def _leave_crashes(self) -> None:
+        for name in SCRATCH:
+            shutil.rmtree(self.path / name, ignore_errors=True)
+        for name in FILES:
+            (self.path / name).unlink(missing_ok=True)
+        for path in (*self.path.rglob("*"), self.path):
+            with suppress(OSError):  # a folder with crashes in it, or a crash
+                path.rmdir()
 
     def remove(self, folder: str, name: str) -> None:
         """Takes away the files of a crash."""

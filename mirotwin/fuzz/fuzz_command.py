@@ -207,7 +207,6 @@ def _campaign(
     if covering is not None and covering.address in reached.total:
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
-    folder.make()
     triage = Triage(reached, oracle, folder, source_folders(image, options.sources), options.minimise_s)
     with folder.filled():
         failing, passing, silent = _sorted_out(target, inputs)

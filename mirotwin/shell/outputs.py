@@ -156,6 +156,16 @@ def _release(lock: int | None) -> None:
         os.close(lock)
 
 
+@contextmanager
+def locked_folder(path: Path) -> Iterator[None]:
+    """Holds a folder that is there. Raises OutputError if another process has it."""
+    lock = _lock(path)
+    try:
+        yield
+    finally:
+        _release(lock)
+
+
 def entries(path: Path, option: str) -> list[str]:
     """What a folder to be written to holds; nothing where it is not there yet. Raises OutputError for any other."""
     remedy = f"choose another folder with {option}"

@@ -26,7 +26,6 @@ def oracle(image):
 def triage_of(image, tmp_path, kind="session"):
     reached = InputCoverage(image, lambda: RobotTarget(image, kind))
     folder = CampaignFolder(tmp_path / "out")
-    folder.make()
     return Triage(reached, RobotOracle(RobotTarget(image, kind)), folder, Sources([image.path.parent]))
 
 
