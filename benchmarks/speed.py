@@ -68,7 +68,7 @@ def address(image: Image, name: str) -> int:
 
 def ours(image: Image) -> Run:
     faults: list[int] = []
-    cpu = Cpu(XramBus(lambda *_: None, lambda kind, *_: faults.append(kind)))
+    cpu = Cpu(XramBus(lambda *_: None, lambda kind, *_: faults.append(kind), lambda *_: None))
     cpu.load(image.code, image.used)
     wall, processor = time.perf_counter(), time.process_time()
     reason = cpu.run_until_any((address(image, "_finish"),), NEVER_TICK)

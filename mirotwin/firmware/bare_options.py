@@ -67,8 +67,8 @@ class BareOptions(Options, frozen=True, kw_only=True):
         Option(
             type=NAME,
             metavar="FILE|-",
-            help="File of bytes for the serial port, sent when the program listens; may be repeated, files are sent in"
-            " order.",
+            help="File of bytes for the serial port, sent without a pause once its receiver is on; may be repeated,"
+            " files are sent in order.",
         ),
     ] = ()
     stdin_when: Annotated[
@@ -82,13 +82,21 @@ class BareOptions(Options, frozen=True, kw_only=True):
         bool, Option(help="Send one line of --stdin each time the program has sent TEXT.")
     ] = False
     stdin_after: Annotated[
-        Time | None,
-        Option(type=TimeType(), help="Delay of --stdin after the start, or after its TEXT, such as 200ms."),
-    ] = None
+        tuple[Time, ...],
+        Option(
+            type=TimeType(),
+            help="Delay of --stdin after the start, or after its TEXT, such as 200ms. Repeated, one for each --stdin:"
+            " without a TEXT it counts from the end of the file before.",
+        ),
+    ] = ()
     stdin_gap: Annotated[
         Time | None,
         Option(type=TimeType(), help="Shortest pause between two characters of --stdin. Default 0."),
     ] = None
+    stdin_wait: Annotated[
+        bool,
+        Option(help="Send each character of --stdin only when the program has taken the one before."),
+    ] = False
     baud: Annotated[int | None, BAUD] = None
     pins: Annotated[
         str | None,
@@ -171,10 +179,11 @@ def make_machine(
             output=output,
             stop_on_fault=not options.go_on,
             crystal_hz=options.crystal_hz,
-            gap_ticks=_ticks(options.stdin_gap, options) or 0,
+            gap_ticks=0 if options.stdin_gap is None else options.stdin_gap.ticks(options.crystal_hz),
             live=live,
             pins=pins,
             start=start,
+            wait=options.stdin_wait,
         )
     except ValueError as error:
         raise BadInput(
@@ -211,14 +220,15 @@ def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
         complain(f"addresses have no names: {machine.image.symbols.problem}")
     waiting = machine.input.waiting_for
+    left = amount(machine.input.left, "byte of --stdin was", "bytes of --stdin were")
     if waiting:
-        seen = (
-            f"was not seen again after {amount(machine.input.seen, 'time')}"
-            if machine.input.seen
-            else "was not seen"
-        )
-        left = amount(machine.input.left, "byte of --stdin was", "bytes of --stdin were")
+        times = machine.input.seen[waiting]
+        seen = f"was not seen again after {amount(times, 'time')}" if times else "was not seen"
         complain(f"--stdin-when: {waiting!r} {seen}; {left} not sent")
+    elif machine.input.left and not machine.input.live and ended is not Ended.UNTIL:
+        begun = machine.input.char_end
+        reason = "the run ended first" if begun else "the receiver was never on, and no --baud is given"
+        complain(f"{left} not sent: {reason}")
     if options.stdin and machine.cpu.sfr(_SCON) & _NINE_BITS:
         complain("--stdin: the serial port takes characters of 9 bits; the ninth was 1 in all that were sent")
     changed = machine.changed_code()
@@ -235,16 +245,12 @@ def stopped_at(machine: BareMachine) -> str:
     return f"{place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
 
 
-def _ticks(time: Time | None, options: BareOptions) -> int | None:
-    return None if time is None else time.ticks(options.crystal_hz)
-
-
 def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
     """What --stdin and its conditions say, in order."""
     texts = [text.encode(errors="surrogateescape") for text in options.stdin_when]
     files = len(options.stdin)
     if not files:
-        for name in options.given("stdin_when", "stdin_by_line", "stdin_after", "stdin_gap"):
+        for name in options.given("stdin_when", "stdin_by_line", "stdin_after", "stdin_gap", "stdin_wait"):
             raise BadInput("", name, "has no effect without --stdin", "give both")
     if b"" in texts:
         raise BadInput("", "--stdin-when", "the text is empty", "give text that the program sends")
@@ -261,13 +267,24 @@ def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
         )
     if options.stdin_by_line and not texts:
         raise BadInput("", "--stdin-by-line", "has no effect without --stdin-when", "give that too")
-    delay = _ticks(options.stdin_after, options)
+    whens = [b""] * (files - len(texts)) + texts
     pieces: list[InputPiece] = []
-    for path, when in zip(options.stdin, [b""] * (files - len(texts)) + texts, strict=True):
+    for path, when, delay in zip(options.stdin, whens, _delays(whens, options), strict=True):
         data = _stdin_bytes(path)
         parts = data.splitlines(keepends=True) if options.stdin_by_line and when else [data]
-        pieces += [InputPiece(part, when, delay if when or not pieces else None) for part in parts]
+        pieces += [InputPiece(part, when, delay) for part in parts]
     return tuple(pieces)
+
+
+def _delays(whens: list[bytes], options: BareOptions) -> list[int | None]:
+    """The delay of each --stdin: its own, or the only one for the first and for all that wait for a text."""
+    after = [time.ticks(options.crystal_hz) for time in options.stdin_after]
+    if len(after) not in (0, 1, len(whens)):
+        what = f"{len(after)} for {len(whens)} --stdin"
+        raise BadInput("", "--stdin-after", what, "give one for all, or one for each --stdin")
+    if len(after) == 1:
+        return [after[0] if when or not index else None for index, when in enumerate(whens)]
+    return list(after) or [None] * len(whens)
 
 
 def _stdin_bytes(path: str) -> bytes:

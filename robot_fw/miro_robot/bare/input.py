@@ -1,24 +1,33 @@
-"""What comes in on RXD of the bare machine: bytes from a file or a keyboard, as a person at a terminal would send them.
+"""What comes in on RXD of the bare machine: bytes from a file or a keyboard, as another machine would send them.
 
-The order of things: a piece of input begins when its condition is met (a text seen on the program's output, a time).
-Each character then waits until the one before is over, the gap has passed and the program listens: its receiver is on
-with RI down, or it polls P3 as a program does that measures the first character. The first character of a piece that
-has a condition does not wait for polls: the condition says that the program listens.
+                    REN is set, a time,           back to back at the line's rate, whatever RI says
+                    a text on TXD                 │
+    piece ── waits ──────┴──> character character character ──> the next piece
+
+The order of things: a piece begins when its condition is met. The first one without a condition begins when the program
+listens: its receiver is on, or, where `baud` is given, it polls P3 as a program does that measures the first character.
+The line has the rate `baud`, or that of the receiver when a character begins; while the receiver is off, the rate that
+it had. A character that the program does not take in time is lost, as on silicon.
+
+With `wait` each character waits instead until the program has taken the one before: its receiver is on with RI down,
+or it polls P3.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK, Octets, Rows
 from miro_robot.mcs51.cpu import Cpu
 
-SLICE = 1_000  # cycles between two looks at whether the program listens
+SLICE = 1_000  # cycles between two looks at what is to be sent
+_CLOCK_SLICE = 100  # ... while the receiver is on and its clock has not overflowed yet
 MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
 _IDLE_SLICE = 200_000  # cycles between two looks when nothing is left to send
 _POLLS = 32  # reads of P3 within a slice that count as listening on RXD
-_RI = 0x01  # in SCON
+_SCON, _SM0, _SM1, _REN, _RI = 0x98, 0x80, 0x40, 0x10, 0x01
 _CHARACTER_BITS = 10
 _TICKS_PER_BIT = 32  # of the fastest receiver there is: mode 2 with SMOD
 _LONGEST = 1 << 30  # bytes of a saved piece
@@ -28,7 +37,8 @@ class InputPiece(NamedTuple):
     """Bytes with a condition: they begin `delay_ticks` after the program has sent `when`.
 
     Without `when` the delay counts from the end of the piece before, or from the start. With neither (None), they
-    follow as soon as the program listens. `when` is looked for in what is sent after the piece before.
+    follow the piece before, or begin as soon as the program listens. `when` is looked for in what is sent after the
+    piece before.
     """
 
     data: bytes
@@ -44,7 +54,8 @@ class SerialInput:
     """Sends `pieces` to the serial port of `cpu`, bit by bit at `baud`, or at the rate that its receiver is set to.
 
     `gap_ticks`: least time from the end of a character to the start of the next. `live`: more may be added any time.
-    Raises ValueError for a rate that the crystal does not allow.
+    `wait`: each character waits until the program listens. Raises ValueError for a rate that the crystal does not
+    allow.
     """
 
     STATE = {
@@ -62,8 +73,9 @@ class SerialInput:
         "begin_tick": TICK,
         "char_end": TICK,
         "polls": TICK,
+        "bit_ticks": ("q", 0, 1 << 40),
     }
-    NOT_STATE = ("seen", "cpu", "baud", "crystal_hz", "gap_ticks", "live")
+    NOT_STATE = ("seen", "cpu", "baud", "crystal_hz", "gap_ticks", "live", "wait")
 
     def __init__(
         self,
@@ -73,6 +85,7 @@ class SerialInput:
         crystal_hz: int,
         gap_ticks: int = 0,
         live: bool = False,
+        wait: bool = False,
     ) -> None:
         fastest = crystal_hz // _TICKS_PER_BIT
         if baud is not None and not 50 <= baud <= fastest:
@@ -83,12 +96,14 @@ class SerialInput:
         self.crystal_hz = crystal_hz
         self.gap_ticks = gap_ticks
         self.live = live
+        self.wait = wait
         self.fed = 0  # bytes of the first piece that are on their way or received
         self.tail = b""  # of what the program sent, as long as the text waited for
-        self.seen = 0  # how often a text was seen that was waited for
+        self.seen: Counter[bytes] = Counter()  # how often each text was sent while it was waited for
         self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was seen
         self.char_end = 0  # tick at which the last character ends
         self.polls = 0  # reads of P3 seen so far
+        self.bit_ticks = 0  # as the receiver was last set, 0 while that is not known
         self._arm()
 
     def add(self, data: bytes) -> None:
@@ -99,10 +114,13 @@ class SerialInput:
 
     def heard(self, value: int, tick: int) -> None:
         """The program has sent a character, whose stop bit began at `tick`."""
-        if self.waiting_for:
+        last_start = self.char_end - self._bit_offset(
+            _CHARACTER_BITS
+        )  # of the piece before, which may be to come
+        if self.waiting_for and tick >= last_start:
             self.tail = (self.tail + bytes([value]))[-len(self.waiting_for) :]
             if self.tail == self.waiting_for:
-                self.seen += 1
+                self.seen[self.tail] += 1
                 self.begin_tick = tick + (self.pieces[0].delay_ticks or 0)
 
     @property
@@ -115,15 +133,26 @@ class SerialInput:
         """Bytes still to be sent."""
         return sum(len(piece.data) for piece in self.pieces) - self.fed
 
+    @property
+    def waits_for_receiver(self) -> bool:
+        """Whether the first piece begins when the receiver is switched on."""
+        return bool(self.pieces) and self.fed == 0 and not self.waiting_for
+
     def feed(self) -> int:
-        """Puts the next character on RXD if it is time, and says up to which cycle to run now."""
+        """Puts on RXD what begins soon, and says up to which cycle to run now."""
         now = self.cpu.cycles
-        end = now + SLICE
-        listening = self._listening()
-        start = max(self.begin_tick, 12 * now + MARGIN_TICKS)
-        if self.char_end:
-            start = max(start, self.char_end + self.gap_ticks)
-        if self.pieces and 12 * now >= self.char_end and start < 12 * end + 2 * MARGIN_TICKS and listening:
+        self.bit_ticks = self.cpu.peripherals.bit_ticks() or self.bit_ticks
+        receiving = self._receiving()
+        reads = self.cpu.peripherals.p3_reads
+        polling = self.baud is not None and reads - self.polls >= _POLLS
+        self.polls = reads
+        end = now + (_CLOCK_SLICE if receiving and not self.baud and not self.bit_ticks else SLICE)
+        while self.pieces and self._listening(now, receiving, polling):
+            start = max(self.begin_tick, 12 * now + MARGIN_TICKS)
+            if self.char_end:
+                start = max(start, self.char_end + self.gap_ticks)
+            if start >= 12 * end + 2 * MARGIN_TICKS:
+                break
             self._send(start)
         if self.live or (self.pieces and not self.waiting_for):
             self.cpu.rxd.settled_tick = 12 * end + MARGIN_TICKS
@@ -131,15 +160,21 @@ class SerialInput:
             self.cpu.rxd.settled_tick = NEVER_TICK
         return end if self.live or self.pieces else now + _IDLE_SLICE
 
-    def _listening(self) -> bool:
-        """Whether a character sent now would be heard: by the receiver with RI down, or by software."""
-        reads = self.cpu.peripherals.p3_reads
-        polling = reads - self.polls >= _POLLS
-        self.polls = reads
-        if self.cpu.peripherals.bit_ticks():
-            return not self.cpu.sfr(0x98) & _RI
-        told = bool(self.pieces) and self.fed == 0 and self.pieces[0].has_condition
-        return self.baud is not None and (polling or told)
+    def _receiving(self) -> bool:
+        """Whether the receiver is on, in a mode that takes characters."""
+        control = self.cpu.sfr(_SCON)
+        return bool(control & _REN and control & (_SM0 | _SM1))
+
+    def _listening(self, now: int, receiving: bool, polling: bool) -> bool:
+        """Whether the next character may be sent, as far as the program has a say in it."""
+        if not self.baud and not self.bit_ticks:
+            return False
+        condition = self.fed == 0 and self.pieces[0].has_condition
+        if not self.wait:
+            return receiving or polling or condition or self.char_end > 0
+        if 12 * now < self.char_end or (receiving and self.cpu.sfr(_SCON) & _RI):
+            return False
+        return receiving or polling or (condition and self.baud is not None)
 
     def _send(self, start: int) -> None:
         """Start bit, eight data bits, stop bit."""
@@ -171,5 +206,5 @@ class SerialInput:
     def _bit_offset(self, number: int) -> int:
         """Ticks from the start of a character to its bit `number`."""
         if self.baud is None:
-            return number * self.cpu.peripherals.bit_ticks()
+            return number * self.bit_ticks
         return (2 * number * self.crystal_hz + self.baud) // (2 * self.baud)

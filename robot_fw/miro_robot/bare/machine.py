@@ -43,7 +43,8 @@ class Ended(StrEnum):
 class BareMachine:
     """One AT89C52 with RAM and a terminal.
 
-    `stdin` is sent to the serial port byte by byte, see `SerialInput`: plain bytes as soon as the program listens.
+    `stdin` is sent to the serial port byte by byte, see `SerialInput`: plain bytes from when the program listens on;
+    `wait`: each as soon as it has taken the one before.
     The rate is the one the receiver is programmed for, or `baud`, which also serves a program that measures its first
     character. `live`: `input.add` may add more at any time. `pins` are put on the ports.
     `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
@@ -83,6 +84,7 @@ class BareMachine:
         live: bool = False,
         pins: tuple[PinEvent, ...] = (),
         start: int = 0,
+        wait: bool = False,
     ) -> None:
         least, most = CRYSTAL_RANGE_HZ
         if not least <= crystal_hz <= most:
@@ -103,7 +105,7 @@ class BareMachine:
         self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
         self.loaded = bytearray(0x10000)  # 1 where executing is legal; up to date while the state is saved
         self.dead = False  # it has ended; what it sent may still be on its way
-        self.bus = XramBus(self._sent, self._faulted)
+        self.bus = XramBus(self._sent, self._faulted, self._receiver_on)
         self.cpu = Cpu(self.bus)
         self.cpu.stop_asleep = 1
         self.cpu.load(image.code, image.used)
@@ -113,7 +115,7 @@ class BareMachine:
             self.bus.fill(image.code)
             self.bus.code_of = self.cpu
         pieces = (InputPiece(stdin),) if isinstance(stdin, bytes) else stdin
-        self.input = SerialInput(self.cpu, pieces, baud, crystal_hz, gap_ticks, live)
+        self.input = SerialInput(self.cpu, pieces, baud, crystal_hz, gap_ticks, live, wait)
         self.pins = PinInput(self.cpu, pins)
         if self.pins.uses_rxd and (live or self.input.pieces):
             raise ValueError("P3.0 is RXD and cannot be a pin while serial input is sent there")
@@ -217,6 +219,12 @@ class BareMachine:
         self.input.heard(value, tick)
         if self.output is not None:
             self.output(bytes([value]))
+
+    def _receiver_on(self, tick: int) -> None:
+        """What waits for the receiver begins now, not only at the next look."""
+        if self.input.waits_for_receiver:
+            self.next_feed = 0
+            self.cpu.request_stop()
 
     def _faulted(self, kind: int, pc: int, tick: int) -> None:
         if len(self.faults) < _FAULTS_KEPT:

@@ -23,12 +23,12 @@ class RecordingBus(XramBus):
     """
 
     NOT_STATE = (
-        *("code_of", "faulted", "sent", "cpu", "heard", "said"),
+        *("code_of", "faulted", "sent", "listening", "cpu", "heard", "said"),
         *("fault_kind", "fault_pc", "fault_tick", "reset_tick"),
     )
 
     def __init__(self) -> None:
-        XramBus.__init__(self, _nothing, _nothing)
+        XramBus.__init__(self, _nothing, _nothing, _nothing)
         self.cpu: Cpu | None = None
         self.fault_pc = 0
         self.fault_tick = 0

@@ -25,6 +25,9 @@ class Bus:
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """The firmware did what it must not (`miro_robot.faults.FaultKind`) at the instruction at `pc`."""
 
+    def receiver_on(self, tick: int) -> None:
+        """REN was 0 and is 1 from `tick` on."""
+
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         """The serial port set RI at `tick` for the character `value`; `stop`: bit RB8, the stop bit in mode 1."""
 

@@ -146,8 +146,11 @@ class Uart:
         """SCON is written; `cycle` is the first to see it. Another mode aborts what is on its way (U5)."""
         if (value ^ self.scon) & (_SM0 | _SM1):
             self.abort(12 * cycle)
+        switched_on = value & ~self.scon & _REN
         self.scon = value
         self.interrupts.follow(_SERIAL, value & (_RI | _TI), cycle)
+        if switched_on:
+            self.bus.receiver_on(12 * cycle)
 
     def write_sbuf(self, value: int) -> None:
         """Loads the transmitter; a character on its way is cut off, the new one begins at the next rollover (U4)."""

@@ -14,16 +14,24 @@ from miro_robot.mcs51.cpu import Cpu
 class XramBus(Bus):
     """`sent(value, tick)` gets every character, `faulted(kind, pc, tick)` every firmware fault.
 
+    `listening(tick)` is called when the receiver of the serial port is switched on.
+
     With `code_of` set, the RAM is also that CPU's code memory (EA low, one space for both).
     """
 
     STATE = {"memory": "65536B"}
-    NOT_STATE: tuple[str, ...] = ("code_of", "faulted", "sent")
+    NOT_STATE: tuple[str, ...] = ("code_of", "faulted", "sent", "listening")
 
-    def __init__(self, sent: Callable[[int, int], None], faulted: Callable[[int, int, int], None]) -> None:
+    def __init__(
+        self,
+        sent: Callable[[int, int], None],
+        faulted: Callable[[int, int, int], None],
+        listening: Callable[[int], None],
+    ) -> None:
         self.memory = bytearray(0x10000)
         self.sent = sent
         self.faulted = faulted
+        self.listening = listening
         self.code_of: Cpu | None = None
 
     def movx_read(self, address: int, tick: int) -> int:
@@ -33,6 +41,9 @@ class XramBus(Bus):
         self.memory[address] = value
         if self.code_of is not None:
             self.code_of.write_code(address, value)
+
+    def receiver_on(self, tick: int) -> None:
+        self.listening(tick)
 
     def byte_sent(self, value: int, tick: int) -> None:
         self.sent(value, tick)

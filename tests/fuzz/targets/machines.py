@@ -54,6 +54,7 @@ def _serial():
                     crystal_hz=crystal_hz,
                     gap_ticks=gap_ticks,
                     pins=tuple(pins),
+                    wait=bool(gap_ticks & 1),
                 )
                 for at in range(2)
             )

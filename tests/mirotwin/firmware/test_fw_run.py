@@ -168,6 +168,8 @@ def test_a_time_is_one_of_the_crystal(mirotwin, tmp_path):
         (("--stdin", "F", "--stdin-when", "a", "--stdin-when", "b"), "--stdin-when: 2 for 1 --stdin; give one"),
         (("--stdin", "F", "--stdin", "F", "--stdin", "F", "--stdin-when", "a"), "--stdin-when: 1 for 3 --stdin"),
         (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: has no effect without --stdin-when"),
+        (("--stdin-wait",), "--stdin-wait: has no effect without --stdin"),
+        (("--stdin", "F", "--stdin-after", "1s", "--stdin-after", "2s"), "--stdin-after: 2 for 1 --stdin; give one"),
         (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read only once"),
         (("--stdin", "F", "--stdin-after", "soon"), "'soon' is not a time"),
         (("--stdin", "F", "--baud", "600000", "--crystal", "12000000"), "--baud 600000 is outside 50..375000"),
@@ -208,13 +210,10 @@ def test_a_monitor_and_its_program_run_as_two_images(mirotwin, program_at_8000, 
     assert f"{program_at_8000}: has a byte at 0x8000, as monitor.ihx has; link one of them elsewhere" in err
 
 
-def test_a_text_that_came_only_for_the_first_line_is_told_so(mirotwin, tmp_path):
+def test_a_text_that_never_came_is_told_so(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", SENDS + b">" + LOOP)
     (tmp_path / "lines").write_bytes(b"one\ntwo\n")
     words = ("--stdin", tmp_path / "lines", "--stdin-when", ">", "--stdin-by-line", "--max-cycles", 2_000_000)
-    # the program takes no character, so RI stays up after the first
-    _, _, err = mirotwin("fw", "run", image, *words)
-    assert "was not seen;" not in err
     _, _, err = mirotwin("fw", "run", image, *words[:3], "?", "--stdin-by-line", "--max-cycles", 200_000)
     assert "--stdin-when: b'?' was not seen; 8 bytes of --stdin were not sent" in err
 
@@ -229,6 +228,40 @@ def test_lines_after_a_text_that_does_not_come_again_are_told_with_how_often_it_
     words = ("--stdin", tmp_path / "lines", "--stdin-when", ">", "--stdin-by-line", "--max-cycles", 400_000)
     _, _, err = mirotwin("fw", "run", image, *words)
     assert "--stdin-when: b'>' was not seen again after 1 time; 4 bytes of --stdin were not sent" in err
+
+
+def test_only_the_text_that_is_waited_for_is_counted(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "a.ihx", SENDS + b">" + bytes.fromhex(READS * 4) + LOOP)
+    (tmp_path / "line").write_bytes(b"one\n")
+    pair = ("--stdin", tmp_path / "line", "--stdin-when")
+    _, _, err = mirotwin("fw", "run", image, *pair, ">", *pair, "?", "--max-cycles", 400_000)
+    assert "--stdin-when: b'?' was not seen; 4 bytes of --stdin were not sent" in err
+
+
+def test_the_files_of_stdin_have_a_delay_each(mirotwin, tmp_path):
+    """The program sends back what it gets, and ends at `!`."""
+    echo = SENDS[:-2] + bytes.fromhex("758dfd 3098fd e599 c298 f599 3099fd c299 b421ef") + LOOP
+    image = hex_file(tmp_path / "a.ihx", echo)
+    for name, text in (("first", "ab"), ("second", "c"), ("third", "!")):
+        (tmp_path / name).write_text(text)
+    files = [option for name in ("first", "second", "third") for option in ("--stdin", tmp_path / name)]
+    ended = []
+    for second in ("0s", "50ms"):
+        delays = ("--stdin-after", "10ms", "--stdin-after", second, "--stdin-after", "0s")
+        code, out, err = mirotwin("fw", "run", image, *files, *delays)
+        assert (code, out) == (0, "abc!")
+        ended.append(int(err.split(" after ")[1].split()[0]))
+    assert abs(ended[1] - ended[0] - 100_000) < 6_000
+
+
+def test_characters_that_were_never_sent_are_told_with_the_reason(mirotwin, tmp_path):
+    (tmp_path / "bytes").write_bytes(b"xyz")
+    stdin = ("--stdin", tmp_path / "bytes", "--max-cycles", 10_000)
+    deaf = hex_file(tmp_path / "deaf.ihx", bytes.fromhex("2080fd 3080fd"))
+    _, _, err = mirotwin("fw", "run", deaf, *stdin)
+    assert (
+        "mirotwin: 3 bytes of --stdin were not sent: the receiver was never on, and no --baud is given" in err
+    )
 
 
 def test_a_port_of_9_bits_is_told(mirotwin, tmp_path):

@@ -27,10 +27,10 @@ def test_stdin_is_echoed_byte_by_byte():
     assert bytes(out) == b"hello, world\n"
 
 
-def test_the_next_byte_waits_until_ri_was_cleared():
+def test_with_wait_the_next_byte_waits_until_ri_was_cleared():
     slow = SERIAL + "loop:\nJNB RI,$\nMOV @R0,SBUF\nINC R0\nMOV R7,#00h\nw:\nMOV R6,#20\nDJNZ R6,$\n"
     slow += "DJNZ R7,w\nCLR RI\nSJMP loop"
-    machine = BareMachine(image_of("MOV R0,#30h\n" + slow), stdin=b"abcdef")
+    machine = BareMachine(image_of("MOV R0,#30h\n" + slow), stdin=b"abcdef", wait=True)
     machine.run(max_cycles=200_000)
     assert bytes(machine.cpu.peek_iram(0x30 + n) for n in range(6)) == b"abcdef"
 
@@ -293,12 +293,107 @@ def test_a_text_releases_what_waits_for_it_and_only_once():
     assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(3)) == b"xy\r"
 
 
+BIT_TICKS = 2496  # of SERIAL
+LOSES_EVERY_SECOND = f"""MOV R0,#40h
+{SERIAL}
+loop:
+JNB RI,$
+MOV @R0,SBUF
+INC R0
+MOV R7,#12
+work:
+MOV R6,#100
+DJNZ R6,$
+DJNZ R7,work
+CLR RI
+SJMP loop
+"""
+"""Works on each character for 2436 cycles, which is 1.17 times its length, before it clears RI."""
+
+
+def starts_of(machine):
+    """Start ticks of the characters, as they are put on RXD."""
+    starts, send = [], machine.input._send
+
+    def noted(start):
+        starts.append(start)
+        send(start)
+
+    machine.input._send = noted
+    return starts
+
+
+@pytest.mark.parametrize(("wait", "taken"), [(False, b"AC\0\0"), (True, b"ABCD")])
+def test_a_parser_that_is_slower_than_the_line_loses_every_second_character(wait, taken):
+    machine = BareMachine(image_of(LOSES_EVERY_SECOND), stdin=b"ABCD", wait=wait)
+    machine.run(max_cycles=50_000)
+    assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(4)) == taken
+
+
+@pytest.mark.parametrize("text", [ECHO, LOSES_EVERY_SECOND])
+@pytest.mark.parametrize("gap_ticks", [0, 7, 480_000])
+def test_characters_follow_at_the_rate_of_the_line_whatever_the_program_does(text, gap_ticks):
+    pieces = (InputPiece(b"ABCDE" * 20), InputPiece(b""), InputPiece(b"FG"))
+    machine = BareMachine(image_of(text), stdin=pieces, gap_ticks=gap_ticks)
+    starts = starts_of(machine)
+    machine.run(max_cycles=5_000_000)
+    assert len(starts) == 102
+    assert {later - earlier for earlier, later in pairwise(starts)} == {10 * BIT_TICKS + gap_ticks}
+
+
+@pytest.mark.parametrize(("baud", "delay"), [(9600, 1), (9600, 77), (None, 140), (None, 250)])
+def test_the_first_character_begins_when_the_receiver_is_switched_on(baud, delay):
+    before = f"MOV R6,#40\nw:\nMOV R7,#{delay}\nDJNZ R7,$\nDJNZ R6,w\n"
+    on = 6 + 1 + 40 * (1 + 2 * delay + 2) + 2  # cycles until SCON is written
+    timed = SERIAL.replace("MOV SCON,#50h\n", "") + before + "MOV SCON,#50h\n"
+    machine = BareMachine(image_of(timed + "JNB RI,$\nSJMP $"), stdin=b"A", baud=baud)
+    starts = starts_of(machine)
+    machine.run(max_cycles=100_000)
+    assert starts == [12 * on + 240]
+
+
+def test_without_a_baud_rate_it_begins_when_the_clock_of_the_receiver_runs():
+    text = "MOV SCON,#50h\nMOV TMOD,#20h\nMOV TH1,#0F3h\nMOV R7,#0\nMOV R6,#9\nw:\nDJNZ R7,w\nDJNZ R6,w\n"
+    machine = BareMachine(image_of(text + "SETB TR1\nloop:\nJNB RI,$\nSJMP loop"), stdin=b"AB")
+    starts = starts_of(machine)
+    machine.run(max_cycles=100_000)
+    overflow = 12 * (8 + 9 * 514 + 256)
+    assert overflow < starts[0] < overflow + 12 * 150
+    assert starts[1] - starts[0] == 10 * 32 * 12 * 13
+
+
+def test_a_receiver_that_is_switched_off_does_not_stop_the_line():
+    text = SERIAL + "JNB RI,$\nMOV SCON,#00h\nSJMP $"
+    machine = BareMachine(image_of(text), stdin=b"ABCD")
+    starts = starts_of(machine)
+    machine.run(max_cycles=50_000)
+    assert {later - earlier for earlier, later in pairwise(starts)} == {10 * BIT_TICKS}
+
+
+def test_each_piece_has_a_delay_of_its_own():
+    pieces = (InputPiece(b"ab", delay_ticks=240_000), InputPiece(b"c", delay_ticks=33_333), InputPiece(b"d"))
+    machine = BareMachine(image_of(ECHO), stdin=pieces)
+    starts = starts_of(machine)
+    machine.run(max_cycles=50_000)
+    ends = [start + 10 * BIT_TICKS for start in starts]
+    assert starts == [240_000, ends[0], ends[1] + 33_333, ends[2]]
+
+
 def test_a_text_counts_only_behind_the_piece_before():
     """Its first letter would fit the prompt that came before."""
     pieces = (InputPiece(b"x", b">"), InputPiece(b"\r", b">>"))
     machine = BareMachine(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.CYCLES
     assert (machine.input.waiting_for, machine.input.left) == (b">>", 1)
+
+
+def test_a_text_that_was_sent_before_the_last_character_of_a_piece_began_does_not_count():
+    """The second character is put on the line as the program sends its prompt, and begins 300 cycles after that."""
+    text = SERIAL + "JNB RI,$\nMOV SBUF,#3Eh\nSJMP loop\nloop:\nJNB F0,loop"
+    pieces = (InputPiece(b"a"), InputPiece(b"b", delay_ticks=10 * BIT_TICKS + 4_000), InputPiece(b"c", b">"))
+    machine = BareMachine(image_of(text), stdin=pieces)
+    assert machine.run(max_cycles=200_000) == Ended.CYCLES
+    assert (machine.input.waiting_for, machine.input.left) == (b">", 1)
 
 
 def test_characters_keep_their_gap():

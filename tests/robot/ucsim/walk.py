@@ -55,7 +55,7 @@ class Walker:
     def __init__(self, seed, scattered=False):
         self.random = Random(seed)
         self.scattered = scattered
-        self.bus = XramBus(_ignore, _ignore)
+        self.bus = XramBus(_ignore, _ignore, _ignore)
         self.cpu = Cpu(self.bus)
         self.known = bytearray(0x10000)  # bytes of code that exist
         self.visits = bytearray(0x10000)
