@@ -1,25 +1,36 @@
 """What may be sent to a robot that can hurt: nothing that moves it unless that is allowed, and nothing too fast.
 
-The guard reads what is to be sent as a robot of either layout would, before it is sent. A robot that takes damaged
-frames may still make something else of them: no guard on this side of the radio can know that.
+A robot takes the last 17 characters for a frame (25 in a network of five) if they begin with the sync and their CRC is
+good; which pauses it refuses, and which frames it has lost, this side of the radio does not know. So every window of
+both lengths is judged, across transmissions, whatever the pauses and whatever frames it overlaps. Without
+`--allow-motion` such a frame may hold nothing but zeros, and the slot of a ping: velocities 0, no gains, no
+acceleration, whatever its type. A window with a bad CRC is no frame: receivers notice any 1 to 4 wrong bits. A robot
+whose firmware takes it may make something else of it; no guard can know that.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+import struct
+from collections.abc import Iterator
+from typing import Annotated, NamedTuple
 
 from miro_exact.bad_input import BadInput
 from miro_host.wheels import Wheels
-from miro_protocol.decoder import Decoder
-from miro_protocol.events import Received
-from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, FrameType, Opcode
+from miro_protocol.crc import crc16
+from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.table import DOWNLINK, FRESH_STEPS, ROBOT_COUNTS, SEQ_MODULUS, FrameType
+from miro_protocol.whitening import whiten
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import FiniteNumber, PathType
 
 MAX_SPEED_M_S = 0.5
 """Of each wheel, unless another limit is given. A third of what the robot can do."""
 STOP_FRAMES = 3
+"""With the numbers that follow; further ones are fresh after any other number (`Guard.stop_frames`)."""
+LONGEST = max(form.size for form in DOWNLINK.values())
+"""Characters of the longest window."""
+KEPT = 8192
+"""Characters that are remembered: more than a port's driver holds back."""
 WHEELS = Wheels()
 _WHERE = "Talk to a robot: /dev/ttyUSB0, or any URL that pyserial knows."
 _MOTION = "Send what moves a robot, too. Without it only what lets it stand is sent."
@@ -39,53 +50,117 @@ class DeskOptions(Options, frozen=True, kw_only=True):
     )
 
 
+class FrameSent(NamedTuple):
+    """A window that robots of a network of `robots` take for a frame. `body`: HDR and payload in clear."""
+
+    end: int
+    robots: int
+    body: bytes
+
+    @property
+    def kind(self) -> int:
+        return self.body[0] // SEQ_MODULUS
+
+    @property
+    def seq(self) -> int:
+        return self.body[0] % SEQ_MODULUS
+
+    def speeds(self) -> list[tuple[float, float]]:
+        """What each robot's wheels are told, in m/s, none by a frame without velocities."""
+        if self.kind not in (FrameType.TEAM, FrameType.TEAM_ASK):
+            return []
+        words = struct.iter_unpack("<hh", self.body[1:])
+        return [(left / WHEELS.units_per_m_s, right / WHEELS.units_per_m_s) for left, right in words]
+
+    def moves(self) -> str:
+        """What it does to a robot other than letting it stand with its gains, "" for nothing."""
+        slot, *rest = self.body[1:]
+        if not any(rest) and (not slot or (self.kind == FrameType.SERVICE and slot < self.robots)):
+            return ""
+        for place, (left, right) in enumerate(self.speeds()):
+            if left or right:
+                return f"robot {place} told {left:.3f} and {right:.3f} m/s"
+        if self.kind == FrameType.SERVICE:
+            return f"service frame with opcode {self.body[2]}"
+        return f"frame of type {self.kind}, which no host sends"
+
+
+def frames_in(wire: bytes, from_end: int = 0) -> Iterator[FrameSent]:
+    """Every window of either layout that is a frame and ends behind `from_end`."""
+    for robots, form in DOWNLINK.items():
+        start = wire.find(form.sync, max(0, from_end - form.size + 1))
+        while 0 <= start <= len(wire) - form.size:
+            end = start + form.size
+            clear = whiten(wire[start + len(form.sync) : end])
+            if crc16(bytes([form.layout]) + clear[:-2]) == int.from_bytes(clear[-2:], "little"):
+                yield FrameSent(end, robots, clear[:-2])
+            start = wire.find(form.sync, start + 1)
+
+
 class Guard:
-    """Checks what is sent to the robots of one port. `layout`: robots of the network that was spoken to last."""
+    """Checks what is sent to the robots of one port. `last`: by robots in a network, the number of the frame that was
+    sent last, the network spoken to last at the end.
+    """
 
     def __init__(self, desk: DeskOptions, path: str = "") -> None:
         self.desk = desk
         self.path = path
-        self.layout = 0
-        self.last_seq = 0
-        self._decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
+        self.last: dict[int, int] = {}
+        self._sent = b""
 
     def check(self, data: bytes, place: str = "") -> list[int]:
-        """Reads what is about to be sent; the numbers of its frames. Raises BadInput for what is not allowed."""
-        numbers = []
-        for count, decoder in self._decoders.items():
-            for event in decoder.feed(data):
-                if isinstance(event, Received):
-                    try:
-                        message = event.message(count)
-                    except ContentError:
-                        continue
-                    if not isinstance(message, TelemetryFrame):
-                        self._check(message, place)
-                        self.layout, self.last_seq = count, message.seq
-                        numbers.append(message.seq)
-        return numbers
+        """Reads what is sent next; the numbers of its frames.
 
-    def _check(self, message: TeamFrame | ServiceFrame, place: str) -> None:
-        moves, fastest = "", 0.0
-        if isinstance(message, ServiceFrame) and message.opcode != Opcode.PING:
-            moves = f"service frame with opcode {message.opcode}"
-        for slot, pair in enumerate(message.velocities if isinstance(message, TeamFrame) else ()):
-            left, right = (word / WHEELS.units_per_m_s for word in pair)
-            fastest = max(fastest, abs(left), abs(right))
-            if any(pair) and not moves:
-                moves = f"robot {slot} told {left:.3f} and {right:.3f} m/s"
+        Raises BadInput for what is not allowed, which then counts as not sent.
+        """
+        wire, begun = self._sent + data, len(self._sent)
+        frames = sorted(frames_in(wire, begun))
+        for frame in frames:
+            if refused := self._refusal(frame):
+                raise BadInput(self.path, place, *refused)
+        for frame in frames:
+            self.last.pop(frame.robots, None)
+            self.last[frame.robots] = frame.seq
+        self._sent = wire[-KEPT:]
+        return [frame.seq for frame in frames]
+
+    def _refusal(self, frame: FrameSent) -> tuple[str, str] | None:
+        """Why it is not sent and what to do, None if it may be sent."""
+        moves, where = frame.moves(), f"(frame {frame.seq}, {frame.robots} robots)"
         if moves and not self.desk.allow_motion:
             remedy = "clear its way or lift its wheels off the ground, then give --allow-motion"
-            raise BadInput(self.path, place, f"{moves}, which may move a real robot", remedy)
+            return f"{moves} {where}, which may move a real robot", remedy
+        fastest = max((abs(speed) for pair in frame.speeds() for speed in pair), default=0.0)
         if fastest > self.desk.max_speed:
             most = f"at most {self.desk.max_speed:g} m/s are allowed"
-            raise BadInput(self.path, place, f"a wheel at {fastest:.3f} m/s; {most}", "raise --max-speed")
+            return f"a wheel at {fastest:.3f} m/s {where}; {most}", "raise --max-speed"
+        return None
 
-    def stop_frames(self) -> bytes:
-        """Frames that tell all robots to stand, in numbers that are fresh after what was sent."""
-        stop = FrameType.TEAM
-        return b"".join(
-            encode(TeamFrame(stop, (self.last_seq + step) % SEQ_MODULUS, ((0, 0),) * count), count)
-            for count in ((self.layout,) if self.layout else ROBOT_COUNTS)
-            for step in range(1, STOP_FRAMES + 1)
+    def stop_frames(self, unsent: int = 0) -> bytes:
+        """Frames that tell all robots to stand, to networks of every size that was spoken to, the last one first.
+
+        The first follow the number that was sent last. The others, in steps of 8, make sure that one is fresh whatever
+        number a robot took last: who jumps in its numbers does not know which that is.
+
+        `unsent`: so many of the characters sent last may have been taken back. Wherever they end, no window over what
+        is left of them and the frames' first characters is a frame: other characters stand between if need be.
+        """
+        steps = [*range(1, STOP_FRAMES + 1), *range(STOP_FRAMES + FRESH_STEPS, SEQ_MODULUS, FRESH_STEPS)]
+        frames = b"".join(
+            encode(TeamFrame(FrameType.TEAM, (seq + step) % SEQ_MODULUS, ((0, 0),) * robots), robots)
+            for robots, seq in (reversed(self.last.items()) if self.last else ((n, 0) for n in ROBOT_COUNTS))
+            for step in steps
         )
+        betweens = (b"", *(bytes([character]) * LONGEST for character in range(256)))
+        return next(between + frames for between in betweens if self._is_apart(between + frames, unsent))
+
+    def _is_apart(self, frames: bytes, unsent: int) -> bool:
+        """Whether robots find nothing in these characters that moves them, behind any beginning of what was sent."""
+        first = frames[: LONGEST - 1]
+        ends = range(max(0, len(self._sent) - unsent), len(self._sent) + 1)
+        across = (
+            frame
+            for end in ends
+            for frame in frames_in(self._sent[max(0, end - LONGEST + 1) : end] + first, min(end, LONGEST - 1))
+        )
+        return not any(frame.moves() for frame in across) and not any(map(FrameSent.moves, frames_in(frames)))

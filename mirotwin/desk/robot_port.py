@@ -25,7 +25,7 @@ from urllib.parse import urlsplit
 import msgspec
 import serial
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Event as Decoded
@@ -41,6 +41,7 @@ from miro_sim.world.waits import Waits
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.recording.recorder import Recorder
 from mirotwin.shell.held_signals import held_signals
+from mirotwin.shell.program import complain
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -55,8 +56,19 @@ BLOCKED_S = 1.0
 LOOK_S = 0.001
 """How often a port is looked at that cannot be waited for (`rfc2217://`)."""
 READ_BYTES = 4096
+BURST_BYTES = 1 << 16
+"""So many may have waited in buffers of the system before the port was read."""
+LEAST_CHARACTER_TICKS = character_ticks(UP) * 15 // 16
+"""No receiver of 9600 baud takes shorter characters; what comes faster for long is no robot, and is dropped."""
 CUT_TICKS = TICKS_PER_SECOND // 10
 """What came so long before is no part of an answer that goes on now; USB adapters keep characters for 16 ms."""
+PORT_ERRORS: tuple[type[Exception], ...] = (OSError,)
+"""What pyserial raises for a port that is gone: its own errors are OSErrors, that of termios is none."""
+with suppress(ImportError):  # Windows has none
+    import termios
+
+    PORT_ERRORS += (termios.error,)
+OPENING_ERRORS: tuple[type[Exception], ...] = (*PORT_ERRORS, ValueError)
 REOPENINGS = 3
 BOOT_TICKS = TICKS_PER_SECOND // 10
 """A twin that is switched on at tick 0 is up by then."""
@@ -66,6 +78,8 @@ APART = 32
 """Numbers between the last question of the greeting and what follows it."""
 PAUSE_TICKS = FRESH_AGAIN_TICKS + TICKS_PER_SECOND // 10
 """After the greeting: after so long a silence any other number is fresh."""
+ADAPTER_TICKS = TICKS_PER_SECOND // 10
+"""So much may wait in an adapter when the port's driver has sent all."""
 AFTER_TICKS = TICKS_PER_SECOND // 5
 """An answer that comes later than this is none."""
 PIECE_BYTES = 200
@@ -107,6 +121,7 @@ class RobotPort:
     opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
     answers; `delays`: from each question since the greeting began to its whole answer, in ticks.
     `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: with real-time priority.
+    `dropped`: characters that came faster than a line carries them.
     """
 
     def __init__(self, desk: DeskOptions, scenario: Scenario, name: str = "") -> None:
@@ -126,10 +141,10 @@ class RobotPort:
         self.delays: list[int] = []
         self._asked: dict[int, int] = {}
         self.began_tick = self.free_tick = 0
-        self.in_period = self.stopped = self.prompt = False
+        self.in_period = self.stopped = self.prompt = self._blocked = False
         self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
-        self._heard_tick = self._end_tick = self._recorded = 0
+        self._heard_tick = self._end_tick = self._recorded = self._came = self.dropped = 0
         self._began_ns = time.monotonic_ns()
         self._serial: Any = _opened(self.url)
         self._virtual = getattr(self._serial, "virtual_tick", None) is not None
@@ -144,8 +159,11 @@ class RobotPort:
             realtime_priority(False)
             self._keep(self._decoder.flush(), self._heard_tick)
             self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
-            with suppress(OSError):
+            with suppress(*PORT_ERRORS):
                 self._serial.close()
+        if self.dropped:
+            count = amount(self.dropped, "character is", "characters are")
+            complain(f"{self.url}: {count} left out, which came faster than {BAUD} baud carries")
 
     # ---- time --------------------------------------------------------------------------------------------
 
@@ -212,14 +230,18 @@ class RobotPort:
             raise NotObservable("a character with a bad stop bit")
         if at_tick is not None:
             self.run_to(at_tick)
-        numbers = self.guard.check(data)
+        numbers = self.guard.check(data, f"tick {self.tick}")
         now = self._now
         with self._told():
+            if self._blocked:  # how much of what was sent last is on its way is not known
+                raise serial.SerialTimeoutException
+            sent = Transmission(max(now, self.free_tick), DOWN, data)
+            self.free_tick = (
+                sent.end_tick
+            )  # before Ctrl-C can break off the next line: some of it may be on its way
             self._serial.write(data)
         if at_tick is not None:
             self.late_ticks.append(max(0, now - self.began_tick - at_tick))
-        sent = Transmission(max(now, self.free_tick), DOWN, data)
-        self.free_tick = sent.end_tick
         self.wire.append(sent)
         self._asked |= dict.fromkeys(numbers, sent.tick)
         tick = sent.tick - self.began_tick
@@ -238,9 +260,10 @@ class RobotPort:
 
     def stop(self) -> None:
         """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
-        frames = self.guard.stop_frames()
+        unsent_ticks = max(0, self.free_tick - self._now) + ADAPTER_TICKS
+        frames = self.guard.stop_frames(unsent_ticks // HOST_CHARACTER_TICKS)
         for _ in range(REOPENINGS):
-            with suppress(OSError, PortError):
+            with suppress(PortError, *PORT_ERRORS):
                 if not self._serial.is_open:
                     self._serial = _opened(self.url)
                 self._serial.reset_output_buffer()
@@ -248,7 +271,7 @@ class RobotPort:
                 if not self._virtual:
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
                 return
-            with suppress(OSError):
+            with suppress(*PORT_ERRORS):
                 self._serial.close()
             time.sleep(LOOK_S)
 
@@ -284,7 +307,7 @@ class RobotPort:
         counted = {}
         for said in [answer_of(event.frame) for _, event in cursor.read() if event.frame]:
             if said is not None and said.seq in self._asked and said.slot == said.seq % robots:
-                since = (self.guard.last_seq - said.seq) % SEQ_MODULUS  # questions to others
+                since = (self.guard.last[robots] - said.seq) % SEQ_MODULUS  # questions to others
                 counted[said.slot] = (said.accepted + since, said.rejected)
         return counted if self.delays else {}  # without any, the numbers are those of later questions
 
@@ -320,9 +343,13 @@ class RobotPort:
             return found
 
     def _take(self, data: bytes) -> None:
+        now = self._now
+        room = BURST_BYTES + now // LEAST_CHARACTER_TICKS - self._came
+        self.dropped += max(0, len(data) - room)
+        data = data[: max(0, room)]
         if not data:
             return
-        now = self._now
+        self._came += len(data)
         if now - self._heard_tick > CUT_TICKS and self._decoder.pending:
             self._keep(self._decoder.flush(), self._heard_tick)
         self._heard_tick = now
@@ -355,11 +382,12 @@ class RobotPort:
         try:
             yield
         except serial.SerialTimeoutException:
+            self._blocked = True
             what = f"it takes no characters for {BLOCKED_S:g} s"
             raise PortError(self.url, "", what, "look at its flow control, and at who reads it") from None
-        except OSError as error:
+        except PORT_ERRORS as error:
             seconds = self._now / TICKS_PER_SECOND
-            with suppress(OSError):
+            with suppress(*PORT_ERRORS):
                 self._serial.close()
             what, remedy = f"the port is lost: {error}", "robots that hear nothing stop after 110 ms"
             raise PortError(self.url, f"{seconds:.3f} s", what, remedy) from None
@@ -368,13 +396,19 @@ class RobotPort:
 
     def _record(self, until_tick: int) -> None:
         """Writes the periods that are over by then: what is broken off is there up to there."""
-        while self.recorder and (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:
-            there = sorted((one for one in self.wire if one.tick < end_tick), key=lambda one: one.tick)
-            self.wire = [one for one in self.wire if one.tick >= end_tick]
+        if self.recorder is None:
+            return
+        self.wire.sort(key=lambda sent: sent.tick)
+        done = 0
+        while (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:
+            first = done
+            while done < len(self.wire) and self.wire[done].tick < end_tick:
+                done += 1
             begin_tick = self._recorded * CONTROL_PERIOD_TICKS
-            self.recorder.write(Period(self._recorded, begin_tick, (), tuple(there), ""))
+            self.recorder.write(Period(self._recorded, begin_tick, (), tuple(self.wire[first:done]), ""))
             self._recorded += 1
             self.recorder.flush_if_due()
+        del self.wire[:done]
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("_"):
@@ -404,7 +438,7 @@ def _opened(url: str) -> Any:
             with socket.socket(fileno=os.dup(port.fileno())) as same:
                 same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return port
-    except (OSError, ValueError) as error:
+    except OPENING_ERRORS as error:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":
             number = errno.EBUSY

@@ -6,10 +6,10 @@ import re
 import signal
 import socket
 import subprocess
+import termios
 import threading
 import tty
-from contextlib import nullcontext, suppress
-from itertools import accumulate, pairwise
+from contextlib import suppress
 
 import pytest
 import serial
@@ -17,12 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
-from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
+from miro_protocol.transmission import Transmission
 from mirotwin import Telemetry
-from mirotwin.desk.guard import DeskOptions, Guard
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.testing.link import Link
 from mirotwin.verify.rig_options import silent_scenario
@@ -277,74 +277,139 @@ def test_a_signal_stops_the_robot_and_leaves_what_was_recorded(tmp_path, number,
     assert (tmp_path / "runs/drive-port/run.part.mcap").exists()
 
 
-STANDING = DeskOptions(port="COM1")
-MOVING = DeskOptions(port="COM1", allow_motion=True, max_speed=0.5)
+# ---- ports that are hostile, or go at the worst moment -------------------------------------------------------
 
 
-def team(*pairs, seq=0):
-    return encode(TeamFrame(0, seq, (*pairs, *[(0, 0)] * (3 - len(pairs)))), 3)
+@pytest.mark.parametrize("call", ["reset_output_buffer", "write", "close"])
+def test_a_port_that_vanishes_with_ctrl_c_is_opened_again_for_the_stop_frames(pty, monkeypatch, call):
+    """The terminal's own error is no OSError."""
+    broken = [termios.error(errno.EIO, "Input/output error")]
+
+    def do(port):
+        port.inject(DRIVE)
+        was = getattr(port._serial, call)
+
+        def fails_once(*given):
+            if broken:
+                raise broken.pop()
+            return was(*given)
+
+        monkeypatch.setattr(port._serial, call, fails_once)
+        raise KeyboardInterrupt
+
+    broken_off(pty.path, do, KeyboardInterrupt)
+    assert stops(pty.read())
 
 
-@pytest.mark.parametrize("place", range(3))
-@pytest.mark.parametrize("pair", [(1, 0), (0, -1)])
-def test_the_smallest_velocity_of_any_robot_is_refused_where_nothing_may_move(place, pair):
-    pairs = [(0, 0)] * 3
-    pairs[place] = pair
-    with pytest.raises(BadInput, match=f"robot {place} told .* may move a real robot; .*--allow-motion"):
-        Guard(STANDING).check(team(*pairs))
+def test_a_port_that_refuses_to_be_set_up_is_told_in_one_line(pty, monkeypatch):
+    def refuse(*given, **named):
+        raise termios.error(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(PortError, match="cannot be opened: "):
+        robots_at(pty.path)
 
 
-@pytest.mark.parametrize(
-    "frame", [ServiceFrame.filter(0, 1, 1, 2, 3, 4), ServiceFrame.acceleration(0, 1, 5973)]
-)
-def test_gains_and_accelerations_count_as_motion(frame):
-    with pytest.raises(BadInput, match="service frame with opcode"):
-        Guard(STANDING).check(encode(frame, 3))
-    Guard(MOVING).check(encode(frame, 3))
+def test_a_blocked_port_takes_nothing_more_but_stop_frames(pty):
+    """What was sent last may have ended anywhere, so nothing is known of a window over it and what comes next."""
+
+    def do(port):
+        with suppress(PortError):
+            for _ in range(100):
+                port.inject(DRIVE * 40)
+        pty.read()
+        port.inject(DRIVE)
+
+    assert "it takes no characters" in broken_off(pty.path, do, PortError)
+    assert stops(pty.read())
 
 
-def test_what_lets_robots_stand_is_always_allowed():
-    guard = Guard(STANDING)
-    guard.check(team())
-    guard.check(encode(ServiceFrame.ping(1, 0), 3))
-    guard.check(bytes(range(256)))
+@pytest.mark.parametrize("many", [1, 5000])
+def test_characters_that_come_faster_than_the_line_carries_them_are_left_out(pty, capsys, many):
+    answer = encode(TelemetryFrame(40, 1), 3)
+    with robots_at(pty.path) as port:
+        for _ in range(many):
+            port._take(answer)
+        kept = sum(len(sent.data) for sent in port.wire)
+        assert kept + port.dropped + port._decoder.pending == many * len(answer)
+        assert port._end_tick - port._now < 80 * 24_000_000
+    assert (
+        "characters are left out, which came faster than 9600 baud carries" in capsys.readouterr().err
+    ) == (many > 1)
 
 
-@given(st.integers(-32767, 32767), st.integers(0, 2), st.booleans())
-def test_a_wheel_is_refused_above_the_limit_and_only_there(word, slot, right):
-    pairs = [(0, 0)] * 3
-    pairs[slot] = (0, word) if right else (word, 0)
-    fast = abs(word) / Wheels().units_per_m_s > MOVING.max_speed
-    refused = pytest.raises(BadInput, match=r"at most 0\.5 m/s are allowed; raise --max-speed")
-    with refused if fast else nullcontext():
-        Guard(MOVING).check(team(*pairs))
+def test_a_robot_that_talks_all_the_time_for_an_hour_is_heard_whole(pty, monkeypatch):
+    now = 0
+    monkeypatch.setattr(RobotPort, "_now", property(lambda port: now))
+    with robots_at(pty.path) as port:
+        for now in range(0, 3600 * 24_000_000, 24_000_000):  # noqa: B007  # the port reads it
+            port._take(bytes(970))  # a second of a line that is 1 % fast
+        assert not port.dropped
 
 
-@given(st.lists(st.integers(1, 5), max_size=4))
-def test_a_frame_in_pieces_is_read_as_one(sizes):
-    data, guard = b"\x55" + team((1, 1)), Guard(STANDING)
-    *pieces, last = [data[start:end] for start, end in pairwise([0, *accumulate(sizes), None])]
-    for piece in pieces:
-        guard.check(piece)
-    with pytest.raises(BadInput):
-        guard.check(last)
+class Periods:
+    """A recorder that keeps what it is given."""
+
+    def __init__(self):
+        self.periods = []
+
+    def write(self, period):
+        self.periods.append(period)
+
+    def flush_if_due(self):
+        pass
 
 
-def test_a_frame_for_networks_of_five_is_read_too():
-    with pytest.raises(BadInput, match="robot 4 told"):
-        Guard(STANDING).check(encode(TeamFrame(0, 0, ((0, 0),) * 4 + ((9, 9),)), 5))
+TICKS = st.integers(0, 40 * 800_800)
 
 
-@given(st.integers(0, 63))
-def test_stop_frames_are_fresh_after_what_was_sent(seq):
-    guard = Guard(MOVING)
-    guard.check(team((100, 100), seq=seq))
-    found = [event for event in Decoder(3).feed(guard.stop_frames()) if isinstance(event, Received)]
-    assert [(event.seq - seq) % 64 for event in found] == [1, 2, 3]
-    assert {event.message(3).velocities for event in found} == {((0, 0),) * 3}
+@given(st.lists(TICKS, max_size=30), st.lists(TICKS, max_size=4))
+def test_each_transmission_is_recorded_in_its_control_period(ticks, stops):
+    port = RobotPort.__new__(RobotPort)
+    port.recorder, port._recorded = Periods(), 0
+    port.wire = [Transmission(tick, "<", bytes([1 + tick % 250])) for tick in ticks]
+    for stop in (*sorted(stops), 50 * 800_800):
+        port._record(stop)
+    assert not port.wire
+    assert [period.index for period in port.recorder.periods] == list(range(50))
+    for period in port.recorder.periods:
+        inside = sorted(tick for tick in ticks if period.tick <= tick < period.tick + 800_800)
+        assert [sent.tick for sent in period.wire] == inside
 
 
-def test_before_anything_was_sent_robots_of_both_layouts_are_told_to_stop():
-    frames = Guard(STANDING).stop_frames()
-    for robots in (3, 5):
-        assert [event for event in Decoder(robots).feed(frames) if isinstance(event, Received)]
+@pytest.mark.slow
+def test_ctrl_c_ends_a_talk_with_a_peer_that_floods_answers(tmp_path, pty):
+    (tmp_path / "drive.stream").write_text(stream_text(2000))
+    over = threading.Event()
+
+    def flood():
+        answers, seq = b"", 0
+        os.set_blocking(pty.master, False)
+        decoder = Decoder(3)
+        while not over.is_set():
+            with suppress(OSError):
+                for event in decoder.feed(os.read(pty.master, 4096)):
+                    if isinstance(event, Received):
+                        seq = event.seq
+            answers = b"".join(
+                encode(TelemetryFrame((seq + k) % 64, (seq + k) % 64 % 3), 3) for k in range(3)
+            )
+            with suppress(OSError):
+                os.write(pty.master, answers * 20)
+
+    thread = threading.Thread(target=flood, daemon=True)
+    thread.start()
+    command = [*COMMAND, "replay", "drive.stream", "--port", pty.path, "--allow-motion", "-q"]
+    process = children.start(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    for line in process.stderr:
+        if "all times are" in line:
+            break
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(timeout=5.0)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    over.set()
+    thread.join()
+    assert process.returncode == 130, err
+    assert "characters are left out, which came faster" in err
+    assert (tmp_path / "runs/drive-port/run.part.mcap").exists()
