@@ -11,6 +11,7 @@ module when it is imported instead of listing all of them before.
 from __future__ import annotations
 
 import os
+import struct
 import sys
 from collections.abc import Sequence
 from functools import cache, cached_property
@@ -37,13 +38,43 @@ class EngineError(BadInput, ImportError):  # type: ignore[misc]  # both have a `
         super().__init__("", "", what, remedy)
 
 
-@cache
+# Sums of names: the compiler of the source would add literals. The subnormal is made from its bits, without arithmetic.
+_ONE, _BIG, _ODD = 1.0, 1e16, 2.9999
+_UNSEEN = 8.673617379884035e-19  # 2**-60: to nearest, 1 + this is 1
+_NEARLY = 1.6653345369377348e-16  # three quarters of the last place of 1: to nearest, 1 + this is the number after 1
+_FOUR, _QUARTER, _SMALLEST = 4.0, 0.25, sys.float_info.min
+(_SUBNORMAL,) = struct.unpack("<d", bytes((0, 0, 0, 0, 0, 0, 8, 0)))  # half of the smallest normal number
+_ZERO = bytes(8)  # a comparison may take a subnormal for zero, which is another thing
+
+
 def check_arithmetic() -> None:
-    """Refuses a Python whose sums are rounded twice, as by the x87 unit of 32-bit x86: its runs have other bits."""
-    big, little = float("1e16"), float("2.9999")  # not literals: the compiler of the source would add them
-    if big + little != float("10000000000000002"):
-        what = "this Python rounds sums of doubles twice (x87 arithmetic), so that runs would have other bits"
-        raise EngineError(what, "use a 64-bit Python, or one that was built with -msse2 -mfpmath=sse")
+    """Raises EngineError where sums and products of doubles have other bits than elsewhere, and says by what.
+
+    For the calling thread as it is now: a library may change its rounding, or flush to zero, when it is loaded.
+    """
+    mode = (
+        "up" if _ONE + _UNSEEN != _ONE
+        else "down" if -_ONE - _UNSEEN != -_ONE
+        else "towards zero" if _ONE + _NEARLY == _ONE
+        else ""
+    )  # fmt: skip
+    subnormal = {"results (FTZ)": _SMALLEST * _QUARTER, "operands (DAZ)": _SUBNORMAL * _FOUR}
+    flushed = [name for name, value in subnormal.items() if struct.pack("<d", value) == _ZERO]
+    if mode:
+        what = f"the processor rounds {mode} and not to nearest"
+        remedy = "something in this process, a plug-in or a library, called fesetround: let it set FE_TONEAREST again"
+    elif flushed:
+        what = f"the processor takes subnormal {' and '.join(flushed)} for zero"
+        remedy = (
+            "something in this process, a plug-in or a library in LD_PRELOAD, was linked with -ffast-math:"
+            " build it without, or leave it out"
+        )
+    elif _BIG + _ODD != 10000000000000002.0:
+        what = "this Python rounds sums of doubles twice (x87 arithmetic)"
+        remedy = "use a 64-bit Python, or one that was built with -msse2 -mfpmath=sse"
+    else:
+        return
+    raise EngineError(f"{what}, so that runs would have other bits", remedy)
 
 
 @cache

@@ -20,6 +20,7 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_exact.domain import MAX_SEED
+from miro_exact.engine import check_arithmetic
 from miro_exact.state import TICK, Flat, Octets
 from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
@@ -79,6 +80,7 @@ class World:
         image: Image,
         script: Sequence[ScriptItem] | None = None,
     ) -> None:
+        check_arithmetic()  # again: a plug-in that was loaded since the start may have changed it
         if not 0 <= seed <= MAX_SEED:
             raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
         sending = [one for one in script or () if isinstance(one, Transmission)]

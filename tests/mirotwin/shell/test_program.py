@@ -33,6 +33,19 @@ def test_help_lists_every_command(mirotwin):
         assert [line.split()[0] for line in listed] == list(section)
 
 
+@pytest.mark.parametrize(
+    "arguments", [["scenarios"], ["--help"], ["run", "no-such-scenario"], ["--no-such-option"]]
+)
+def test_the_package_runs_as_the_program_does(tmp_path, arguments):
+    ways = [
+        children.run([*words, *arguments], cwd=tmp_path, capture_output=True, text=True)
+        for words in (COMMAND, [sys.executable, "-m", "mirotwin"])
+    ]
+    as_program, as_package = ((done.returncode, done.stdout, done.stderr) for done in ways)
+    assert as_package == as_program
+    assert "__main__" not in "".join(as_package[1:])
+
+
 def test_a_file_that_ends_too_soon_is_no_interruption(mirotwin, monkeypatch):
     def cut_short(name):
         raise EOFError("marshal data too short")
