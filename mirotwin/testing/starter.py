@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +14,7 @@ from miro_robot.firmware import image_path, source_folder
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, PATH
 from mirotwin.shell.outputs import reason_of, some, write_files
+from mirotwin.testing import origin
 
 _IN_WHEEL = Path(__file__).parent / "examples"
 _IN_TREE = Path(__file__).parents[2] / "examples"
@@ -69,6 +70,7 @@ def _images() -> Iterator[tuple[str, Path]]:
 
 
 FIRMWARE = "firmware"
+REQUIREMENTS = "requirements.txt"
 OF_FIRMWARE = "tests/test_firmware.py"
 """What only this firmware passes, because it names a function of it."""
 
@@ -98,13 +100,12 @@ def all_files(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def write(target: Path, wanted: Iterable[tuple[str, Path]], remedy: str, force: bool = False) -> list[str]:
-    """Writes (name, file) into `target`, which is made, and returns the names. All of them are written, or none.
+def write(target: Path, files: Mapping[str, bytes], remedy: str, force: bool = False) -> None:
+    """Writes files by name into `target`, which is made. All of them are written, or none.
 
     Raises BadInput with `remedy`, before anything is written, if a file of that name has other content: not if
     `force`, unless it is no regular file. A file with the same content stays.
     """
-    files = {name: path.read_bytes() for name, path in wanted}
     if target.exists() and not target.is_dir():
         raise BadInput(target, "", "is no folder", "name one that is new or empty")
     try:
@@ -114,7 +115,6 @@ def write(target: Path, wanted: Iterable[tuple[str, Path]], remedy: str, force: 
     if present:
         raise BadInput(target, "", f"holds {some(present)} already", remedy)
     write_files(target, files, "choose another folder")
-    return list(files)
 
 
 def _is_in_the_way(path: Path, content: bytes, force: bool) -> bool:
@@ -150,11 +150,12 @@ def examples(options: ExamplesOptions) -> None:
         click.echo("write one here: mirotwin examples NAME")
         return
     remedy = "name another folder, or replace with --force"
-    names = write(folder, example_files(name), remedy, options.force)
-    for one in names:
+    files = {one: path.read_bytes() for one, path in example_files(name)}
+    write(folder, files, remedy, options.force)
+    for one in files:
         click.echo(folder / one)
     if folder == Path():
-        click.echo(f"files written into this folder: {len(names)}")
+        click.echo(f"files written into this folder: {len(files)}")
 
 
 class InitOptions(Options, frozen=True, kw_only=True):
@@ -163,6 +164,15 @@ class InitOptions(Options, frozen=True, kw_only=True):
     without_firmware: Annotated[
         bool, Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours.")
     ] = False
+    source: Annotated[
+        str,
+        Option(
+            "--from",
+            metavar="SOURCE",
+            help="Where the project's CI gets Mirotwin: git+https://HOST/PATH@COMMIT, a wheel, a checkout; by default"
+            " where the installed one came from.",
+        ),
+    ] = ""
 
 
 @command_of(InitOptions)
@@ -172,15 +182,28 @@ def init(options: InitOptions) -> None:
     It holds a working firmware in C with a Makefile, a scenario with expectations, a pytest test, and a workflow that
     runs them with `mirotwin conform` at each push. With --without-firmware the project tests a controller or
     a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
+
+    requirements.txt says where the workflow gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the
+    installed one came from. Where neither is known, it says what to write there, and the workflow fails with that.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
-    names = write(folder, project_files(not options.without_firmware), remedy)
-    for name in names:
+    files = {name: path.read_bytes() for name, path in project_files(not options.without_firmware)}
+    line = origin.given(options.source, folder) if options.source else origin.installed(folder)
+    if line is not None:
+        text = files[REQUIREMENTS].decode()
+        files[REQUIREMENTS] = origin.UNKNOWN.sub(lambda _: line, text).encode("utf-8", "surrogateescape")
+    write(folder, files, remedy)
+    for name in files:
         if not name.startswith("firmware/"):
             click.echo(folder / name)
+    click.echo(f"Mirotwin comes from: {line or f'not known; write it into {folder / REQUIREMENTS}'}")
+    if line is not None and "@ file:" in line:
+        click.echo(
+            "That is a path of this machine. For CI on another one begin with --from git+https://HOST/PATH@COMMIT"
+        )
     enter = shlex.join(["cd", str(folder)])
     if options.without_firmware:
         click.echo(f"next: {enter} && make test   (needs make and pytest)")
         return
-    click.echo(f"{folder}/firmware: {len([name for name in names if name.startswith('firmware/')])} files")
+    click.echo(f"{folder}/firmware: {len([name for name in files if name.startswith('firmware/')])} files")
     click.echo(f"next: {enter} && make test   (needs SDCC, make and pytest)")

@@ -1,6 +1,6 @@
 """Hypothesis strategies for frames and for what a receiver hears, drawn from the same table as the codec.
 
-Needs the extra `hypothesis` (`pip install mirotwin[hypothesis]`). What belongs here: inputs for tests
+Needs the extra `hypothesis` (`pip install '.[hypothesis]'` in a checkout). What belongs here: inputs for tests
 of any sender or receiver of this wire. What does not: assertions, the radio and the robot
 (`mirotwin.testing`).
 

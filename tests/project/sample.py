@@ -1,6 +1,8 @@
 """The sample project as a user has it: `python -m tests.project.sample`.
 
-Compiling takes minutes; with `--smoke` the wheel is built without, and gets the compiled modules of this tree.
+It is begun in one environment, by an installed wheel, and tested in another one, in which its own requirements alone
+are installed: as its workflow does. Compiling takes minutes; with `--smoke` the wheel is built without, and gets the
+compiled modules of this tree.
 """
 
 import argparse
@@ -17,19 +19,32 @@ from tests.project.lowest import ROOT, copy_tree
 MISTAKE = ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
 LINE = re.compile(r"^\s*((?:mirotwin replay|mirotwin test|pytest) .*)$", re.M)
 """What a failing test prints to be run again."""
+ACTION = ".github/actions/mirotwin/action.yml"
 TESTS = ("conform", "scenarios", "pytest")
 
 
+def begun(folder, wheel):
+    """The project, written by Mirotwin from that wheel."""
+    user = Clean(folder / "user")
+    user.folder.mkdir()
+    user.make()
+    user.must("pip", "install", "-q", wheel)
+    user.must("mirotwin", "init", "mine")
+    return user.folder / "mine"
+
+
 class Sample(Clean):
-    """A new environment, and the project in it."""
+    """A new environment, and the project that is tested in it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, project):
         super().__init__(folder)
-        self.project = folder / "mine"
+        self.project = project
 
-    def install(self, wheel, smoke):
+    def install(self, smoke):
+        """As the workflow does, word by word."""
         self.make()
-        self.must("pip", "install", "-q", wheel, "pytest")
+        (step,) = re.findall(r"- run: (pip .*)", (self.project / ACTION).read_text("utf-8"))
+        self.must("sh", "-c", step, cwd=self.project)
         if smoke:
             self.copy_engines()
 
@@ -55,7 +70,6 @@ def built(folder, smoke):
 def tried(sample):
     """What is wrong: nothing, if the project passes as it is, and each failure of a wrong firmware is reproduced."""
     found = []
-    sample.must("mirotwin", "init", "mine")
     for test in TESTS:
         begun = time.perf_counter()
         code, out = sample.run("make", "-s", test, cwd=sample.project)
@@ -88,8 +102,8 @@ def main(arguments=None):
     with tempfile.TemporaryDirectory(prefix="mirotwin-sample-") as name:
         folder = Path(name)
         wheel = built(folder, given.smoke)
-        sample = Sample(folder)
-        sample.install(wheel, given.smoke)
+        sample = Sample(folder, begun(folder, wheel))
+        sample.install(given.smoke)
         found = tried(sample)
     for what in found:
         print(what, file=sys.stderr)

@@ -3,13 +3,12 @@
 import os
 import shutil
 import sys
-from importlib import metadata
 from pathlib import Path
 
 import pytest
 
 from miro_robot.firmware import image_path
-from mirotwin.testing import starter
+from mirotwin.testing import origin, starter
 from tests import children
 from tests.mirotwin import program
 from tests.mutants import build
@@ -245,7 +244,56 @@ def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(mirotw
     assert (tmp_path / "mine/build/pytest.xml").is_file() is ("pytest" in words)
 
 
-def test_what_a_project_requires_is_this_version_with_what_its_pages_need():
-    (requirements,) = (path for name, path in starter.project_files() if name == "requirements.txt")
-    minor = ".".join(metadata.version("mirotwin").split(".")[:2])
-    assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()
+def requirements(folder):
+    return (folder / "requirements.txt").read_text("utf-8").splitlines()
+
+
+def test_a_project_requires_what_is_installed_here(mirotwin, tmp_path, monkeypatch):
+    monkeypatch.setattr(origin, "installed", lambda project: f"mirotwin[report] @ {project.as_uri()}")
+    out = mirotwin.succeeds("init", tmp_path / "mine")
+    line = f"mirotwin[report] @ {(tmp_path / 'mine').as_uri()}"
+    assert requirements(tmp_path / "mine")[1:] == [line, "pytest>=8.3,<10"]
+    assert f"Mirotwin comes from: {line}\nThat is a path of this machine." in out
+
+
+def test_a_project_requires_what_the_user_names_instead(mirotwin, tmp_path):
+    source = "git+https://example.org/mirotwin.git@0123abc"
+    out = mirotwin.succeeds("init", tmp_path / "mine", "--from", source)
+    assert f"mirotwin[report] @ {source}" in requirements(tmp_path / "mine")
+    assert "this machine" not in out
+
+
+@pytest.mark.parametrize(
+    "source", ["mirotwin", "mirotwin==0.3.0", "/no/such/folder", "https://x/a b", "file:///x"]
+)
+def test_a_mere_name_is_no_source_of_a_project(mirotwin, tmp_path, monkeypatch, source):
+    monkeypatch.chdir(tmp_path)
+    said = mirotwin.refuses("init", tmp_path / "mine", "--from", source)
+    assert said.startswith(
+        f"{source}: --from: is no address, and there is no such file or folder; give git+https://"
+    )
+    assert os.listdir(tmp_path) == []
+
+
+def test_where_the_source_is_not_known_pip_fails_with_the_sentence_that_says_what_to_write(
+    mirotwin, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(origin, "installed", lambda project: None)
+    out = mirotwin.succeeds("init", tmp_path / "mine")
+    assert f"Mirotwin comes from: not known; write it into {tmp_path}/mine/requirements.txt" in out
+    (line,) = origin.UNKNOWN.findall((tmp_path / "mine/requirements.txt").read_text("utf-8"))
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--dry-run",
+        "--no-index",
+        "-q",
+        "-r",
+        "requirements.txt",
+    ]
+    done = children.run(command, cwd=tmp_path / "mine", capture_output=True, text=True)
+    assert done.returncode == 1
+    assert f"Invalid requirement: '{line}'" in done.stderr
+    assert "git+https://HOST/PATH@COMMIT, or the path of a wheel or a checkout" in line

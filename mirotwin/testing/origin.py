@@ -1,0 +1,79 @@
+"""Where a project gets Mirotwin from, as a line of its requirements: an address or a path, never a mere name.
+
+No package index has Mirotwin: pip would install whatever a stranger registers under the name.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import metadata
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+import msgspec
+
+from miro_exact.bad_input import BadInput, shortened
+
+PACKAGE = "mirotwin[report]"
+UNKNOWN = re.compile(r"^Write here where .*$", re.MULTILINE)
+"""The line of the sample project that stands for it. No requirement: pip fails, and prints the line."""
+_ADDRESS = re.compile(r"(?:(?:git|hg|svn|bzr)\+\w+|https?)://[!-~]+")
+_REMEDY = "give git+https://HOST/PATH@COMMIT, or the path of a wheel, a source archive or a checkout"
+_PLAIN = re.compile(r"[\w+-][\w./+-]*", re.ASCII)
+"""A path that pip reads as it stands: without spaces, brackets and the like, and not the project's folder itself."""
+_ARCHIVES = (".whl", ".tar.gz", ".zip")
+
+
+class _Version(msgspec.Struct):
+    vcs: str
+    commit_id: str
+
+
+class _DirectUrl(msgspec.Struct):
+    """`direct_url.json` (PEP 610), which pip leaves for what it did not install from an index."""
+
+    url: str
+    vcs_info: _Version | None = None
+    subdirectory: str = ""
+
+
+def given(source: str, project: Path) -> str:
+    """The requirement for the address or path `source`. Raises BadInput."""
+    if _ADDRESS.fullmatch(source):
+        return f"{PACKAGE} @ {source}"
+    path = Path(source)
+    if not path.exists():
+        raise BadInput(
+            shortened(source), "--from", "is no address, and there is no such file or folder", _REMEDY
+        )
+    if not (path.name.endswith(_ARCHIVES) if path.is_file() else (path / "pyproject.toml").is_file()):
+        raise BadInput(source, "--from", "is no wheel, no source archive and no checkout", _REMEDY)
+    return _of_path(path, project)
+
+
+def installed(project: Path) -> str | None:
+    """The requirement for what is installed here; None where that is not known, or there no more."""
+    try:
+        text = metadata.distribution("mirotwin").read_text("direct_url.json")
+        found = msgspec.json.decode(text or "", type=_DirectUrl)
+    except (metadata.PackageNotFoundError, msgspec.DecodeError):
+        return None
+    inner = f"#subdirectory={found.subdirectory}" if found.subdirectory else ""
+    if found.vcs_info is not None:
+        address = f"{found.vcs_info.vcs}+{found.url}@{found.vcs_info.commit_id}{inner}"
+    elif found.url.startswith("file:"):
+        path = Path(url2pathname(urlsplit(found.url).path))
+        return _of_path(path, project) if path.exists() else None
+    else:
+        address = f"{found.url}{inner}"
+    return f"{PACKAGE} @ {address}" if _ADDRESS.fullmatch(address) else None
+
+
+def _of_path(path: Path, project: Path) -> str:
+    """A path within the project is relative to it, so that it holds on every machine."""
+    path, project = path.resolve(), project.resolve()
+    inner = path.relative_to(project).as_posix() if path.is_relative_to(project) else ""
+    if _PLAIN.fullmatch(inner):
+        return f"./{inner}{PACKAGE.removeprefix('mirotwin')}"
+    return f"{PACKAGE} @ {path.as_uri()}"
