@@ -172,6 +172,7 @@ def test_each_package_is_tried_where_it_is_built():
         assert any(path in step.get("run", "") for step in jobs[name]["steps"]), name
 
 
+@pytest.mark.develop
 @pytest.mark.parametrize(
     "machine",
     ["linux x86_64", "linux aarch64", "macos arm64", "macos x86_64", "windows AMD64"],

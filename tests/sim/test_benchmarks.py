@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import chain, disturbances, frame_loss, gains, improved, one_frame_page, one_frame_pictures
+from benchmarks import chain, disturbances, frame_loss, gains, improved, one_frame_page
 from benchmarks.gains import FAMILIES, PATHS, Budget, Drive, Outcome, Search, Task
 from benchmarks.interval import clopper_pearson, wilson
 from benchmarks.one_frame import Way, edges_of
@@ -316,7 +316,9 @@ def test_the_bits_that_count_are_those_from_sync_to_crc_and_one_stop_bit():
     assert frame_loss.formula(3, 12.31) == pytest.approx(171e-4, rel=0.02)
 
 
+@pytest.mark.develop
 def test_the_same_figures_make_the_same_picture(tmp_path):
+    pytest.importorskip("matplotlib", reason="needs the extra develop")
     points = [frame_loss.Point(3, "decoder", 10.0, 1000, 440), frame_loss.Point(5, "firmware", 14.0, 100, 0)]
     for name in ("a.png", "b.png"):
         frame_loss.draw(points, tmp_path / name)
@@ -343,7 +345,11 @@ def test_the_page_in_the_tree_is_what_the_command_writes(way):
 
 
 @pytest.mark.slow
+@pytest.mark.develop
 def test_the_command_draws_the_pictures_that_the_page_shows(way, tmp_path):
+    pytest.importorskip("matplotlib", reason="needs the extra develop")
+    from benchmarks import one_frame_pictures
+
     one_frame_pictures.draw(way, tmp_path)
     drawn = sorted(file.name for file in tmp_path.iterdir())
     assert drawn == sorted(file.name for file in DOCS.glob("one-frame-*.png"))

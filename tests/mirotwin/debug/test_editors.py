@@ -55,8 +55,8 @@ def test_the_client_gets_what_it_asks_for(sent):
 
 
 def schema():
-    jsonschema = pytest.importorskip("jsonschema")
-    debugpy = pytest.importorskip("debugpy")
+    jsonschema = pytest.importorskip("jsonschema", reason="needs the extra develop")
+    debugpy = pytest.importorskip("debugpy", reason="needs the extra develop")
     path = Path(debugpy.__file__).parent / "_vendored/pydevd/_pydevd_bundle/_debug_adapter/debugProtocol.json"
     return jsonschema.Draft4Validator, msgspec.json.decode(path.read_bytes())
 
@@ -69,6 +69,7 @@ def definition_of(message, definitions):
     return next(one for one in definitions if one.lower() == f"{name}{message['type']}".lower())
 
 
+@pytest.mark.develop
 def test_each_message_is_valid_against_the_published_schema(sent):
     validator, document = schema()
     seen = set()
@@ -80,6 +81,7 @@ def test_each_message_is_valid_against_the_published_schema(sent):
     assert len(seen) > 25
 
 
+@pytest.mark.develop
 def test_a_message_that_is_wrong_would_be_found():
     validator, document = schema()
     checker = validator({**document, "$ref": "#/definitions/StoppedEvent"})

@@ -7,6 +7,8 @@ import msgspec
 import pytest
 
 layouts = pytest.importorskip("foxglove.layouts", reason="needs the extra develop")
+pytestmark = pytest.mark.develop
+
 LAYOUT = msgspec.json.decode((Path(__file__).parents[4] / "examples" / "foxglove.json").read_bytes())
 PANELS = LAYOUT["configById"]
 CONFIGS = {

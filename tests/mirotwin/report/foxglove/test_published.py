@@ -102,6 +102,7 @@ def strict(schema):
     return found
 
 
+@pytest.mark.develop
 def test_each_message_fits_its_schema(shown):
     jsonschema = pytest.importorskip("jsonschema", reason="needs the extra develop")
     found = [one for one in shown if one.topic.startswith("/foxglove/")]
