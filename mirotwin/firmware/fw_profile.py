@@ -85,8 +85,8 @@ def _print(result: Profile, name: str) -> None:
                 str(found.count),
                 amount(found.worst_latency, "cycle"),
                 str(found.worst_latency_tick),
-                amount(found.worst_duration, "cycle"),
-                str(found.worst_duration_tick),
+                "never left" if found.never_left else amount(found.worst_duration, "cycle"),
+                str(found.unfinished_tick if found.never_left else found.worst_duration_tick),
                 _percent(found.total_cycles, result.cycles),
             )
     if interrupts.row_count:

@@ -21,6 +21,7 @@ class FaultKind(IntEnum):
     LM629_BUSY = 6
     LM629_TIMING = 7
     MAIN_LOOP_STARVED = 8
+    INTERRUPT_NOT_LEFT = 9
 
 
 STACK_FAULTS = (FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW)
@@ -34,6 +35,7 @@ DESCRIPTIONS = {
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
     FaultKind.LM629_TIMING: "violated an LM629 bus timing limit",
     FaultKind.MAIN_LOOP_STARVED: "starved its main loop: interrupts took all of 10 ms",
+    FaultKind.INTERRUPT_NOT_LEFT: "left an interrupt with RET, not RETI: its level stays blocked",
 }
 
 

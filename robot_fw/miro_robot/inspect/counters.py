@@ -61,6 +61,7 @@ class InterruptProfile(msgspec.Struct):
     """Latency and duration in machine cycles; ticks of 24 MHz at which the worst ones began.
 
     `total_cycles`: from the call of the routine to the end of its RETI, routines that came in between included.
+    `unfinished_cycles`: of a routine that was called at `unfinished_tick` and has not come to its RETI, 0 without one.
     """
 
     source: str
@@ -70,6 +71,13 @@ class InterruptProfile(msgspec.Struct):
     worst_duration: int = 0
     worst_duration_tick: int = 0
     total_cycles: int = 0
+    unfinished_cycles: int = 0
+    unfinished_tick: int = 0
+
+    @property
+    def never_left(self) -> bool:
+        """Whether the routine that is under way takes longer than any that came to its end."""
+        return self.unfinished_cycles > self.worst_duration
 
 
 class Activity(Watcher):
@@ -125,6 +133,7 @@ class Activity(Watcher):
         self.ended[source] = cycle
         profile = self.interrupts[source]
         profile.total_cycles += duration
+        profile.unfinished_cycles = 0
         if duration > profile.worst_duration:
             profile.worst_duration = duration
             profile.worst_duration_tick = 12 * self.began[self.depth]
@@ -134,3 +143,7 @@ class Activity(Watcher):
 
     def ran(self, cpu: Cpu, start: int) -> None:
         self.cycles += cpu.cycles - start
+        for level in range(self.depth):
+            profile = self.interrupts[self.serving[level]]
+            profile.unfinished_cycles = cpu.cycles - self.began[level]
+            profile.unfinished_tick = 12 * self.began[level]

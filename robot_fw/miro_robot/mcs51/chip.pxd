@@ -26,6 +26,7 @@ cdef class Chip:
     cdef long long next_event, blocked
     cdef public long long main_loop_limit
     cdef long long next_mark, marks
+    cdef int interrupt_returns[2]
     cdef public int stop_asleep
     cdef public object inspector
     cdef unsigned char[::1] edges

@@ -88,8 +88,10 @@ class Chip:
         "powered_down": FLAG,
         "blocked": ("q", -1, LAST_CYCLE),
         "marks": ("q", 0, LAST_CYCLE),
+        "interrupt_returns": ("2i", -1, 0xFFFFFF),
         "peripherals": Peripherals,
     }
+    NOT_HASHED = ("interrupt_returns",)  # it follows from what was executed, and decides about faults alone
     NOT_STATE: tuple[str, ...] = (
         *("rom", "lines"),  # the image: constant, unless code lies in RAM, whose owner then restores it
         *("stack_floor", "stack_end"),  # where the image's map says that the stack is
@@ -129,6 +131,10 @@ class Chip:
         self.next_mark = NEVER_TICK
         self.marks = 0  # marks passed since interrupts took over
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
+        self.interrupt_returns = [
+            -1,
+            -1,
+        ]  # by level: SP after the return of its last interrupt << 16 | where to
         self.inspector: CpuInspector | None = None
         self._erase()
         self.reset()

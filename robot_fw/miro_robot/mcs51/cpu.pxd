@@ -3,7 +3,7 @@ cimport cython
 from miro_robot.mcs51.chip cimport Chip
 
 cdef long long NEVER_TICK
-cdef int _REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP, _MARK, _MARK_CYCLES, _MAIN_LOOP_STARVED
+cdef int _REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP, _MARK, _MARK_CYCLES, _MAIN_LOOP_STARVED, _INTERRUPT_NOT_LEFT
 cdef int _UNDEFINED_OPCODE, _STACK_OVERFLOW, _STACK_UNDERFLOW, _OUTSIDE_IMAGE
 cdef int _MOV_DATA, _P2, _CORE, _IDL, _SPREAD_FROM, _SPREAD_TO, _DEPTH
 
@@ -22,7 +22,8 @@ cdef class Cpu(Chip):
     cdef int _look_for_sleep(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1
     cdef int _enter(self, int source) except -1
-    cdef int end_of_interrupt(self) except -1
+    cdef int end_of_interrupt(self, int pc) except -1
+    cdef int return_in_service(self, int pc) except -1
     @cython.locals(now='long long', pc='long long', line='unsigned long long', row=int, value=int)
     cdef int execute(self, long long until_cycle) except -1
 

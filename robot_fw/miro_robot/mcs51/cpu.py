@@ -26,6 +26,7 @@ _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
 _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 _MAIN_LOOP_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
+_INTERRUPT_NOT_LEFT = int(FaultKind.INTERRUPT_NOT_LEFT)
 _MOV_DATA = 0x75
 _P2 = 0xA0
 _CORE = 0xD0  # the core's registers that have bits (PSW, ACC, B) lie from here on
@@ -178,14 +179,30 @@ class Cpu(Chip):
         self.start = self.cycles
         self.at = self.pc
         self.cycles += 2
+        self.interrupt_returns[self.peripherals.interrupts.in_service >> 1] = self.sp << 16 | self.pc
         self.pc = self.call(self.pc, 8 * source + 3)
         self._expect(self.cycles)
 
-    def end_of_interrupt(self) -> None:
-        """RETI was executed."""
+    def end_of_interrupt(self, pc: int) -> None:
+        """RETI went to `pc`."""
+        for level in range(2):
+            if self.interrupt_returns[level] == self.sp << 16 | pc:
+                self.interrupt_returns[level] = -1  # taken: from now on any RET may go there
         self.leave_edges()
         self.peripherals.interrupts.leave()
         self._block()
+
+    def return_in_service(self, pc: int) -> None:
+        """RET went to `pc` while an interrupt is in service.
+
+        A fault if it took the return address that the interrupt pushed from its place. Returns from functions that the
+        routine calls, jumps by PUSH and RET, other stacks, and routines that lowered their level by the RETI of a
+        subroutine are none.
+        """
+        level = self.peripherals.interrupts.in_service >> 1
+        if self.interrupt_returns[level] == self.sp << 16 | pc:
+            self.interrupt_returns[level] = -1
+            self.fault(_INTERRUPT_NOT_LEFT)
 
     # Instructions
 
@@ -266,6 +283,8 @@ class Cpu(Chip):
             elif row == 0x22:  # RET
                 value = self.pop() << 8
                 pc = value | self.pop()
+                if self.peripherals.interrupts.in_service:
+                    self.return_in_service(pc)
             elif row == 0x23:  # RL A
                 self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
             elif row == 0x24:  # ADD A,#imm
@@ -282,7 +301,7 @@ class Cpu(Chip):
             elif row == 0x32:  # RETI
                 value = self.pop() << 8
                 pc = value | self.pop()
-                self.end_of_interrupt()
+                self.end_of_interrupt(pc)
             elif row == 0x33:  # RLC A
                 value = self.a
                 self.a = ((value << 1) & 0xFF) | self.cy

@@ -17,6 +17,7 @@ from mirotwin.rerun.inspected_run import RobotRun, watch
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build_modules
+from tests.robot.mcs51.asm import assemble
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 LOOP = b"\x80\xfe"
@@ -98,6 +99,40 @@ def test_a_profile_for_people_names_functions_interrupts_and_stack(mirotwin, sho
     assert "_uart_interrupt" in out
     assert "serial" in out
     assert "stack: from " in out
+
+
+RET_IN_INTERRUPT = """LJMP main
+ORG 0Bh
+INC 32h
+RETI
+ORG 1Bh
+RET
+main:
+MOV TMOD,#21h
+MOV IE,#8Ah
+MOV TH1,#00h
+SETB TR0
+SETB TR1
+loop:
+INC 30h
+SJMP loop
+"""
+
+
+def test_a_routine_that_ends_in_ret_is_a_fault_and_never_left_in_the_profile(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "ret.ihx", assemble(RET_IN_INTERRUPT))
+    limit = ("--max-cycles", 300_000)
+    said = "firmware left an interrupt with RET, not RETI: its level stays blocked at 0x001b, tick "
+    assert said in mirotwin.ends(3, "fw", "run", image, *limit)
+    for more in ((), ("--go-on",)):
+        code, out, err = mirotwin("fw", "profile", image, *limit, *more)
+        assert (code, err.count(said)) == (3, 1)
+        (line,) = [line for line in out.splitlines() if line.startswith("timer 1")]
+        assert " never left " in line
+        assert "0 cycles" not in line
+    mended = hex_file(tmp_path / "mended.ihx", assemble(RET_IN_INTERRUPT.replace("RET\n", "RETI\n")))
+    code, out, _ = mirotwin("fw", "profile", mended, *limit)
+    assert (code, "never left" in out) == (42, False)
 
 
 def test_coverage_of_several_runs_adds_up_in_one_file(mirotwin, short, tmp_path):

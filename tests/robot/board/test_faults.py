@@ -65,6 +65,10 @@ CASES = {
         STUCK_INTERRUPT,  # at cycle 2000, 4000 ... 22000 it is in service; its jumps end in odd cycles
         (FaultKind.MAIN_LOOP_STARVED, 22001 * CYCLE, 0x0B, ""),
     ),
+    "an interrupt routine that is a plain function": (
+        "LJMP main\nORG 0Bh\nguilty:\nRET\nORG 30h\nmain:\n" + TIMER_0,
+        (FaultKind.INTERRUPT_NOT_LEFT, 33 * CYCLE, 0x0B, ""),  # overflow at the end of cycle 27
+    ),
 }
 
 
@@ -158,11 +162,14 @@ def test_a_main_loop_that_shuts_interrupts_out_is_not_starved():
     assert starved_ticks(text + "SETB EA\nSJMP loop") == []
 
 
-def test_ret_in_place_of_reti_is_found_because_the_interrupt_stays_in_service():
-    text = "LJMP main\nORG 0Bh\nRET\nORG 30h\nmain:\n" + TIMER_0
-    ticks = starved_ticks(text, ms=12)
-    assert len(ticks) == 1
-    assert 22000 * CYCLE <= ticks[0] <= 22001 * CYCLE
+def test_after_ret_in_place_of_reti_the_interrupt_stays_in_service_and_starves_the_main_loop():
+    board = board_with("LJMP main\nORG 0Bh\nRET\nORG 30h\nmain:\n" + TIMER_0, stop_on_fault=False)
+    board.run(12 * MS)
+    assert [fault.kind for fault in board.faults] == [
+        FaultKind.INTERRUPT_NOT_LEFT,
+        FaultKind.MAIN_LOOP_STARVED,
+    ]
+    assert 22000 * CYCLE <= board.faults[1].tick <= 22001 * CYCLE
 
 
 def test_nested_interrupts_count_as_one():

@@ -54,11 +54,13 @@ def lm629(script: TrialScript) -> None:
     "P52",
     FAULTS,
     presupposes="P13 P16 P36",
-    faults=(FaultKind.MAIN_LOOP_STARVED,),
-    broken="interrupts leave the main loop no time, or frames are lost under load",
+    faults=(FaultKind.MAIN_LOOP_STARVED, FaultKind.INTERRUPT_NOT_LEFT),
+    broken="interrupts leave the main loop no time or end in RET, or frames are lost under load",
 )
 def main_loop(script: TrialScript) -> None:
-    """Interrupts MUST leave the main loop time: never all of 10 ms, whatever comes over the air."""
+    """Interrupts MUST leave the main loop time: never all of 10 ms, whatever comes over the air. Their routines MUST
+    end with RETI.
+    """
     load(script)
 
 
