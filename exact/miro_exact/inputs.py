@@ -55,7 +55,7 @@ def read_input(
     longer ones, OSError as `open` does.
     """
     check_no_folder(path)
-    _check_ends(path)
+    check_ends(path)
     with open(path, "rb") as file:
         state = os.fstat(file.fileno())
         data = bytearray(file.read(min(CHUNK_BYTES, limit + 1)))
@@ -70,7 +70,7 @@ def read_input(
     return bytes(data)
 
 
-def _check_ends(path: str | os.PathLike[str]) -> None:
+def check_ends(path: str | os.PathLike[str]) -> None:
     """Refuses what reading may never come to the end of, before it is opened: opening a pipe waits for its writer."""
     try:
         mode = os.stat(path).st_mode

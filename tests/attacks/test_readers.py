@@ -80,6 +80,8 @@ FILES = {
     "a recording": ("big.mcap", b"", ["replay", "big.mcap"]),
     "a recording with its magic number": ("magic.mcap", b"\x89MCAP0\r\n", ["report", "magic.mcap"]),
     "a stream": ("big.stream", b"# mirotwin stream 2\n", ["replay", "big.stream"]),
+    "a capture": ("big.pcapng", b"\x0a\x0d\x0d\x0a", ["decode", "big.pcapng"]),
+    "a run to export": ("big.mcap", b"", ["export", "big.mcap", "--out", "x.pcapng"]),
     "a campaign": ("big.toml", b"#", ["campaign", "big.toml"]),
     "results of a campaign": ("big.parquet", b"PAR1", ["campaign", "show", "big.parquet"]),
     "a calibration": (

@@ -8,7 +8,7 @@ import stat
 import sys
 from typing import BinaryIO
 
-from miro_exact.inputs import InputError, check_no_folder
+from miro_exact.inputs import InputError, check_ends, check_no_folder
 from mirotwin.shell.outputs import RECORDING
 
 STDIN = "-"
@@ -19,7 +19,7 @@ CHUNK_BYTES = 1 << 16
 class Input:
     """`path` ("-": standard input), open for reading; `size` is None for a pipe; `position`: so much was read.
 
-    Raises InputError for devices other than the null device and for folders, OSError as `open` does.
+    Raises InputError for folders, named pipes, and devices other than the null device, OSError as `open` does.
     """
 
     def __init__(self, path: str) -> None:
@@ -29,6 +29,7 @@ class Input:
         self._head = b""
         if path != STDIN:
             check_no_folder(path, RECORDING)
+            check_ends(path)
         elif vars(sys)["stdin"] is None:
             raise InputError(self.label, "is closed", "name a file or a pipe")
         self._file: BinaryIO = sys.stdin.buffer if path == STDIN else open(path, "rb")  # noqa: SIM115
@@ -40,15 +41,12 @@ class Input:
         except (OSError, io.UnsupportedOperation):  # no real file: a test's, say
             return None
         if stat.S_ISBLK(status.st_mode) or (stat.S_ISCHR(status.st_mode) and not self._readable(status)):
-            if self.path != STDIN:
-                self._file.close()
             raise InputError(self.label, "is a device", "name a file or a pipe")
         return status.st_size if stat.S_ISREG(status.st_mode) else None
 
     def _readable(self, status: os.stat_result) -> bool:
         """Whether a character device has an end: the null device, or a terminal with a keyboard."""
-        terminal = self.path == STDIN and self._file.isatty()
-        return terminal or os.path.samestat(status, os.stat(os.devnull))
+        return self._file.isatty() or os.path.samestat(status, os.stat(os.devnull))
 
     def peek(self, size: int = HEAD_BYTES) -> bytes:
         """The next bytes, which stay to be read: `size` of them, fewer only at the end."""
