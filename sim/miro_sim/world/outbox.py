@@ -112,7 +112,8 @@ class Outbox:
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
-        return max([free_tick] + [one.sent.end_tick for one in self.waiting])
+        count = len(self.waiting)  # in order, and none overlaps another: the last one ends last
+        return max(free_tick, self.waiting[count - 1].sent.end_tick) if count else free_tick
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""

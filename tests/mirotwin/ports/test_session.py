@@ -250,3 +250,40 @@ def test_what_was_sent_in_an_hour_is_announced_within_seconds():
     world = World(live_world().scenario, 1, own_image(), script=sent)
     assert time.process_time() - begun_s < 10  # it was minutes, when each was compared with all before
     assert [one.sent for one in world.networks[0].outbox.waiting] == sent
+
+
+class Looked:
+    """What waits in an outbox; counts how often it is looked at."""
+
+    looks = 0
+
+    def __init__(self, sent):
+        self._sent = sent
+
+    @property
+    def sent(self):
+        Looked.looks += 1
+        return self._sent
+
+
+@pytest.mark.parametrize("waiting", [1, 100, TRANSMIT_CHARACTERS])
+def test_room_is_found_by_a_look_at_the_last_character_that_waits(waiting):
+    """A client that never pauses fills the buffer with single characters, and every loop asks several times."""
+    world = World(live_world().scenario, 1, own_image())
+    port, outbox = RadioPort(world), world.networks[0].outbox
+    outbox.waiting = [
+        Looked(Transmission(place * HOST_CHARACTER_TICKS, DOWN, b"U")) for place in range(waiting)
+    ]
+    before = Looked.looks
+    assert (port.waiting, port.room) == (waiting, TRANSMIT_CHARACTERS - waiting)
+    assert Looked.looks - before == 2
+
+
+def test_the_transmitter_is_free_when_the_last_of_what_waits_has_been_sent():
+    world = World(live_world().scenario, 1, own_image())
+    outbox = world.networks[0].outbox
+    assert outbox.end_tick(700) == 700
+    for tick, data in ((9_000_000, b"abc"), (3_000_000, b"d"), (6_000_000, b"ef")):
+        world.inject(data, at_tick=tick)
+    assert outbox.end_tick(700) == 9_000_000 + 3 * HOST_CHARACTER_TICKS
+    assert outbox.end_tick(10_000_000) == 10_000_000
