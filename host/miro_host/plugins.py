@@ -6,8 +6,7 @@ one in its `pyproject.toml`:
     [project.entry-points."mirotwin.laws"]
     samson = "samson_law:Parameters"
 
-Entry points are looked up only for a name that is not in our own table, because reading the metadata of all installed
-distributions takes tens of milliseconds. For the same reason a name in our table cannot be replaced from outside.
+Two of one name are an error that names both, also where one is our own: a run must not depend on which of them is found.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,6 +16,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
+from miro_host import installed
 from miro_host.raised import raised
 
 Plugin = TypeVar("Plugin")
@@ -46,33 +46,25 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
 
     def names(self) -> list[str]:
         """All names that can be used: our own in the order of the table, then the others sorted."""
-        from importlib.metadata import entry_points  # slow to import, and rarely needed
-
-        found = {entry.name for entry in entry_points(group=self.group)}
+        found = {entry.name for entry in installed.entries_of(self.group)}
         return [*self.own, *sorted(found.difference(self.own))]
 
     def find(self, name: str) -> type[Plugin]:
         """The struct of parameters of the plug-in `name`. Raises PluginError with the reason in one line."""
-        if name in self.own:
+        entry = installed_part(self.group, self.word, name, self.own.get(name, ""))
+        if entry is None and name in self.own:
             return self._checked(_loaded(self.own[name]), name, self.own[name])
-        from importlib.metadata import entry_points
-
-        entries = list(entry_points(group=self.group, name=name))
-        if not entries:
+        if entry is None:
             names = self.names()
             remedy = did_you_mean(name, names, use_one_of(names))
             raise PluginError(f"{name!r} is not one of the choices", remedy)
-        sources = [_source(entry) for entry in entries]
-        if len(entries) > 1:
-            raise PluginError(
-                f"{self.word} {name!r} is in {' and in '.join(sources)}", "uninstall one of them"
-            )
-        entry_point = f"{entries[0].value}, from {sources[0]}"
+        owner = installed.owner(entry)
+        entry_point = f"{entry.value}, from {owner}"
         try:
-            found = entries[0].load()
+            found = entry.load()
         except (Exception, SystemExit) as error:
             what = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
-            raise PluginError(what, f"repair or uninstall {sources[0]}") from error
+            raise PluginError(what, f"repair or uninstall {owner}") from error
         return self._checked(found, name, entry_point)
 
     def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
@@ -89,6 +81,20 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
         return found
 
 
+def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
+    """The entry point that has this name, None where there is none. Raises PluginError where two plug-ins have it.
+
+    `own`: what has the name in our own table, if something has.
+    """
+    entries = installed.entries_of(group, name)
+    places = ([f"mirotwin ({own})"] if own else []) + [installed.place(entry) for entry in entries]
+    if len(places) > 1:
+        others = " or ".join(installed.owner(entry) for entry in entries)
+        what = f"{word} {name!r} is in {' and in '.join(places)}"
+        raise PluginError(what, f"uninstall {others}, or give one of them another name")
+    return entries[0] if entries else None
+
+
 def use_one_of(choices: Iterable[str]) -> str:
     """The remedy for what is not one of them."""
     *others, last = choices
@@ -99,7 +105,3 @@ def _loaded(entry_point: str) -> Any:
     """The attribute that `module:attribute` names."""
     module, _, attribute = entry_point.partition(":")
     return getattr(import_module(module), attribute)
-
-
-def _source(entry: Any) -> str:
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "an unknown distribution"

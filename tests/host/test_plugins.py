@@ -13,8 +13,10 @@ from miro_host.plugins import PluginError
 from miro_host.raised import raised, raised_at
 from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
 from miro_host.references.interface import CheckedReference
-from miro_host.registries import LAWS, REFERENCES
+from miro_host.registries import ESTIMATORS, LAWS, REFERENCES
 from miro_sim.scenario.file import parse
+from mirotwin.fuzz.bare import PROTOCOLS
+from mirotwin.verify.checks.expect import CHECKS
 from tests import children
 from tests.host.distribution import install
 
@@ -51,7 +53,13 @@ def reason(name):
     return str(caught.value)
 
 
-def test_our_own_law_is_found_without_a_look_at_other_distributions(monkeypatch):
+def test_where_no_distribution_has_plug_ins_none_is_read(tmp_path, monkeypatch):
+    """Reading the metadata of all takes longer than the look whether one of them says anything to us."""
+    (tmp_path / "other-1.dist-info").mkdir()
+    (tmp_path / "other-1.dist-info" / "entry_points.txt").write_text(
+        "[console_scripts]\nother = other:main\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(importlib.metadata, "entry_points", None)
     assert LAWS.find("yang_kim") is Gains
 
@@ -70,10 +78,35 @@ def test_a_law_of_another_distribution_is_found_by_its_entry_point(site):
     assert LAWS.names() == [*OWN, "steady"]
 
 
-def test_our_own_name_is_not_taken_from_outside(site):
+@pytest.mark.parametrize(
+    ("registry", "kind", "name", "own"),
+    [
+        (LAWS, "laws", "yang_kim", "miro_host.laws.yang_kim:Gains"),
+        (ESTIMATORS, "estimators", "ekf", "miro_host.estimators.ekf:EkfParameters"),
+        (REFERENCES, "references", "sine", "miro_host.references.sine:SineRef"),
+        (CHECKS, "checks", "inside_pitch", "mirotwin.verify.checks.course:InsidePitch"),
+        (PROTOCOLS, "protocols", "miro", "miro_protocol.miro_wire:Miro"),
+    ],
+)
+def test_another_plug_in_with_the_name_of_our_own_is_an_error_that_names_both(
+    site, registry, kind, name, own
+):
+    install(site, "own-part", "1.2", {name: "plug_own:Parameters"}, kind, plug_own=GOOD)
+    places = rf"mirotwin \({own}\) and in own-part 1.2 \(plug_own:Parameters\)"
+    remedy = "uninstall own-part 1.2, or give one of them another name"
+    with pytest.raises(PluginError, match=f"{registry.word} '{name}' is in {places}; {remedy}"):
+        registry.find(name)
+    others = [one for one in registry.own if one != name]
+    assert all(registry.find(one) for one in others)  # nobody else's trouble
+    assert registry.names() == list(registry.own)
+
+
+def test_a_scenario_that_uses_the_ambiguous_law_by_default_says_where(site):
     install(site, "steady-law", "1.2", {"yang_kim": "plug_steady:Parameters"}, plug_steady=GOOD)
-    assert LAWS.find("yang_kim") is Gains
-    assert LAWS.names() == OWN
+    text = 'name = "a"\nduration_s = 1\n[[network]]\n[[network.robot]]\nreference.kind = "line"\n'
+    with pytest.raises(ValueError, match=r"law 'yang_kim' is in mirotwin \(.*\) and in steady-law 1.2"):
+        parse(text, "my.toml")
+    parse(text + 'controller.law = "body_frame"\n', "my.toml")
 
 
 def test_an_unknown_name_gets_the_nearest_and_the_list(site):
@@ -110,8 +143,14 @@ def test_a_part_that_cannot_be_used_names_its_distribution_and_the_reason(site, 
 def test_one_name_in_two_distributions_is_refused(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
     install(site, "other-law", "7", {"steady": "plug_other:Parameters"}, plug_other=GOOD)
-    found = re.fullmatch("law 'steady' is in (.*) and in (.*); uninstall one of them", reason("steady"))
-    assert {*found.groups()} == {"steady-law 1.2", "other-law 7"}
+    found = re.fullmatch(
+        "law 'steady' is in (.*) and in (.*); uninstall .* or .*, or give one of them another name",
+        reason("steady"),
+    )
+    assert {*found.groups()} == {
+        "steady-law 1.2 (plug_steady:Parameters)",
+        "other-law 7 (plug_other:Parameters)",
+    }
 
 
 def error_in(module, caller):

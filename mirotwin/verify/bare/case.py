@@ -25,6 +25,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_host.installed import entries_of
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
 from miro_protocol.toml_text import TomlError, struct_of
@@ -32,6 +33,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.exchange import (
+    GROUP,
     NEVER_SLEEPS,
     NO_FAULT,
     OPTION,
@@ -179,13 +181,12 @@ def _check(case: stream.StreamFile, name: str, given: str | None) -> NamedCheck:
             what = f"is a case of the check {name!r}, and {OPTION} gives {found_name!r}"
             raise BadInput(case.source, "header: expect", what, f"give {name}")
         return check_named(given)
-    try:
+    if entries_of(GROUP, name):
         return installed_check(name)
-    except BadInput as error:
-        what = f"names the check {name!r}, which is not installed"
-        own = name.isidentifier()
-        remedy = f"give it: {OPTION} FILE.py:{name}" if own else "a case names a check, and never its file"
-        raise BadInput(case.source, "header: expect", what, remedy) from error
+    what = f"names the check {name!r}, which is not installed"
+    own = name.isidentifier()
+    remedy = f"give it: {OPTION} FILE.py:{name}" if own else "a case names a check, and never its file"
+    raise BadInput(case.source, "header: expect", what, remedy)
 
 
 def _heard(case: stream.StreamFile) -> list[ScriptItem]:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -25,6 +24,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
+from miro_host.installed import entries_of
+from miro_host.plugins import PluginError, installed_part
 from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
@@ -39,6 +40,8 @@ GROUP = "mirotwin.bare_checks"
 NO_FAULT = "no_fault"
 NEVER_SLEEPS = "never_sleeps"
 """That the firmware did not go back to sleep. No check of a world has that name: what follows from it is judged."""
+OWN = dict.fromkeys((NO_FAULT, NEVER_SLEEPS), "always on")
+"""Names that no check in Python may have: a case that says one of them is about our own."""
 
 
 class Character(NamedTuple):
@@ -152,24 +155,30 @@ def check_named(text: str) -> NamedCheck:
     """
     path, _, function = text.rpartition(":")
     if path.endswith(".py"):
+        if function in OWN:
+            what = f"check {function!r} is in mirotwin (always on), too"
+            raise BadInput("", f"{OPTION} {text}", what, "give the function another name")
         return NamedCheck(function, text, _callable(_module(path, text), function, text), True)
     return installed_check(text)
 
 
 def installed_check(name: str) -> NamedCheck:
     """The check that an installed distribution has under this name. Raises BadInput."""
-    entries = list(entry_points(group=GROUP, name=name))
-    if not entries:
-        names = sorted(entry.name for entry in entry_points(group=GROUP))
+    try:
+        entry = installed_part(GROUP, "check", name, OWN.get(name, ""))
+    except PluginError as error:
+        raise BadInput("", OPTION, error.what, error.remedy) from None
+    if entry is None:
+        names = sorted(one.name for one in entries_of(GROUP))
         remedy = did_you_mean(name, names, f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}")
         raise BadInput("", OPTION, f"there is no check {name!r} for a bare processor", remedy)
     try:
-        found = entries[0].load()
+        found = entry.load()
     except (Exception, SystemExit) as error:
-        what = f"check {name!r} ({entries[0].value}) cannot be imported: {raised(error)}"
+        what = f"check {name!r} ({entry.value}) cannot be imported: {raised(error)}"
         raise BadInput("", OPTION, what, "repair or uninstall it") from error
     if not callable(found):
-        raise BadInput("", OPTION, f"check {name!r} ({entries[0].value}) is no function", "name a function")
+        raise BadInput("", OPTION, f"check {name!r} ({entry.value}) is no function", "name a function")
     return NamedCheck(name, name, found, False)
 
 

@@ -231,6 +231,34 @@ def test_what_is_no_check_is_refused(file, tmp_path):
         check_named(f"{file}:quiet")
 
 
+def test_two_checks_of_one_name_are_an_error_that_names_both(tmp_path, monkeypatch):
+    source = "def wrong(run):\n    return 'wrong'\n"
+    for number in "12":
+        folder = tmp_path / number
+        parts = {"always_wrong": f"check_{number}:wrong", "no_fault": f"check_{number}:wrong"}
+        distribution.install(
+            folder, f"theirs-{number}", "1.0", parts, "bare_checks", **{f"check_{number}": source}
+        )
+        monkeypatch.syspath_prepend(folder)
+    with pytest.raises(BadInput) as caught:
+        check_named("always_wrong")
+    for place in ("theirs-1 1.0 (check_1:wrong)", "theirs-2 1.0 (check_2:wrong)"):
+        assert place in str(caught.value)
+    with pytest.raises(BadInput, match=r"check 'no_fault' is in mirotwin \(always on\) and in theirs-"):
+        check_named("no_fault")
+
+
+@pytest.mark.parametrize("name", ["no_fault", "never_sleeps"])
+def test_a_check_in_a_file_does_not_take_the_name_of_one_that_is_always_on(tmp_path, name):
+    """A case that says this name is about our own, so the file's would never be asked again."""
+    path = tmp_path / "mine.py"
+    path.write_text(f"def {name}(run):\n    return 'wrong'\n")
+    with pytest.raises(
+        BadInput, match=rf"check '{name}' is in mirotwin \(always on\), too; give the function"
+    ):
+        check_named(f"{path}:{name}")
+
+
 def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
     parts = {
         "always_wrong": "their_check:wrong",
