@@ -107,7 +107,7 @@ def _groups_table(groups: Sequence[Arm]) -> Table:
         head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
         head += [f"{group.verdicts[name]}" for name in VERDICTS]
         for name, found in group.metrics.items():
-            table.add_row(*head, _labelled(name), *_cells(found))
+            table.add_row(*head, _labelled(group.metric_label(name)), *_cells(found))
             head = [""] * len(head)
     return table
 

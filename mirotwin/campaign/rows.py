@@ -21,22 +21,30 @@ from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
 
 VERDICTS = ("failed", "fault", "error")
 UNSETTLED = "unsettled"
+SETTLING = "settling_s"
 EVERYONE = "all runs"
 NOT_FIGURES = ("settled",)
 """Has a share of its own."""
 
 
 class Arm(msgspec.Struct, frozen=True):
-    """Runs with the same levels of some factors."""
+    """Runs with the same levels of some factors. `never_settled`: so many end outside and have no `settling_s`."""
 
     factors: dict[str, Value]
     runs: int
     verdicts: dict[str, int]
+    never_settled: int
     metrics: dict[str, Figures | None]
 
     @property
     def label(self) -> str:
         return label_of(self.factors)
+
+    def metric_label(self, name: str) -> str:
+        """The metric, and what its median leaves out: runs that never settle have no time at which they did."""
+        if name == SETTLING and self.never_settled:
+            return f"{name} ({self.never_settled} of {self.runs} never settle)"
+        return name
 
 
 def label_of(factors: Mapping[str, Value]) -> str:
@@ -123,6 +131,7 @@ class ResultRows:
     ) -> Iterator[tuple[Arm, dict[str, Numbers]]]:
         """Each of the `groups` with its figures, and the numbers that these are made of."""
         verdicts, seeds = self.column("verdict"), self.samples()
+        settled = self.column("settled") if "settled" in self.table.column_names else [None] * self.count
         columns = {name: self.numbers(name) for name in metrics}
         for levels, members in groups.items():
             places = np.array(members)
@@ -132,6 +141,7 @@ class ResultRows:
                 factors=dict(zip(by, levels, strict=True)),
                 runs=len(members),
                 verdicts={name: counted.count(name) for name in VERDICTS},
+                never_settled=[settled[row] for row in members].count(False),
                 metrics={name: figures(columns[name][of], seeds[of]) for name, of in there.items()},
             )
             yield arm, {name: columns[name][of] for name, of in there.items()}

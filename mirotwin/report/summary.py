@@ -25,7 +25,7 @@ class Tracking(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
     period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it never was inside. `off_pitch_s`: how long a corner of the robot's square was
+    0.15 rad; 0 if it never was, None if it is outside at the end of the run: it never settled. `off_pitch_s`: how long a corner of the robot's square was
     beyond the edge of the pitch, in whole control periods.
     """
 
@@ -187,18 +187,16 @@ def _last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
 
 
 def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
-    if not any(sample.settled for sample in samples):
+    if not samples[-1].settled:
         return None
     outside = [sample.tick for sample in samples if not sample.settled]
     return seconds(outside[-1]) if outside else 0.0
 
 
 def settling_text(samples: Sequence[ErrorSample]) -> str:
-    """When the robot settled, for people; one that is outside at the end has not, whatever `settling_s` is."""
+    """When the robot settled, for people."""
     settling_s = _settling_s(samples)
-    if settling_s is None or not samples[-1].settled:
-        return "not settled"
-    return f"settled at {settling_s:.2f} s"
+    return "not settled" if settling_s is None else f"settled at {settling_s:.2f} s"
 
 
 def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) -> Summary:

@@ -215,6 +215,24 @@ def test_a_metric_of_0_and_1_says_what_1_is(results, metric, label):
     assert label in mirotwin.succeeds("campaign", "show", results, "--metric", metric)
 
 
+def test_runs_that_never_settle_are_counted_beside_the_median_of_those_that_do(results, tmp_path):
+    ends = [run % 20 >= 7 for run in range(40)]
+    settled, times_s = iter(ends), iter([0.5 if end else None for end in ends])
+    some = made(
+        tmp_path / "some.parquet",
+        FACTORS,
+        settling_s=lambda _: next(times_s),
+        settled=lambda _: next(settled),
+    )
+    shown = mirotwin.succeeds("campaign", "show", some).split("settling_s (7 of 20 never settle)")[1:]
+    assert [rest.split()[0] for rest in shown] == ["13", "13"]
+    groups = json.loads(mirotwin.succeeds("campaign", "show", some, "--json"))["groups"]
+    assert [group["never_settled"] for group in groups] == [7, 7]
+    page = tmp_path / "page.html"
+    mirotwin.succeeds("campaign", "page", some, "--out", page)
+    assert "settling_s (7 of 20 never settle)" in page.read_text()
+
+
 def test_two_levels_are_compared_on_the_same_seeds(results):
     between = ("campaign", "show", results, "--between")
     document = json.loads(mirotwin.succeeds(*between, "start=near,far", "--json"))

@@ -122,6 +122,25 @@ def test_a_verdict_follows_from_the_rows(words, changes, expected):
     assert finding(words, **changes).verdict == expected
 
 
+def test_the_page_says_which_law_is_better_by_which_error():
+    """The reverse may hold as the camera sees it."""
+    changes = {
+        f"fig{n}_epsilon_retuned": {"rms_position_cm": 2.0, "seen_position_cm": 0.3} for n in range(6, 11)
+    }
+    text = page(table(**changes, fig9_paper={"settled": False}), "0 to 19", "reproduction")
+    section = text.partition("## Which of the two laws is better")[2].partition("\n## ")[0]
+    assert (
+        "in truth the paper's law from 4 of 4 starts, as the camera sees it the paper's law from 0 of 4"
+        in section
+    )
+    none = "not judged: 0 of 20 / 20 of 20 settle"
+    assert f"| in truth | 1.00 / 2.00 | 1.00 / 2.00 | 1.00 / 2.00 | {none} | 1.00 / 2.00 |" in section
+    assert (
+        f"| as the camera sees it | 0.90 / 0.30 | 0.90 / 0.30 | 0.90 / 0.30 | {none} | 0.90 / 0.30 |"
+        in section
+    )
+
+
 def test_of_rows_that_are_not_there_nothing_holds():
     assert all(found.verdict in (NOT, PART, NOT_JUDGED) for found in findings({}))
 
