@@ -6,7 +6,7 @@ one in its `pyproject.toml`:
     [project.entry-points."mirotwin.laws"]
     samson = "samson_law:Parameters"
 
-Two of one name are an error that names both, also where one is our own: a run must not depend on which of them is found.
+Two of one name are an error that names both, also where one is our own: a run must not depend on which is found first.
 """
 
 from collections.abc import Iterable, Mapping

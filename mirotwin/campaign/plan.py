@@ -16,6 +16,7 @@ from miro_exact import engine
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
+from miro_sim.scenario.plugins import plugins_used
 from miro_sim.scenario.settings import OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value, as_kind, kind_of
@@ -148,6 +149,7 @@ def checked(plan: Plan, settings: Sequence[str] = ()) -> Plan:
 def _tried(plan: Plan) -> Plan:
     """The plan with the names of all checks, and what settings left out. Raises BadInput with the place in the file."""
     checks: dict[str, None] = {}
+    plugins: set[str] = set()
     notes: dict[str, None] = {}
     for point in _tried_points(plan.design):
         places = _places(plan, point)
@@ -157,10 +159,12 @@ def _tried(plan: Plan) -> Plan:
             check_symbols(steps, load_firmware(job.firmware.path), job.origin)
         except BadInput as error:
             raise _placed(plan, places, error) from error.__cause__
+        plugins.update(plugins_used(text.scenario))
         of_steps = [step.checks for step in steps if isinstance(step, CheckStep)]
         checks |= {check.name: None for group in (*expected.values(), *of_steps) for check in group}
         notes |= {_placed_note(plan, places, note): None for note in text.notes}
-    return msgspec.structs.replace(plan, checks=tuple(checks), notes=tuple(notes))
+    used = msgspec.structs.replace(plan.versions, parts=tuple(sorted(plugins)))
+    return msgspec.structs.replace(plan, checks=tuple(checks), notes=tuple(notes), versions=used)
 
 
 def _tried_points(design: Design) -> Iterator[DesignPoint]:

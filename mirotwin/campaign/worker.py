@@ -12,7 +12,7 @@ from functools import cache
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.versions import Versions, versions
+from mirotwin.campaign.versions import Versions, versions_here
 
 Figure = float | int | bool | str | None
 
@@ -60,7 +60,9 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
 
 def work(job: Work) -> RunOutcome:
     """Runs a job to its end, whatever happens to the run. Raises BadInput where this process is not as the job's."""
-    difference = job.versions.difference(versions()) or _engine(job.engine) or _firmware(job.firmware)
+    difference = (
+        job.versions.difference(versions_here(job.versions)) or _engine(job.engine) or _firmware(job.firmware)
+    )
     if difference:
         worker = f"worker {socket.gethostname()} process {os.getpid()}"
         raise BadInput("", worker, f"has {difference}", "install there what runs here")

@@ -142,4 +142,5 @@ def _source(messages: Messages) -> RunSource:
         state=metadata.get("state", ""),
         resumed=attachments.get(RESUMED_ATTACHMENT, b""),
         origin=metadata.get("source", ""),
+        plugins=tuple(metadata.get("plugins", "").splitlines()),
     )

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_host.installed import described_once
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
+from miro_sim.scenario.plugins import plugins_used
 from mirotwin.recording import channels
 from mirotwin.recording.channels import ControlMessage, FaultMessage, ImageMessage, TheoryMessage
 from mirotwin.recording.rows import Message, Rows
@@ -48,7 +50,8 @@ class RunSource(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
-    were real and what is in it is their twin's, else empty.
+    were real and what is in it is their twin's, else empty. `plugins`: those of other distributions that the scenario
+    names, with version and hash of their sources (`miro_host.installed.described`).
     """
 
     scenario_name: str
@@ -61,6 +64,7 @@ class RunSource(msgspec.Struct, frozen=True):
     state: str = ""
     resumed: bytes = b""
     origin: str = ""
+    plugins: tuple[str, ...] = ()
 
 
 def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
@@ -79,6 +83,7 @@ def source_of(text: ScenarioText, world: World, record: str = "default", resumed
         record=record,
         state=world.state.tables(),
         resumed=resumed,
+        plugins=plugins_used(text.scenario, described_once),
     )
 
 
@@ -109,6 +114,7 @@ class Recorder:
                 "record": source.record,
                 **({"state": source.state} if source.state else {}),
                 **({"source": source.origin} if source.origin else {}),
+                **({"plugins": "\n".join(source.plugins)} if source.plugins else {}),
             },
         )
         self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())

@@ -30,7 +30,7 @@ from mirotwin.replay.differences import differences_as_json, print_differences, 
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
 from mirotwin.replay.state_fields import Record
-from mirotwin.rerun.job import image_if_any, repeating, world_of
+from mirotwin.rerun.job import image_if_any, repeating, warn_of_plugins, world_of
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
@@ -74,6 +74,10 @@ def source_differences(one: Made, other: Made) -> Iterator[SourceDifference]:
         here, there = (shown(found.get(key)) for found in (keys, others))
         if here != there:
             yield SourceDifference(key, here, there)
+    if one.source.plugins != other.source.plugins:
+        yield SourceDifference(
+            "plug-ins", *("; ".join(made.source.plugins) or "none" for made in (one, other))
+        )
     if one.source.state and other.source.state and one.source.state != other.source.state:
         yield SourceDifference("form of the state", one.source.state[:12], other.source.state[:12])
 
@@ -265,6 +269,7 @@ def _made(path: str) -> Made:
         raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
     if recording.broken_off:
         complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+    warn_of_plugins(path, recording.source)
     scenario = parse_scenario(recording.source.scenario_text, f"{path}: scenario.toml")
     return Made(path, recording, scenario, image_if_any(recording, path))
 

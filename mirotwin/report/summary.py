@@ -25,8 +25,8 @@ class Tracking(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
     period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it is outside at the end of the run: it never settled. `off_pitch_s`: how long a corner of the robot's square was
-    beyond the edge of the pitch, in whole control periods.
+    0.15 rad; 0 if it never was, None if it is outside at the end of the run: it never settled. `off_pitch_s`: how long
+    a corner of the robot's square was beyond the edge of the pitch, in whole control periods.
     """
 
     rms_x_cm: float | None

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_host.installed import differences as plugin_differences
 from miro_protocol import stream
 from miro_protocol.actions import Power, Reset, ScriptItem
 from miro_protocol.stream_header import Header
@@ -30,6 +31,7 @@ from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
+from mirotwin.recording.recorder import RunSource
 from mirotwin.recording.writer import MAGIC
 from mirotwin.shell.command import command_line, operand
 from mirotwin.shell.firmware_image import load_firmware
@@ -304,6 +306,7 @@ def load_job(
             complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
+        warn_of_plugins(file, recording.source)
         if firmware is None:
             image = image_of(recording, file)
             return _job_of_recording(recording, file, settings, image, image, seed)
@@ -319,6 +322,12 @@ def load_job(
             raise BadInput(file, "header", what, "name the image with --firmware")
         complain(f"{file}: {what}")  # to run another one is what a replay is for
     return _job_of_stream(given, file, settings, image, seed)
+
+
+def warn_of_plugins(file: str, source: RunSource) -> None:
+    """A line for each plug-in that a run used and that is another one here."""
+    for text in plugin_differences(source.plugins):
+        complain(f"{file}: {one_line(shortened(text))}: run again, it may do something else")
 
 
 def load_stream(file: str, firmware: str | None) -> Job:

@@ -1,10 +1,12 @@
 """Tables of a scenario whose keys depend on the plug-in that they name: `law = "yang_kim"` and the keys of that law."""
 
 import re
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgspec
 
+from miro_host.installed import described
 from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES, AnyEstimator, AnyReference, Controller
@@ -42,6 +44,38 @@ def struct_of(registry: Registry[Any], keys: dict[str, Any]) -> type[msgspec.Str
         raise msgspec.ValidationError(f"{error} - at `$.{registry.key}`") from None
     found: type[msgspec.Struct] = registry.find(name)
     return found
+
+
+def plugins_used(
+    scenario: msgspec.Struct, describe: Callable[[str, str], str] = described
+) -> tuple[str, ...]:
+    """What other distributions bring of all that a scenario names, as `described`: in order, each once."""
+    return tuple(sorted({text for kind, name in _named(scenario) if (text := describe(kind, name))}))
+
+
+def _named(value: Any) -> Iterator[tuple[str, str]]:
+    """Kind and name of each plug-in: by the struct of its parameters, and of checks by the keys of their tables."""
+    if isinstance(value, msgspec.Struct):
+        for kind, registry in REGISTRIES.items():
+            if isinstance(value, kind):
+                yield registry.word, str(value.__struct_config__.tag)
+        for name in value.__struct_fields__:
+            field = getattr(value, name)
+            if name == "expect":
+                yield from (("check", key) for key in field)
+            elif name == "step":
+                yield from (("check", key) for step in field for key in _table(step.get("check")))
+            else:
+                yield from _named(field)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _named(inner)
+    elif isinstance(value, dict):
+        yield from _named(tuple(value.values()))
+
+
+def _table(value: Any) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}
 
 
 def cause_of(error: msgspec.ValidationError) -> BaseException | None:
