@@ -21,8 +21,9 @@ NOT_OF_RUNS = (
 
 
 class Versions(msgspec.Struct, frozen=True):
-    """`mirotwin`: the version; `code`: hash of its sources; `parts`: plug-ins of other distributions that runs use, with
-    version and hash of their sources (`miro_host.installed.described`)."""
+    """`mirotwin`: the version; `code`: hash of its sources; `parts`: plug-ins of other distributions that runs use,
+    each with version and hash of its sources (`miro_host.installed.described`).
+    """
 
     mirotwin: str
     code: str

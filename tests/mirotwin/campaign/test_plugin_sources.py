@@ -97,7 +97,7 @@ def test_a_campaign_that_was_broken_off_does_not_go_on_with_another_law(site, tm
     left = journal_path(path).read_bytes()
     (site / "plug_edited.py").write_text(STEADY.replace("plug_scale.SCALE", "2.0"))
     with pytest.raises(
-        BadInput, match="unfinished results of another campaign: law edited of edited-law 1.0"
+        BadInput, match=r"unfinished results of another campaign: law edited of edited-law 1.0"
     ):
         campaign.run(plan_of(SHORT), path, Processes(1))
     assert journal_path(path).read_bytes() == left
