@@ -2,9 +2,10 @@
 
     from mirotwin import campaign
 
-    plan = campaign.load("noise.toml")              # or campaign.parse(text, "noise.toml")
-    campaign.run(plan, "noise.parquet")             # or with any executor of concurrent.futures
-    table, about = campaign.read("noise.parquet")   # an Arrow table, a row a run
+    if __name__ == "__main__":                          # the processes import this script
+        plan = campaign.load("noise.toml")              # or campaign.parse(text, "noise.toml")
+        campaign.run(plan, "noise.parquet")             # or with any executor of concurrent.futures
+        table, about = campaign.read("noise.parquet")   # an Arrow table, a row a run
 
 Names, those of the stub beside this file, are loaded on first use: workers read this file before their engine is
 chosen.

@@ -111,6 +111,7 @@ class Drive:
         return []
 
     def _restart(self) -> None:
+        self.workers.check_ended()
         self._fruitless += 1
         if not self.workers.restarts or self._fruitless > FRUITLESS:
             raise self._gone()

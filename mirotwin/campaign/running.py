@@ -15,7 +15,7 @@ from mirotwin.campaign.drive import Drive
 from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.worker import RunOutcome
-from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.campaign.workers import Processes, Workers, refuse_in_import
 from mirotwin.shell.outputs import check_file, make_folder
 
 MANY_RUNS = 100_000
@@ -50,8 +50,10 @@ def run(
 
     `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Results that are
     there already are those of the same campaign, and are left as they are, or BadInput is raised; with `force` they are
-    made again. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again.
+    made again. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again. A script
+    calls it below `if __name__ == "__main__":`: the processes import the script, and BadInput is raised otherwise.
     """
+    refuse_in_import()
     path = Path(results)
     tables.require_arrow()
     refuse_many(plan, many)

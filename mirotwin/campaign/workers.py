@@ -9,29 +9,80 @@ import os
 import signal
 import threading
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import current_process, parent_process
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any
 
 from miro_exact import engine
+from miro_exact.bad_input import BadInput
 from mirotwin.shell.program import cores, safe_path
 
+NAME = "mirotwin worker"
+FAILED = 1
+"""Exit code of a process that an exception ended."""
+END_S = 5.0
+UNGUARDED = 72
+"""Exit code of a worker whose import of the main script starts a campaign again."""
+GUARD = (
+    "is called again by each process that it starts, which imports your script first",
+    'put the calls in your script below a line `if __name__ == "__main__":`',
+)
 
-def processes(count: int) -> ProcessPoolExecutor:
+
+class WorkerContext(SpawnContext):
+    """Starts the processes of a pool and keeps them: their exit codes say why they ended. `begun`: their first jobs."""
+
+    def __init__(self) -> None:
+        self.started: list[SpawnProcess] = []
+        self.begun: list[Future[int]] = []
+
+    def Process(self, *arguments: Any, **named: Any) -> SpawnProcess:  # type: ignore[override]
+        process = SpawnProcess(*arguments, **{**named, "name": NAME})
+        self.started.append(process)
+        return process
+
+    def check_ended(self) -> None:
+        """Raises BadInput if the processes ended because the main script cannot be imported: no run is to blame."""
+        for process in self.started:
+            process.join(END_S)  # a broken pool ends the others, too
+        codes = [process.exitcode for process in self.started]
+        if UNGUARDED in codes:
+            raise BadInput("", "campaign.run", *GUARD)
+        if FAILED in codes and not any(one.done() and one.exception() is None for one in self.begun):
+            what = "its processes import your script first, which fails in them for the reason above"
+            raise BadInput("", "campaign.run", what, GUARD[1])
+
+
+def refuse_in_import() -> None:
+    """Ends a worker that imports the main script and comes here by it: the first process says why, once.
+
+    Raises BadInput in a process that somebody else started. `multiprocessing` marks such an import the same way.
+    """
+    if getattr(current_process(), "_inheriting", False):
+        if current_process().name == NAME:
+            os._exit(UNGUARDED)
+        raise BadInput("", "campaign.run", *GUARD)
+
+
+def processes(count: int, context: WorkerContext | None = None) -> ProcessPoolExecutor:
     """Processes with the engine of this one, which have begun.
 
     Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
     instruction on: what a process ignores, those that it starts ignore too.
     """
+    refuse_in_import()
+    context = context or WorkerContext()
     with _ignoring_interrupts(), safe_path():
         found = ProcessPoolExecutor(
             max_workers=count,
-            mp_context=get_context("spawn"),
+            mp_context=context,
             initializer=_begin,
             initargs=(engine.active(),),
         )
         for _ in range(count):  # each of which starts a process, as long as none is idle
-            found.submit(int)
+            context.begun.append(found.submit(int))
     return found
 
 
@@ -84,6 +135,9 @@ class Workers:
     def start(self) -> Executor:
         return self._executor
 
+    def check_ended(self) -> None:
+        """Raises BadInput where processes ended for a reason that others would end for, too."""
+
 
 class Processes(Workers):
     """So many processes of this machine."""
@@ -96,4 +150,8 @@ class Processes(Workers):
         self.ahead = AHEAD * self.count
 
     def start(self) -> Executor:
-        return processes(self.count)
+        self._context = WorkerContext()
+        return processes(self.count, self._context)
+
+    def check_ended(self) -> None:
+        self._context.check_ended()

@@ -273,3 +273,53 @@ def test_at_most_so_many_runs_are_ahead_of_the_first_that_is_missing(monkeypatch
     assert sorted(order) == list(range(30))
     assert set(order[:9]) == set(range(1, 10))
     assert order.index(0) == 9
+
+
+SCRIPT = """
+{before}
+from mirotwin import campaign
+
+plan = campaign.parse('scenario = "fig6"\\nseeds = "0-7"\\nset = {{ duration_s = 0.1 }}\\n', "short.toml")
+{guard}campaign.run(plan, "short.parquet", {executor})
+"""
+
+
+def script(folder, guard="", before="", executor="campaign.Processes(2)"):
+    """What a script that makes a campaign ends with: exit code and stderr."""
+    (folder / "script.py").write_text(SCRIPT.format(guard=guard, before=before, executor=executor))
+    done = children.run([sys.executable, "script.py"], cwd=folder, capture_output=True, text=True)
+    return done.returncode, done.stderr
+
+
+def test_a_script_without_a_main_guard_ends_with_one_error_that_names_it(tmp_path):
+    code, err = script(tmp_path)
+    assert code == 1
+    assert err.count("Traceback") == 1
+    assert err.endswith('put the calls in your script below a line `if __name__ == "__main__":`\n')
+    assert not (tmp_path / "short.parquet").exists()
+    assert script(tmp_path, guard='if __name__ == "__main__":\n    ') == (0, "")
+    assert len(rows(tmp_path / "short.parquet")) == 8
+
+
+def test_an_executor_of_a_script_without_a_guard_names_it_too(tmp_path):
+    before = "from concurrent.futures import ProcessPoolExecutor\nfrom multiprocessing import get_context"
+    code, err = script(tmp_path, "", before, 'ProcessPoolExecutor(1, get_context("spawn"))')
+    assert code == 1
+    assert 'put the calls in your script below a line `if __name__ == "__main__":`' in err
+    assert not (tmp_path / "short.parquet").exists()
+
+
+def test_a_script_that_its_processes_cannot_import_blames_no_run(tmp_path):
+    before = (
+        "import multiprocessing\nif multiprocessing.current_process().name != 'MainProcess':\n"
+        "    raise RuntimeError('not twice')"
+    )
+    code, err = script(tmp_path, 'if __name__ == "__main__":\n    ', before)
+    assert code == 1
+    assert "RuntimeError: not twice" in err
+    assert (
+        "campaign.run: its processes import your script first, which fails in them for the reason above"
+        in err
+    )
+    assert err.count("RuntimeError: not twice") <= 2  # of each process, and no more are started
+    assert not (tmp_path / "short.parquet").exists()
