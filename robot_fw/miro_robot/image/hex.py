@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +19,9 @@ from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map,
 FLASH_BYTES = 8192  # of an AT89C52
 SPACE_BYTES = 0x10000
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)  # record types
+_BLANK = b" \t\r\n\v\f\0\x1a"
+_DIGITS = re.compile(rb".{0,2}[0-9A-Fa-f]{8,}")
+"""A record whose first character is another, or is missing."""
 _GIVE = "build it, or give the path of an .ihx or .hex file"
 _REBUILD = "rebuild the image, or copy it again in full"
 
@@ -103,7 +107,7 @@ class _Content(msgspec.Struct, frozen=True):
 
 @lru_cache(32)  # by content: a test loads the robot's image hundreds of times
 def _parsed(content: bytes, limit: int) -> _Content:
-    if not content.strip():
+    if not content.removeprefix(BOM_UTF8).strip(_BLANK):
         raise ImageError("", 0, "is empty", _REBUILD)
     code = bytearray(b"\xff" * SPACE_BYTES)
     loaded = bytearray(SPACE_BYTES)
@@ -151,15 +155,21 @@ def _ranges(loaded: bytearray) -> tuple[tuple[int, int], ...]:
 
 
 def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """(line number, address, bytes) of each data record; checks everything that is not about the address."""
+    """(line number, address, bytes) of each data record; checks everything that is not about the address.
+
+    What other programs read is read: a byte-order mark, the 1Ah with which old ones end a text, comments, and text after
+    the end record. A record that lost its colon is no comment, and data after the end record are lost data.
+    """
     base = 0
-    ended = False
-    for number, raw in enumerate(content.splitlines(), start=1):
-        text = raw.strip()
-        if not text:
-            continue
+    begun = ended = False
+    for number, raw in enumerate(content.removeprefix(BOM_UTF8).splitlines(), start=1):
+        text = raw.strip(_BLANK)
         if ended:
-            raise ImageError("", number, "has more records after its end record", _REBUILD)
+            _refuse_data(text, number)
+            continue
+        if not text or not (text.startswith(b":") or _DIGITS.fullmatch(text)):  # a comment
+            continue
+        begun = True
         address, kind, data = _record(text, number)
         if kind == _DATA:
             yield number, base + address, data
@@ -171,15 +181,28 @@ def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
             base = int.from_bytes(data, "big") << (4 if kind == _SEGMENT else 16)
         elif kind not in (_START_SEGMENT, _START_LINEAR):  # start addresses mean nothing to an 8051
             raise ImageError("", number, f"unknown record type {kind:02X}", _REBUILD)
+    if not begun:
+        reason = "is not Intel HEX: no line begins with ':'"
+        raise ImageError("", 1, reason, "give an .ihx or .hex file")
     if not ended:
         raise ImageError("", 0, "is truncated: it has no end record (:00000001FF)", _REBUILD)
+
+
+def _refuse_data(text: bytes, number: int) -> None:
+    """Raises ImageError for a record with data behind the end record; all else there is text."""
+    try:
+        _, kind, data = _record(text, number)
+    except ImageError:
+        return
+    if kind == _DATA and data:
+        raise ImageError("", number, "has more records after its end record", _REBUILD)
 
 
 def _record(text: bytes, number: int) -> tuple[int, int, bytes]:
     """One line, taken apart and checked: address, type, data."""
     if text[:1] != b":":
         reason = "is not Intel HEX: a record begins with ':'"
-        raise ImageError("", number, reason, "give an .ihx or .hex file")
+        raise ImageError("", number, reason, "give an .ihx or .hex file, copied in full")
     try:
         record = bytes.fromhex(text[1:].decode("ascii"))
     except ValueError:

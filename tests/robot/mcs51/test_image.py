@@ -6,8 +6,9 @@ import hashlib
 import shutil
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from intelhex import HexReaderError, IntelHex
 
 from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, Symbol, load_hex
@@ -63,7 +64,14 @@ def test_extended_address_and_start_records_are_understood(tmp_path):
         ([":03000000020010EB", ":zz"], 2, "bad record: not pairs of hex digits"),
         ([":03000000020010EC", END], 1, "bad checksum EC, expected EB"),
         ([":0300000002EB", END], 1, "bad record: 1 data bytes where 3 are declared"),
-        (["hello"], 1, "is not Intel HEX"),
+        (["hello"], 1, "is not Intel HEX: no line begins with ':'"),
+        (["S1137AF00A0A0D0000000000000000000000000061"], 1, "is not Intel HEX: a record begins with ':'"),
+        ([record(0, b"\x01")[1:], END], 1, "is not Intel HEX: a record begins with ':'"),
+        (
+            [record(0, b"\x01"), f";{record(1, b'x')[1:]}", END],
+            2,
+            "is not Intel HEX: a record begins with ':'",
+        ),
         ([":00000009F7"], 1, "unknown record type 09"),
         ([record(0, b"\x01", 4), END], 1, "extended address record needs 2 bytes"),
         ([record(0, b"\x01")], 0, "truncated"),
@@ -72,7 +80,9 @@ def test_extended_address_and_start_records_are_understood(tmp_path):
         ([record(0, b"\x01\x02"), record(1, b"\x02"), END], 2, "0x0001 is loaded a second time"),
         ([record(0x1FFF, b"\x01\x02"), END], 1, "byte at 0x2000 does not fit 8192 bytes"),
         ([record(0, b"\x00\x01", 4), record(0, b"\x01"), END], 2, "byte at 0x10000 does not fit"),
+        ([END, "", "some text", record(0, b"\x01")], 4, "has more records after its end record"),
         ([""], 0, "is empty"),
+        (["\ufeff", "\x1a"], 0, "is empty"),
     ],
 )
 def test_a_damaged_image_is_refused_by_line(tmp_path, lines, line, reason):
@@ -83,6 +93,68 @@ def test_a_damaged_image_is_refused_by_line(tmp_path, lines, line, reason):
     assert reason in caught.value.what
     assert caught.value.remedy
     assert str(caught.value).startswith(f"{path}:{line}: " if line else f"{path}: ")
+
+
+ACCEPTED = {
+    "a byte-order mark": "\ufeff{0}\n{1}\n",
+    "lower case": "{lower}\n:00000001ff\n",
+    "the end of a CP/M text": "{0}\n{1}\n\x1a",
+    "padding with zeros": "{0}\n{1}\n\0\0\0",
+    "comments before, between and behind": "; by make: 12:30\n// a\n{0}\n# b\n{1}\n* c\n",
+    "text after the end record": "{0}\n{1}\nChecksum: 1234\n:not a record\n",
+    "records without data after the end record": "{0}\n{1}\n{1}\n",
+    "carriage returns and blanks": "\r\n {0} \r\n\t{1}\r\n",
+    "all of it": "\ufeff; x\r\n{lower}\r\n{1}\r\nend\r\n\x1a",
+}
+
+
+@pytest.mark.parametrize("form", ACCEPTED.values(), ids=ACCEPTED)
+def test_what_other_programs_read_beside_records_changes_nothing(tmp_path, form):
+    """objcopy, s51 or both read each of these."""
+    line = record(0x10, b"\x02\xab\x10")
+    path = tmp_path / "robot.ihx"
+    path.write_bytes(form.format(line, END, lower=line.lower()).encode())
+    image = load_hex(path)
+    assert (image.used, image.code[0x10:0x13]) == (((0x10, 0x13),), b"\x02\xab\x10")
+    assert image.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+TEXTS = st.text(st.characters(codec="ascii", exclude_characters="\n\r:"), max_size=20)
+LINES = st.one_of(
+    st.builds(record, st.integers(0, 0x1FF0), st.binary(min_size=1, max_size=8)),
+    st.builds(record, st.just(0), st.binary(min_size=2, max_size=2), st.sampled_from([2, 4])),
+    st.just(END),
+    TEXTS,
+    st.from_regex(r":[0-9a-f]{4,12}", fullmatch=True),
+)
+
+
+@given(
+    st.lists(LINES, max_size=8), st.booleans(), st.sampled_from(["\n", "\r\n"]), st.sampled_from(["", "\x1a"])
+)
+@example([record(0, b"\x01\x02"), END, "text"], True, "\n", "")
+def test_an_image_that_intelhex_reads_has_the_same_bytes_here(tmp_path_factory, lines, lower, newline, end):
+    """Where it has no comments, which intelhex refuses, and no bytes after its end record, which it does not see."""
+    text = newline.join(line.lower() if lower else line for line in [*lines, END]) + newline + end
+    path = tmp_path_factory.mktemp("hex") / "robot.ihx"
+    path.write_text(text, newline="")
+    try:
+        wanted = IntelHex(f"{path}").todict()
+    except HexReaderError:
+        return
+    wanted.pop("start_addr", None)
+    try:
+        image = load_hex(path, limit=0x10000)
+    except ImageError as error:
+        reasons = (
+            "holds no bytes",
+            "after its end record",
+            "does not fit",
+            "is not Intel HEX: a record begins",
+        )
+        assert error.what.startswith(reasons) or any(reason in error.what for reason in reasons)
+        return
+    assert {address: image.code[address] for one in image.used for address in range(*one)} == wanted
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
