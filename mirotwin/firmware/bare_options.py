@@ -301,4 +301,4 @@ def _stdin_bytes(path: str) -> bytes:
 def _pins(options: BareOptions) -> tuple[PinEvent, ...]:
     if options.pins is None:
         return ()
-    return read_pins(read_input(options.pins).decode("utf-8", errors="replace"), options.pins)
+    return read_pins(read_input(options.pins).decode("utf-8-sig", errors="replace"), options.pins)

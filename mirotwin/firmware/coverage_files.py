@@ -79,7 +79,7 @@ def read_tracefile(path: Path) -> Tracefile:
     """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
     if not path.exists():
         return {}
-    return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
+    return decode(read_input(path).decode("utf-8-sig", "surrogateescape"), str(path))
 
 
 def table(tracefile: Tracefile) -> Table:

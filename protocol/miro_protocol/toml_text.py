@@ -48,7 +48,8 @@ class TomlError(BadInput):
 
 
 def tables(text: str) -> dict[str, Any]:
-    """The tables of a document. Raises TomlError."""
+    """The tables of a document, which may begin with a byte-order mark. Raises TomlError."""
+    text = text.removeprefix("\ufeff")  # editors of Windows write it, and TOML 1.0 does not say
     check_size(text)
     try:
         return tomllib.loads(text)

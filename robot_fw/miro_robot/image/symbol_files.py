@@ -80,7 +80,7 @@ class ListedCode(msgspec.Struct, frozen=True):
 
 def read_text(path: Path) -> str:
     """The text of a file beside an image, "" if there is none. Raises InputError for one that is too long."""
-    return read_input(path).decode(errors="replace") if path.is_file() else ""
+    return read_input(path).decode("utf-8-sig", errors="replace") if path.is_file() else ""
 
 
 _HEX = re.compile(r"[0-9A-F]{8}")
