@@ -157,8 +157,8 @@ def _ranges(loaded: bytearray) -> tuple[tuple[int, int], ...]:
 def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
     """(line number, address, bytes) of each data record; checks everything that is not about the address.
 
-    What other programs read is read: a byte-order mark, the 1Ah with which old ones end a text, comments, and text after
-    the end record. A record that lost its colon is no comment, and data after the end record are lost data.
+    What other programs read is read: a byte-order mark, the 1Ah with which old ones end a text, comments, and text
+    after the end record. A record that lost its colon is no comment, and data after the end record are lost data.
     """
     base = 0
     begun = ended = False
