@@ -3,8 +3,8 @@
 report.txt        what failed, and the commands that give it again
 case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
 sent.stream       the same without a verdict, where no check can judge the failure
-firmware.ihx      the image, with its .map and .cdb: `replay` and `report` find it beside the stream; not where it
-                  is the robot's own, which every installation has
+firmware.ihx      the image, with its .map, .cdb and listings (.rst): `replay` and `report` find it beside the stream; not
+                  where it is the robot's own, which every installation has
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from miro_robot.image import Image
+from miro_robot.image.debug_info import debug_files
 from mirotwin.shell.command import command_line, operand
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
@@ -22,14 +23,12 @@ REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
 CASES = (CASE, SENT)
 PAGE = "report.html"
 FIRMWARE = "firmware.ihx"
-DEBUG_FILES = (".map", ".cdb")
-IMAGE_FILES = (FIRMWARE, *(Path(FIRMWARE).stem + suffix for suffix in DEBUG_FILES))
-FILES = (REPORT, CASE, SENT, PAGE, *IMAGE_FILES)
+FILES = (REPORT, CASE, SENT, PAGE)
 
 
 def clear(folder: Path, *others: str) -> None:
     """Takes away what an earlier run left there, `others` too, and nothing else."""
-    for name in (*FILES, *others):
+    for name in (*FILES, *image_files(folder), *others):
         (folder / name).unlink(missing_ok=True)
     if folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
@@ -48,6 +47,11 @@ def leave(
         leave_image(folder, image)
 
 
+def image_files(folder: Path) -> list[str]:
+    """Names of the image that was left in a folder and of its debug files."""
+    return [FIRMWARE, *debug_files(folder / FIRMWARE, Path(FIRMWARE).stem)]
+
+
 def leave_image(folder: Path, image: Image) -> None:
     """The image's own file, as long as that is what ran."""
     if foreign_path(image) is None or not image.path.is_file():
@@ -56,10 +60,8 @@ def leave_image(folder: Path, image: Image) -> None:
     if hashlib.sha256(content).hexdigest() != image.sha256:
         return
     (folder / FIRMWARE).write_bytes(content)
-    for suffix in DEBUG_FILES:
-        beside = image.path.with_suffix(suffix)
-        if beside.is_file():
-            (folder / FIRMWARE).with_suffix(suffix).write_bytes(beside.read_bytes())
+    for name, path in debug_files(image.path, Path(FIRMWARE).stem).items():
+        (folder / name).write_bytes(path.read_bytes())
 
 
 def image_beside(stream: str | Path, sha256: str | None) -> Path | None:

@@ -27,7 +27,7 @@ from mirotwin.shell.program import (
     show_line,
 )
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.cases.artifacts import FIRMWARE, IMAGE_FILES, case_lines, leave_image, report_line
+from mirotwin.verify.cases.artifacts import FIRMWARE, case_lines, image_files, leave_image, report_line
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
@@ -206,9 +206,9 @@ def _make_room(folder: Path, rules: Sequence[Rule]) -> None:
     """Makes the folder, and takes away what these rules left there before. What others left stays."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for rule in rules:
-            for name in (*case_names(rule), *IMAGE_FILES):
-                (folder / name).unlink(missing_ok=True)
+        names = [name for rule in rules for name in case_names(rule)]
+        for name in (*names, *image_files(folder)):
+            (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise BadInput(
             folder, "", error.strerror or str(error), "choose another folder with --artifacts"

@@ -163,6 +163,20 @@ def listings(image: Path, link_map: str) -> Iterator[Path]:
             yield found
 
 
+NAMES = (".map", ".cdb")
+"""Files beside an image that the linker writes for it; the listings are the compiler's, one a module."""
+
+
+def debug_files(image: Path, stem: str) -> dict[str, Path]:
+    """All files that name things in an image, each by the name under which a copy of the image, `stem`.ihx, finds it."""
+    found = {f"{stem}{suffix}": image.with_suffix(suffix) for suffix in NAMES}
+    link_map = read_text(image.with_suffix(".map"))
+    modules = set(map(_name, map_modules(link_map)))
+    for path in listings(image, link_map):
+        found[path.name if path.stem in modules else f"{stem}.rst"] = path
+    return {name: path for name, path in found.items() if path.is_file()}
+
+
 def _read_listing(path: Path, image: Image) -> Iterator[tuple[int, int, SourceLine | None]]:
     """(address, end, line) of the first code of each line, a comment above it names that; line None for tables.
 

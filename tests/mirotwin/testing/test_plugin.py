@@ -299,7 +299,7 @@ def test_it(world):
 @pytest.mark.slow
 def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path):
     (tmp_path / "session").mkdir()
-    for suffix in (".ihx", ".map", ".cdb"):
+    for suffix in (".ihx", ".map", ".cdb", ".rst"):
         shutil.copy(image_path().with_suffix(suffix), tmp_path / "session" / f"mine{suffix}")
     tests = """
 @pytest.mark.mirotwin(expect={"frames_accepted_min": 9})
@@ -312,7 +312,7 @@ def test_counts(link):
     shutil.move(tmp_path / "session" / "left", tmp_path / "elsewhere" / "left")
     shutil.rmtree(tmp_path / "session")
     (folder,) = (tmp_path / "elsewhere" / "left").iterdir()
-    beside = ["firmware.cdb", "firmware.ihx", "firmware.map"]
+    beside = ["firmware.cdb", "firmware.ihx", "firmware.map", "firmware.rst"]
     assert sorted(path.name for path in folder.iterdir()) == [
         *("case.stream", *beside, "report.txt", "summary.json")
     ]
