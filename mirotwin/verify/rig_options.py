@@ -20,7 +20,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.domain import MAX_SEED
 from miro_robot.image import Image
-from miro_sim.scenario.file import load, parse
+from miro_sim.scenario.file import load
 from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.expect import expectations_of
@@ -120,8 +120,7 @@ def _near(path: str | Path, folder: Path) -> Path:
 @lru_cache(64)
 def silent_scenario(settings: tuple[str, ...]) -> Scenario:
     """The scenario of a test that names none, with these settings: read once for all that want the same."""
-    text = (Path(__file__).parents[1] / "testing" / "silent.toml").read_text(encoding="utf-8")
-    return parse(text, "silent", settings)
+    return load("silent", settings).scenario
 
 
 def _toml(value: Any) -> str:

@@ -9,6 +9,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, ms
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FaultKind
+from miro_sim.scenario.file import load
 from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
@@ -145,6 +146,10 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
     assert (made.boot, made.scenario.duration_s, made.scenario.networks[0].robots) == (False, 2, 5)
     added = [check.name for check in made.expected[0, 0]][len(ALWAYS_ON) :]
     assert added == ["inside_pitch", "frames_accepted_min"]
+
+
+def test_a_test_that_names_no_scenario_has_the_one_that_is_called_silent():
+    assert options().scenario == options({"scenario": "silent"}).scenario == load("silent").scenario
 
 
 def test_a_table_as_scenario_changes_keys_of_the_silent_one():
