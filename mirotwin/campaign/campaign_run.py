@@ -67,7 +67,7 @@ def run(options: CampaignOptions) -> int:
     FILE.wall.parquet.
 
     Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
-    a check. The rows say which.
+    a check, or had no occasion for it. The rows say which.
     """
     require_arrow()
     plan = load(options.file, (*options.settings, *as_settings(options.expected)))
@@ -118,16 +118,23 @@ def _judge(plan: Plan, results: Path) -> int:
             _list(verdict, first)
             if count > len(first):
                 complain(f"{verdict}: {count - len(first)} more of {count}")
-    errors, faults, failed = (found.get(name, (0, []))[0] for name in ("error", "fault", "failed"))
+    errors, faults, failed, unjudged = (
+        found.get(name, (0, []))[0] for name in ("error", "fault", "failed", "not judged")
+    )
     if errors:
         complain(f"{errors} of {plan.runs} runs have an error; {results} says which")
         return BAD_INPUT
     if faults:
         complain(f"{faults} of {plan.runs} runs had firmware faults")
         return FIRMWARE_FAULT
-    if failed > plan.allowed_failed_share * plan.runs:
-        allowed = plan.allowed_failed_share
-        complain(f"expectation failed: {failed} of {plan.runs} runs failed a check; {100 * allowed:g} % may")
+    if failed + unjudged > plan.allowed_failed_share * plan.runs:
+        allowed = f"{100 * plan.allowed_failed_share:g} % may"
+        if failed:
+            complain(f"expectation failed: {failed} of {plan.runs} runs failed a check; {allowed}")
+        if unjudged:
+            complain(
+                f"expectation not judged: {unjudged} of {plan.runs} runs had no occasion for a check; {allowed}"
+            )
         return EXPECTATION_FAILED
     return DONE
 

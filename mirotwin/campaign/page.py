@@ -63,7 +63,7 @@ def campaign_page(path: Path) -> bytes:
     comparisons = _comparisons(rows, made)
     failed = _failed(rows)
     verdicts, seeds = rows.column("verdict"), rows.column("seed")
-    counts = {name: verdicts.count(name) for name in ("passed", *VERDICTS)}
+    counts = {name: verdicts.count(name) for name in ("passed", "not judged", *VERDICTS)}
     values = {
         "file": path.name,
         "about": rows.about,
@@ -135,7 +135,12 @@ def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
 
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
     """A word, and the numbers after it."""
-    words = {"failed": "failed", "fault": "with a firmware fault", "error": "with an error"}
+    words = {
+        "not judged": "not judged",
+        "failed": "failed",
+        "fault": "with a firmware fault",
+        "error": "with an error",
+    }
     wrong = [name for name in words if counts[name]]
     said = ", ".join(f"{counts[name]} {words[name]}" for name in wrong)
     return ["passed", *wrong][-1], said or f"{counts['passed']} runs passed"

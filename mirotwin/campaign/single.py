@@ -23,9 +23,11 @@ from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
+from mirotwin.shell.verdicts import worst
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.expectations import expectation_lines, verdict_of_run
 from mirotwin.verify.steps.keys import Step
 from mirotwin.verify.steps.player import Player, player_of
 from mirotwin.verify.steps.reading import steps_of
@@ -75,12 +77,15 @@ def _run(job: Work) -> RunOutcome:
     summary = summarise(world, tracks, wall_s)
     judges = (checks, *(player.checks if player else ()))
     failures = [one for group in judges for one in group.failures]
-    failure = f"{min(failures, key=lambda one: one.tick)}" if failures else ""
+    lines = [
+        line for group in judges for verdict, line in expectation_lines(group) if verdict == "not judged"
+    ]
+    failure = f"{min(failures, key=lambda one: one.tick)}" if failures else "; ".join(lines)
     if player is not None and player.failure is not None:
         failure = f"step: {player.failure}"
     return RunOutcome(
         run=job.run,
-        verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
+        verdict=verdict_of_run(checks, player),
         failure=failure,
         digest=tracks.digest,
         figures=figures_of(summary, tracks),
@@ -100,8 +105,7 @@ def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorde
 
 def _verdicts(judges: Iterable[Checks]) -> dict[str, str]:
     """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
-    order = ("failed", "not judged", "passed")
     found: dict[str, str] = {}
     for one in (one for group in judges for one in group.verdicts()):
-        found[one.name] = min(found.get(one.name, one.verdict), one.verdict, key=order.index)
+        found[one.name] = worst([found.get(one.name, one.verdict), one.verdict])
     return found

@@ -42,9 +42,11 @@ class Work(msgspec.Struct, frozen=True):
 
 
 class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The result of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
+    """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a check that is named had no
+    occasion), fault (of the firmware) or error (no run).
 
-    `error`: why there are no figures. `failure`: the first check or step that failed. `checks`: name -> verdict.
+    `error`: why there are no figures. `failure`: the first check or step that failed, or what was not judged. `checks`:
+    name -> verdict.
     `wall_s`: the simulation loop.
     """
 

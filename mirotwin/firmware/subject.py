@@ -158,7 +158,7 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
         job = load_job(subject, options.firmware, options.settings)
-        periods = job.recorded[-1].index + 1 if job.recorded else None
+        periods = job.recorded[-1].index + 1 if job.recorded else job.case_periods
         with plain_parameters(subject):
             world = job.world_of()
     network, index = _which_robot(world, options)

@@ -22,6 +22,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import Engine, EngineProgress
 from mirotwin.fuzz.triage import Crash, Triage
+from mirotwin.shell.verdicts import Verdict
 
 LOOK_S = 0.2
 """Wall time between two looks at the engine."""
@@ -43,8 +44,8 @@ class Covering(msgspec.Struct, frozen=True):
 class Campaign:
     """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
-    `inputs`: those of the queue that were looked at; `judged`: those that the checks have looked at; `reached_by`: the
-    stream that reached what was to be reached. `show` is called now and then.
+    `inputs`: those of the queue that were looked at; `judged`: those that the checks have looked at; `verdicts`: what
+    each of these came to; `reached_by`: the stream that reached what was to be reached. `show` is called now and then.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Campaign:
         self.engine = engine
         self.triage = triage
         self.expected = expected
+        self.verdicts: dict[str, set[Verdict]] = {name: set() for name in expected}
         self.covering = covering
         self.tell = tell
         self.show: Callable[[Campaign], None] = lambda campaign: None
@@ -181,7 +183,10 @@ class Campaign:
         began_s = time.monotonic()
         try:
             self.judged += 1
-            failure = self.triage.oracle.judged(data, self.expected).failure
+            found = self.triage.oracle.judged(data, self.expected)
+            failure = found.failure
+            for name in self.expected:
+                self.verdicts[name].add(found.verdict_on(name))
             if failure is not None:
                 self._keep(self.triage.take_judged(data, failure, self.expected))
         finally:

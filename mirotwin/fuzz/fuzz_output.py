@@ -14,7 +14,7 @@ import msgspec
 from miro_exact.bad_input import amount
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
-from mirotwin.firmware.coverage_files import table
+from mirotwin.firmware.coverage_files import table, write
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
@@ -92,9 +92,9 @@ def report(campaign: Campaign, left: int, complete: bool, check: str | None, qui
     FILE.py:FUNCTION of --check.
     """
     triage, out, progress = campaign.triage, campaign.triage.folder.path, campaign.progress()
-    tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
+    coverage = triage.coverage(out / COVERAGE, triage.reached.total)
+    tracefile = coverage.tracefile
     never = never_reached(tracefile)
-    _write_summary(campaign, tracefile, never, left, complete)
     if not quiet:
         edges = "" if progress.edges is None else f", {amount(progress.edges, 'edge')}"
         made = (
@@ -113,10 +113,25 @@ def report(campaign: Campaign, left: int, complete: bool, check: str | None, qui
     if triage.unrepeated:
         complain(f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
     _print_crashes(campaign, check)
+    missed = campaign.covering is not None and _print_covering(campaign, campaign.covering.name)
+    unjudged = _print_unjudged(campaign)
+    write(
+        tracefile, coverage, out / COVERAGE, "--out"
+    )  # what was found is told, whatever becomes of the files
+    _write_summary(campaign, tracefile, never, left, complete)
     if not quiet:
         show_line(f"written to {out}")
-    missed = campaign.covering is not None and _print_covering(campaign, campaign.covering.name)
-    return EXPECTATION_FAILED if triage.confirmed or missed else DONE
+    return EXPECTATION_FAILED if triage.confirmed or missed or unjudged else DONE
+
+
+def _print_unjudged(campaign: Campaign) -> bool:
+    """Names the checks of --expect that judged no input; True if one of them had no occasion."""
+    open_ = {name: found for name, found in campaign.verdicts.items() if not found & {"passed", "failed"}}
+    unseen = [name for name, found in open_.items() if "not observable" in found]
+    for name in open_:
+        verdict = "not observable" if name in unseen else "not judged"
+        complain(f"expectation {verdict}: {name}: no input that was looked at lets it judge")
+    return len(open_) > len(unseen)
 
 
 def never_reached(tracefile: Tracefile) -> list[str]:

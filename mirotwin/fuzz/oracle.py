@@ -19,11 +19,10 @@ from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.target import RobotTarget, Target, TargetFailure
-from mirotwin.verify.bare.case import BareRerun, rerun_bare
+from mirotwin.verify.bare.case import BareRerun, after_ticks, rerun_bare
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
-from mirotwin.verify.bare.run import AHEAD_TICKS
 from mirotwin.verify.cases.rerun import Rerun, rerun_robot
-from mirotwin.verify.checks.expect import CHECKS
+from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, struct_of
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
 """How long a world goes on after the input and the crash: an answer may take 30 ms, a frame 10 ms."""
@@ -44,17 +43,19 @@ class RobotOracle:
 
     def confirm(self, data: bytes, failure: TargetFailure) -> Rerun:
         """Judges an input in which the target failed so."""
-        script = self.target.script(data)
-        if failure.check == NEVER_SLEEPS:
-            script = [*script, *_questions(script, failure.tick, self.target.robots)]
-        return self._rerun(script, expected_of(failure.check), failure.tick)
+        return self._rerun(data, expected_of(failure.check), failure.tick, asks=failure.check == NEVER_SLEEPS)
 
     def judged(self, data: bytes, expected: Expected) -> Rerun:
         """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
-        return self._rerun(self.target.script(data), expected, 0)
+        return self._rerun(data, expected, 0)
 
-    def _rerun(self, script: Sequence[ScriptItem], expected: Expected, last_tick: int) -> Rerun:
-        target, until_tick = self.target, max(last_tick, _end_tick(script)) + AFTER_TICKS
+    def _rerun(self, data: bytes, expected: Expected, last_tick: int, asks: bool = False) -> Rerun:
+        target = self.target
+        script: list[ScriptItem] = [*target.script(data)]
+        if asks or any(struct_of(name).KIND == "safety" for name in {*expected} - {*ALWAYS_ON}):
+            # firmware that was mended, and does not what it must not, has to show that it lives
+            script += _questions(script, last_tick, target.robots, target.slot)
+        until_tick = max(last_tick, _end_tick(script)) + AFTER_TICKS
         return rerun_robot(target.image, target.robots, target.slot, script, expected, until_tick)
 
 
@@ -66,8 +67,9 @@ class BareProcessorOracle:
         self.check = check
 
     def confirm(self, data: bytes, failure: TargetFailure) -> BareRerun:
-        after_ticks = AHEAD_TICKS if failure.check == NO_FAULT else 0  # the instruction itself
-        return self._rerun(data, failure.check, failure.tick + after_ticks)
+        # a build that is slower, and no better, comes to its fault later
+        later = after_ticks(self.target.line) if failure.check == NO_FAULT else 0
+        return self._rerun(data, failure.check, failure.tick + later)
 
     def judged(self, data: bytes, expected: Expected) -> BareRerun:
         self.target.run(data)
@@ -102,12 +104,16 @@ def _end_tick(script: Sequence[ScriptItem]) -> int:
     return max((one.end_tick if isinstance(one, Transmission) else one.tick for one in script), default=0)
 
 
-def _questions(script: Sequence[ScriptItem], found_tick: int, robots: int) -> list[Transmission]:
-    """Two team frames after the input, so late that one of them at least is fresh: a robot that lives acts on it."""
+def _questions(script: Sequence[ScriptItem], found_tick: int, robots: int, slot: int) -> list[Transmission]:
+    """Two team frames after the input that ask the robot, so late that one of them at least is fresh.
+
+    A robot that lives acts on it, and answers.
+    """
     tick = max(found_tick, _end_tick(script)) + FRESH_AGAIN_TICKS + _SETTLED_TICKS
     found: list[Transmission] = []
-    for seq in (1, 2):
-        frame = TeamFrame(FrameType.TEAM, seq, ((256 * seq, 256 * seq),) * robots)
+    for number in (1, 2):
+        velocity = 256 * number
+        frame = TeamFrame(FrameType.TEAM_ASK, slot + number * robots, ((velocity, velocity),) * robots)
         found.append(Transmission(tick, DOWN, encode(frame, robots)))
         tick = found[-1].end_tick + FRESH_AGAIN_TICKS + _SETTLED_TICKS
     return found

@@ -19,8 +19,7 @@ import msgspec
 
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.coverage import Counts
-from miro_robot.inspect.lcov import Tracefile
-from mirotwin.firmware.coverage_files import collect, write
+from mirotwin.firmware.coverage_files import Report, collect, write
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
@@ -191,11 +190,14 @@ class Triage:
         self.write_coverage(self.folder.folder(folder) / f"{name}.info", counts)
         return self.folder.write(folder, f"{name}.stream", stream)
 
-    def write_coverage(self, path: Path, counts: Counts) -> Tracefile:
+    def write_coverage(self, path: Path, counts: Counts) -> None:
         """Writes an lcov tracefile of these counts."""
-        report = collect(self.target.image, counts, self.sources, path)
+        report = self.coverage(path, counts)
         write(report.tracefile, report, path, "--out")
-        return report.tracefile
+
+    def coverage(self, path: Path, counts: Counts) -> Report:
+        """These counts as lines, for a file at `path`."""
+        return collect(self.target.image, counts, self.sources, path)
 
 
 Question = Callable[[bytes], bool]

@@ -13,7 +13,6 @@ from miro_sim.world.world import World
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import FASTEST, Pace, Session
 from mirotwin.recording.recorder import source_of
-from mirotwin.recording.runner import report_faults
 from mirotwin.run.run_files import RunFiles
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
@@ -36,7 +35,7 @@ from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import Expected, as_settings, report_failures
+from mirotwin.verify.expectations import Expected, as_settings, report_run, verdict_first
 
 CASE = "case.stream"
 
@@ -100,6 +99,7 @@ def serve(options: ServeOptions) -> int:
             complain(line)
 
     with (
+        verdict_first(world, checks),
         plain_parameters(text.origin),
         held_signals() as hold,
         folder,
@@ -129,8 +129,7 @@ def serve(options: ServeOptions) -> int:
             behind = f"; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else ""
             tell(f"at most {live.late_max_ms:.1f} ms behind the wall clock{behind}")
     tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
-    failed = report_failures(checks)
-    return report_faults(world) or failed
+    return report_run(world, checks)
 
 
 def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks) -> None:

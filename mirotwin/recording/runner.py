@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS, NEVER_TICK
 from miro_sim.periods import Period
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.recorder import Recorder
@@ -67,11 +67,13 @@ def _sample(tick: int, board: Any) -> SampleMessage:
     return SampleMessage(tick, *values)
 
 
-def report_faults(world: World) -> int:
-    """Says on stderr what the firmware did wrong; returns the exit code."""
-    found = [robot for robot in world.robots if robot.board.faults]
-    for robot in found:
-        first, *others = robot.board.faults
-        more = f" (and {len(others)} more)" if others else ""
-        complain(f"firmware fault: net{robot.network}/robot{robot.slot}: {first}{more}")
-    return FIRMWARE_FAULT if found else DONE
+def report_faults(world: World, to_tick: int = NEVER_TICK) -> int:
+    """Says on stderr what the firmware did wrong up to `to_tick`; returns the exit code."""
+    code = DONE
+    for robot in world.robots:
+        faults = [fault for fault in robot.board.faults if fault.tick <= to_tick]
+        if faults:
+            code = FIRMWARE_FAULT
+            more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+            complain(f"firmware fault: net{robot.network}/robot{robot.slot}: {faults[0]}{more}")
+    return code

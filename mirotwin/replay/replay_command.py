@@ -173,7 +173,7 @@ def replay(options: ReplayOptions) -> int:
     if job.recorded:
         compare.check_reaches(job.file, job.recorded)
     periods = _periods(job, compare.rule)
-    again = _rerun(job, periods, options.quiet or compare.as_json)
+    again = _rerun(job, compare.rule, periods, options.quiet or compare.as_json)
     world, checks, replayed = again.world, again.checks, again.periods
     rule = msgspec.structs.replace(compare.rule, digests=job.state == world.state.tables())
     found = differences(job.recorded, replayed, rule)
@@ -192,7 +192,7 @@ def replay(options: ReplayOptions) -> int:
     failed = report_failures(checks)
     if judged and not options.quiet and not compare.as_json:
         show(expectations_text(checks.verdicts()))
-    faults = report_faults(world)
+    faults = report_faults(world, again.tick)
     differs = _verdict(job, compare, periods, replayed, found, apart)
     if found and not options.quiet and not compare.as_json:
         show(debug_line(file, options.firmware, found[0].tick))
@@ -220,10 +220,9 @@ def _refuse(file: str, what: str, given: Sequence[str]) -> None:
 
 
 def _periods(job: Job, rule: CompareRule) -> int | None:
-    """How many control periods are replayed; None: to the end of the scenario."""
+    """How many of the recorded control periods are replayed; None: nothing was recorded."""
     if not job.recorded:
-        ends = [tick for tick in (rule.to_tick, job.case.end_tick) if tick]
-        return -(-min(ends) // CONTROL_PERIOD_TICKS) if ends else None
+        return None
     first = job.recorded[0].index
     there = first + len(job.recorded)
     if rule.to_tick is None:
@@ -231,13 +230,21 @@ def _periods(job: Job, rule: CompareRule) -> int | None:
     return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
 
 
-def _rerun(job: Job, periods: int | None, quiet: bool) -> Rerun:
-    """The first `periods` of it, as far as the scenario goes."""
-    first = job.recorded[0].index if job.recorded else 0
-    last = job.scenario.periods if periods is None else min(first + periods, job.scenario.periods)
-    until_tick = last * CONTROL_PERIOD_TICKS
+def _rerun(job: Job, rule: CompareRule, periods: int | None, quiet: bool) -> Rerun:
+    """The first `periods` of it, as far as the scenario goes; a stream to where it ends, as `test` runs it.
+
+    Its checks end there, and its world with the control period, so that all frames are listed.
+    """
+    if periods is None:
+        ends = (tick for tick in (rule.to_tick, job.case.end_tick) if tick)
+        until_tick = min(ends, default=job.scenario.periods * CONTROL_PERIOD_TICKS)
+    else:
+        until_tick = min(job.recorded[0].index + periods, job.scenario.periods) * CONTROL_PERIOD_TICKS
     with ProgressBar("replaying", until_tick, quiet) as bar:
-        return rerun_job(job, until_tick, bar.to)
+        again = rerun_job(job, until_tick, bar.to, cut=rule.to_tick is not None)
+    if again.world.in_period and not again.world.stopped:
+        again.world.run_to(again.world.period_end)
+    return again
 
 
 def _verdict(

@@ -23,7 +23,7 @@ from mirotwin.report.page.port_page import beside_twin
 from mirotwin.rerun.job import Job, sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.outputs import RECORDING, OutputFolder
-from mirotwin.shell.program import DIVERGENCE, DONE, complain
+from mirotwin.shell.program import DIVERGENCE, DONE, NOTHING_JUDGED, complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.case import tables_of
 
@@ -116,7 +116,8 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
     """Runs the twin with what was sent at the port, and compares its answers; the exit code."""
     comparison = beside_twin(job, quiet or as_json, rule)
     found = comparison.differences
-    code = DIVERGENCE if found else DONE
+    count = sum(map(len, comparison.robots.values()))
+    code = DIVERGENCE if found else DONE if count else NOTHING_JUDGED
     if as_json:
         head = {"file": job.file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
         head["not_judged"] = comparison.not_judged
@@ -130,9 +131,9 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
     if found:
         first = f"in control period {found[0].period}, {found[0].said(WORDS)}"
         complain(f"the robot differs from its twin {first}")
+    elif not count:
+        complain("no robot was asked, or none answered: nothing could be compared")
     elif not as_json:
-        count, unsure_ms = sum(map(len, comparison.robots.values())), comparison.unsure_ms
-        show(
-            f"the robot answers as its twin does, {amount(count, 'time')}; times are known to {unsure_ms:.1f} ms"
-        )
+        known = f"times are known to {comparison.unsure_ms:.1f} ms"
+        show(f"the robot answers as its twin does, {amount(count, 'time')}; {known}")
     return code

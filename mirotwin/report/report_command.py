@@ -9,7 +9,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.inputs import read_input
+from miro_exact.inputs import read_input, replace_file
 from miro_robot.image import Image
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
@@ -110,7 +110,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
 def leave_page(folder: Path, name: str = "") -> None:
     """Writes the page of what the test `name` left in `folder`. Raises BadInput, also where Bokeh is missing."""
     require_bokeh()
-    (folder / PAGE).write_bytes(page_of(ReportOptions(subject=str(folder), quiet=True), name))
+    replace_file(folder / PAGE, page_of(ReportOptions(subject=str(folder), quiet=True), name))
 
 
 def _file_of(subject: str) -> str:

@@ -38,10 +38,12 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
+from mirotwin.shell.verdicts import worst
 from mirotwin.verify.cases.artifacts import image_beside
 from mirotwin.verify.cases.rerun import CaseVerdict, Rerun, rerun, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks, Expected
+from mirotwin.verify.expectations import expectation_lines
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -250,6 +252,11 @@ class Job(msgspec.Struct, frozen=True):
     origin: str = ""
     firmware: bytes = b""
 
+    @property
+    def case_periods(self) -> int | None:
+        """After so many control periods a case is over; None: with its scenario."""
+        return -(-self.case.end_tick // CONTROL_PERIOD_TICKS) or None
+
     def expectations_of_case(self) -> Expected:
         """What its scenario expects. Raises BadInput where that is not the check that the case is about."""
         name = self.case.verdict.partition(":")[0]
@@ -260,10 +267,10 @@ class Job(msgspec.Struct, frozen=True):
         return expected
 
     def verdict_of_case(self, checks: Checks) -> CaseVerdict:
-        """What its check says this time; `checks` were there."""
-        name = self.case.verdict.partition(":")[0]
-        judged = all(one.name != name or one.verdict != "not judged" for one in checks.verdicts())
-        return verdict_of(self.case.verdict, checks.failures, self.case.changed, judged)
+        """What the checks that it names say this time; `checks` were there."""
+        named = worst(one.verdict for one in checks.verdicts() if one.name in checks.named)
+        why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
+        return verdict_of(self.case.verdict, checks.failures, self.case.changed, named, why)
 
     def world_of(self, image: Image | None = None) -> World:
         """A world that is to do it again, on `image` if one is given; a resumed run begins where that one did."""
@@ -337,13 +344,19 @@ def load_stream(file: str, firmware: str | None) -> Job:
 
 
 def rerun_job(
-    job: Job, until_tick: int | None = None, progress: Callable[[int], object] = lambda tick: None
+    job: Job,
+    until_tick: int | None = None,
+    progress: Callable[[int], object] = lambda tick: None,
+    cut: bool = False,
 ) -> Rerun:
-    """Sends it again, under what its scenario expects; None: to the end of that. Raises BadInput."""
+    """Sends it again, under what its scenario expects; None: to the end of that. `cut`: as of `rerun`.
+
+    Raises BadInput.
+    """
     with plain_parameters(job.file, "replayed"):
         world = job.world_of()
     with replaying(job.file, world):
-        return rerun(world, until_tick, expectations_of(job.scenario, job.file), progress)
+        return rerun(world, until_tick, expectations_of(job.scenario, job.file), progress, cut)
 
 
 @contextmanager

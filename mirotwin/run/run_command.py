@@ -11,7 +11,6 @@ import click
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import source_of
-from mirotwin.recording.runner import report_faults
 from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.shell.command import command_of
@@ -23,7 +22,7 @@ from mirotwin.shell.program import tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import as_settings, report_failures, report_steps
+from mirotwin.verify.expectations import as_settings, report_run, verdict_first
 from mirotwin.verify.steps.player import player_of
 from mirotwin.verify.steps.reading import everything, steps_of
 from mirotwin.verify.steps.running import keep_saved
@@ -88,7 +87,12 @@ def run(options: RunOptions) -> int:
         from mirotwin.camera.frame_folder import FrameFolder
 
         saved = FrameFolder(options.frames, options.force)
-    with plain_parameters(text.origin), held_signals() as hold, folder:
+    with (
+        verdict_first(world, checks, player),
+        plain_parameters(text.origin),
+        held_signals() as hold,
+        folder,
+    ):
         if saved is not None:
             saved.fill(views, hold)
         recorded = views if options.record_frames else []
@@ -105,8 +109,7 @@ def run(options: RunOptions) -> int:
         from mirotwin.run.run_table import print_table  # loads rich
 
         print_table(summary, run_files.tracks, folder.path)
+    code = report_run(world, checks, player)
     if player is not None:
         keep_saved(player, folder.path)
-        return report_faults(world) or report_steps(player, checks)
-    failed = report_failures(checks)
-    return report_faults(world) or failed
+    return code

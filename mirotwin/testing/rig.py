@@ -13,7 +13,7 @@ from mirotwin.testing.link import Link
 from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
 from mirotwin.verify.cases.case import Trace
-from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.interface import Expectation, Failure
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.rig_options import RigOptions
 
@@ -43,6 +43,10 @@ class Rig:
                 self.world.run_to(self.world.period_end)
             self.checks.finish()
         return self.checks.failures
+
+    def unjudged(self) -> list[Expectation]:
+        """The checks that were named and could not judge, by the reason that each has."""
+        return [one for one in self.checks.verdicts() if one.reason and one.name in self.checks.named]
 
     @property
     def written(self) -> bool:

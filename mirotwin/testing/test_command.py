@@ -1,8 +1,8 @@
 """`mirotwin test`: scenario files and cases as tests, for people and machines without pytest.
 
-A case passes where the check that failed passes, as it should on firmware that was mended. A check that had no occasion
-to judge passes if it says "never" (safety), and fails if it says "within a time" (liveness): firmware that does nothing
-at all has mended nothing. A stream that expects nothing is judged by the checks that are always on.
+A case passes where the check that failed passes, as it should on firmware that was mended. Where it had no occasion to
+judge, the case is not judged: firmware that does nothing at all has mended nothing. A stream that expects nothing is
+judged by the checks that are always on.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
@@ -24,24 +23,17 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
-from mirotwin.shell.outputs import check_file, told_when_full, whole_file
-from mirotwin.shell.program import (
-    BAD_INPUT,
-    DONE,
-    EXPECTATION_FAILED,
-    FIRMWARE_FAULT,
-    NOTHING_JUDGED,
-    show_line,
-    tell_notes,
-)
+from mirotwin.shell.outputs import check_file, whole_file
+from mirotwin.shell.program import show_line, tell_notes
+from mirotwin.shell.verdicts import VERDICTS, worst
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
-from mirotwin.verify.checks.expect import ALWAYS_ON
+from mirotwin.verify.cases.rerun import CaseVerdict
 from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import CHECK, Expected, as_settings
-from mirotwin.verify.steps.running import KINDS, Outcome, Verdict, collect, run_test, stem_of
+from mirotwin.verify.steps.running import KINDS, Outcome, collect, run_test, stem_of
 
 
 class CaseTests:
@@ -71,15 +63,9 @@ class CaseTests:
     def _run(self, path: str) -> Outcome:
         job = load_stream(path, self.firmware)
         again = rerun_job(job, job.case.end_tick or None)
-        failure = again.failure
-        lines: tuple[str, ...] = () if failure is None else (f"expectation failed: {failure}",)
-        for one in again.checks.verdicts():
-            if one.verdict == "not judged" and one.kind == "liveness" and one.name not in ALWAYS_ON:
-                lines = lines or (f"expectation not judged: {one.name}: the run had no occasion for it",)
-        return Outcome(
-            path=path,
-            verdict="fault" if failure is not None and failure.fault else "failed" if lines else "passed",
-            lines=lines,
+        outcome = _outcome(path, job.verdict_of_case(again.checks))
+        return replace(
+            outcome,
             tick=again.tick,
             seed=job.seed,
             digest=again.world.digest,
@@ -91,32 +77,17 @@ class CaseTests:
 
         image = load_case_firmware(path, self.firmware)
         self.unused.discard(check or "")
-        failure = rerun_bare_case(path, image, check)[1].failure
-        return Outcome(
-            path=path,
-            verdict="passed" if failure is None else "fault" if failure.fault else "failed",
-            lines=() if failure is None else (f"expectation failed: {failure}",),
-            firmware_sha256=image.sha256 or "",
-        )
+        outcome = _outcome(path, rerun_bare_case(path, image, check)[1])
+        return replace(outcome, firmware_sha256=image.sha256 or "")
 
 
-class Told(msgspec.Struct, frozen=True):
-    """How a verdict is told: in its own line, by the exit code, where files are counted, and in JUnit."""
-
-    line: str
-    code: int
-    counted: str
-    junit: Literal["passed", "failure", "error", "skipped"]
-
-
-TOLD: dict[Verdict, Told] = {
-    "error": Told("ERROR", BAD_INPUT, "cannot be run", "error"),
-    "fault": Told("FAULT", FIRMWARE_FAULT, "with a firmware fault", "failure"),
-    "failed": Told("FAILED", EXPECTATION_FAILED, "failed", "failure"),
-    "passed": Told("passed", DONE, "passed", "passed"),
-    "not observable": Told("not observable", NOTHING_JUDGED, "not observable", "skipped"),
-}
-"""In the order of precedence."""
+def _outcome(path: str, found: CaseVerdict) -> Outcome:
+    """What a case comes to as a test: where its check passes, it passes, whichever firmware it is of."""
+    failures = dict.fromkeys(one for one in (found.failure, found.fault) if one is not None)
+    lines = tuple(f"expectation failed: {one}" for one in failures) or found.lines
+    if found.verdict in ("passed", "differs"):
+        return Outcome(path, "passed", notes=found.lines[1:])
+    return Outcome(path, found.verdict, lines)
 
 
 class TestOptions(Options, frozen=True, kw_only=True):
@@ -187,8 +158,9 @@ def test(options: TestOptions) -> int:
     robot's inside, are not observable on a port: that is told and counted, and never passes. --artifacts leaves the
     recording. A case is refused.
 
-    Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
-    none. Where several apply: 2, then 3, then 1. 5: nothing was judged, because a port shows none of it.
+    Exit code 1: a step or a check failed, or a check that is named had no occasion; 3: the firmware did what it must
+    not; 2: a file cannot be run, or there is none. Where several apply: 2, then 3, then 1. 5: nothing was judged,
+    because a port, or an image without symbols, shows none of it.
     """
     word, junit, desk = options.word, options.junit, options.desk
     files = collect(options.paths)
@@ -211,6 +183,11 @@ def test(options: TestOptions) -> int:
         raise BadInput(case, "--port", what, "leave it out, or send it with `mirotwin replay`")
     if junit is not None:
         check_file(junit, "--junit", *chosen)
+    if options.pages:
+        from mirotwin.report.page.bokeh_page import require_bokeh
+        from mirotwin.report.report_command import leave_page  # loads the pages' library
+
+        require_bokeh()
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
     told: list[TestCase] = []
@@ -224,14 +201,14 @@ def test(options: TestOptions) -> int:
         left_out |= dict.fromkeys(outcome.left_out)
         _show(outcome, options.quiet)
         if options.pages and outcome.left:
-            from mirotwin.report.report_command import leave_page  # loads the pages' library
-
-            with told_when_full(options.artifacts, "--artifacts"):
+            try:
                 leave_page(Path(outcome.left))
-    if junit is not None:
+            except (OSError, BadInput) as error:
+                show_line(f"    no page: {error}")
+    code = _summary(outcomes)
+    if junit is not None:  # the verdicts are told first, whatever becomes of their file
         with whole_file(junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin", told))
-    code = _summary(outcomes)
     if cases.unused:
         what = f"no case is judged by {sorted(cases.unused)[0]}"
         raise BadInput("", "--check", what, "leave it out, or name the one that the cases have in [expect]")
@@ -245,7 +222,7 @@ def _show(outcome: Outcome, quiet: bool) -> None:
     steps = f"{outcome.done} of {amount(outcome.steps, 'step')}, " if outcome.steps else ""
     digest = f", digest {outcome.digest[:12]}" if outcome.digest else ""  # of a robot at a port there is none
     how = f" ({steps}{in_ms(outcome.tick)}{digest})" if steps or digest else ""
-    show_line(f"{TOLD[outcome.verdict].line}  {outcome.path}{how}")
+    show_line(f"{VERDICTS[outcome.verdict].line}  {outcome.path}{how}")
     for line in (*outcome.lines, *outcome.notes):
         show_line(f"    {line}")
     if outcome.left:
@@ -263,12 +240,12 @@ def _show(outcome: Outcome, quiet: bool) -> None:
 def _summary(outcomes: Sequence[Outcome]) -> int:
     """Prints what came of all; returns the exit code."""
     counted = Counter(one.verdict for one in outcomes)
-    found = [verdict for verdict in TOLD if counted[verdict]]
-    said = ", ".join(f"{counted[verdict]} {TOLD[verdict].counted}" for verdict in found)
+    found = [verdict for verdict in VERDICTS if counted[verdict]]
+    said = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in found)
     if unseen := sum(one.unseen for one in outcomes):
         said += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
     show_line(said)
-    return TOLD[found[0]].code
+    return VERDICTS[worst(counted)].code
 
 
 def _test_case(outcome: Outcome, time_s: float) -> TestCase:
@@ -276,7 +253,7 @@ def _test_case(outcome: Outcome, time_s: float) -> TestCase:
         name=stem_of(outcome.path),
         classname=str(Path(outcome.path).parent).strip("./").replace("/", ".") or "scenario",
         time_s=time_s,
-        verdict=TOLD[outcome.verdict].junit,
+        verdict=VERDICTS[outcome.verdict].junit,
         lines=(*outcome.lines, *outcome.notes),
         properties={
             "seed": str(outcome.seed),

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from miro_exact.bad_input import amount
+from miro_exact.bad_input import BadInput, amount
 from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
+from mirotwin.recording.runner import report_faults
 from mirotwin.shell.command import Option
-from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
+from mirotwin.shell.program import complain
+from mirotwin.shell.verdicts import VERDICTS, Verdict, worst
 from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.monitors import Checks
 
 if TYPE_CHECKING:
+    from miro_sim.world.world import World
     from mirotwin.verify.steps.player import Player
 
 LINES = 5
@@ -53,28 +57,26 @@ def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true" for text in expected)
 
 
-def failure_lines(checks: Checks) -> Iterator[tuple[bool, str]]:
-    """Which checks failed and which had nothing to judge, a line each, and whether it failed.
+def expectation_lines(checks: Checks) -> Iterator[tuple[Verdict, str]]:
+    """Which checks failed, had no occasion, or cannot be observed, a line each with that verdict.
 
     Firmware faults have lines and an exit code of their own.
     """
     for verdict in checks.verdicts():
-        if verdict.verdict == "not judged" and verdict.name not in ALWAYS_ON:
-            yield False, f"expectation not judged: {verdict.name}: the run had no occasion for it"
+        if verdict.reason and verdict.name in checks.named:
+            yield verdict.verdict, f"expectation {verdict.verdict}: {verdict.name}: {verdict.reason}"
         failures = [one for one in checks.failures if one.check == verdict.name and not one.fault]
         for failure in failures[:LINES]:
-            yield True, f"expectation failed: {failure}"
+            yield "failed", f"expectation failed: {failure}"
         if failures and verdict.failures > LINES:
-            yield True, f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times"
+            yield "failed", f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times"
 
 
 def report_failures(checks: Checks) -> int:
-    """Says on stderr which checks failed and which had nothing to judge; returns the exit code."""
-    code = DONE
-    for failed, line in failure_lines(checks):
+    """Says on stderr which checks failed and which were not judged; returns the exit code."""
+    for _, line in expectation_lines(checks):
         complain(line)
-        code = EXPECTATION_FAILED if failed else code
-    return code
+    return VERDICTS[checks.verdict()].code
 
 
 def expectations_text(expectations: Sequence[Expectation]) -> str:
@@ -86,9 +88,29 @@ def expectations_text(expectations: Sequence[Expectation]) -> str:
     return ", ".join([f"{len(counted) - len(others)} of {amount(len(counted), 'check')} passed", *others])
 
 
-def report_steps(player: Player, checks: Checks) -> int:
-    """The same where steps were done: the step that failed, and the checks that steps began, too."""
-    if player.failure is not None:
+def report_run(world: World, checks: Checks, player: Player | None = None) -> int:
+    """The same of a run that is over, and its steps, the checks that these began, and firmware faults."""
+    if player is not None and player.failure is not None:
         complain(f"step failed: {player.failure}")
-    codes = [report_failures(one) for one in (checks, *player.checks)]
-    return EXPECTATION_FAILED if player.failure is not None else max(codes)
+    for group in (checks, *(player.checks if player else ())):
+        report_failures(group)
+    return report_faults(world) or VERDICTS[verdict_of_run(checks, player)].code
+
+
+@contextmanager
+def verdict_first(world: World, checks: Checks, player: Player | None = None) -> Iterator[None]:
+    """Within it files are written: a run that was judged is reported, although they could not be (a full disk)."""
+    try:
+        yield
+    except BadInput:
+        if checks.finished:
+            report_run(world, checks, player)
+        raise
+
+
+def verdict_of_run(checks: Checks, player: Player | None) -> Verdict:
+    """Of the checks of the whole run, of the steps, and of the checks that steps began."""
+    if player is None:
+        return checks.verdict()
+    step = "passed" if player.failure is None else "failed"
+    return worst([checks.verdict(), step, *(group.verdict() for group in player.checks)])

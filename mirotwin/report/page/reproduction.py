@@ -20,18 +20,20 @@ from mirotwin.rerun.job import Job, replaying
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Expectation, Failure
 
 
 class Reproduction(msgspec.Struct, frozen=True):
-    """Its result. `faults`: network, slot and fault. `image` has its debug files where they are; `robot`: whose
-    processor was watched.
+    """Its result. `verdict`: of all checks; `faults`: network, slot and fault. `image` has its debug files where they
+    are; `robot`: whose processor was watched.
     """
 
     periods: list[Period]
     digest: str
+    verdict: Verdict
     verdicts: tuple[Expectation, ...]
     failures: list[Failure]
     faults: list[tuple[int, int, FirmwareFault]]
@@ -61,6 +63,7 @@ def reproduce(job: Job, until_tick: int | None, quiet: bool) -> Reproduction:
     return Reproduction(
         periods=again.periods,
         digest=world.digest,
+        verdict=again.checks.verdict(),
         verdicts=again.checks.verdicts(),
         failures=again.failures,
         faults=[(robot.network, robot.slot, one) for robot in world.robots for one in robot.board.faults],

@@ -28,6 +28,7 @@ from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 from mirotwin.rerun.job import Job
+from mirotwin.shell.verdicts import worst
 from mirotwin.verify.cases.case import tables_of
 
 SILENT = "silent"
@@ -146,10 +147,13 @@ def _verdict(material: Material) -> tuple[str, str]:
     if again.faults:
         return "fault", of
     if material.verdict:
-        return material.verdict, of
+        return material.verdict, f"no check, but what its report says; {count}"
     if failed or (steps is not None and steps.failed):
         return "failed", of
-    return ("broken off" if material.extras.broken_off else "passed"), of
+    if material.extras.broken_off:
+        return "broken off", of
+    verdict = worst([again.verdict, *(one.verdict for one in verdicts[len(again.verdicts) :])])
+    return verdict, of
 
 
 def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:

@@ -32,6 +32,7 @@ from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.bare.exchange import (
     GROUP,
     NEVER_SLEEPS,
@@ -58,13 +59,20 @@ class BareFailure(Failure, frozen=True, kw_only=True):
 
 
 class BareRerun(msgspec.Struct, frozen=True):
-    """A script played from power-on. `failure`: what its check said, None where it passed."""
+    """A script played from power-on. `failure`: what its check said, None where it passed. `unjudged`: why the check
+    had no occasion, "" where it had one.
+    """
 
     image: Image
     line: BareLine
     script: Sequence[ScriptItem]
     end_tick: int
     failure: BareFailure | None
+    unjudged: str = ""
+
+    def verdict_on(self, name: str) -> Verdict:
+        """That of its check."""
+        return "failed" if self.failure is not None else "not judged" if self.unjudged else "passed"
 
     def case(self) -> str:
         """The case of the failure."""
@@ -89,11 +97,12 @@ def rerun_bare(
     """Plays a script from power-on to `until_tick`, under the check `name`; a fault goes before what that says."""
     run = BarePlayback(image, line, script, until_tick, source).play()
     fault = run.processor.fault()
-    what, tick = "", 12 * run.processor.cpu.cycles
+    what, unjudged, tick = "", "", 12 * run.processor.cpu.cycles
     if fault is not None:
         name, what, tick = NO_FAULT, str(fault), fault.tick
     elif name == NEVER_SLEEPS:
         what = "" if run.idle else "the firmware is awake long after the last character"
+        unjudged = "" if run.sleeps else "the firmware does not sleep before the first character"
     elif check is not None and name == check.name:
         what = run.verdict(check)
     failure = BareFailure(
@@ -106,7 +115,7 @@ def rerun_bare(
         fault=name == NO_FAULT,
         crystal_hz=line.crystal_hz,
     )
-    return BareRerun(image, line, script, until_tick, failure if what else None)
+    return BareRerun(image, line, script, until_tick, failure if what else None, unjudged)
 
 
 def case_text(
@@ -146,11 +155,25 @@ def rerun_bare_case(
     name, line, header = _name(case), _line(case), case.header
     judge = None if name in (NO_FAULT, NEVER_SLEEPS) else _check(case, name, check)
     script = _heard(case)
-    end_tick = header.end_tick or max((one.tick for one in script), default=0)
+    end_tick = header.end_tick or _end_tick(script, line)
     again = rerun_bare(image, line, script, end_tick, name, judge, case.source)
     changed = header.firmware_sha256 not in (None, image.sha256)
     failures = [] if again.failure is None else [again.failure]
-    return again, verdict_of(header.verdict or "", failures, changed)
+    why = [f"expectation not judged: {name}: {again.unjudged}"] if again.unjudged else []
+    return again, verdict_of(header.verdict or "", failures, changed, "not judged" if why else "passed", why)
+
+
+AFTER_MS = 50
+"""So long after the last character a stream that names no end ends: firmware may answer meanwhile, or do wrong."""
+
+
+def after_ticks(line: BareLine) -> int:
+    return line.crystal_hz * AFTER_MS // 1000
+
+
+def _end_tick(script: Sequence[ScriptItem], line: BareLine) -> int:
+    ends = [one.tick + (line.ticks(len(one.data)) if isinstance(one, Transmission) else 0) for one in script]
+    return max(ends, default=line.begin_tick) + after_ticks(line)
 
 
 def _name(case: stream.StreamFile) -> str:

@@ -19,6 +19,8 @@ _SLICE = 20_000  # cycles
 _CLOCK_CYCLES = 65_536  # after which every timer has overflowed
 _LATEST = 1 << 50
 _FASTEST = 32  # ticks a bit, of the fastest receiver there is
+CHARACTER_BITS = 10
+"""Start bit, eight data bits, stop bit."""
 BAUD = "--baud"
 
 
@@ -40,6 +42,10 @@ class BareLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"a bit of {self.bit_ticks} ticks is outside {_FASTEST}..{self.crystal_hz}")
         if not 0 <= self.begin_tick <= _LATEST:
             raise ValueError(f"begin_tick {self.begin_tick} is outside 0..{_LATEST}")
+
+    def ticks(self, characters: int) -> int:
+        """So many characters last without a pause between them."""
+        return characters * CHARACTER_BITS * self.bit_ticks
 
 
 class BareProcessor:

@@ -12,10 +12,9 @@ from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import Image
 from miro_robot.mcs51.uart import STOPPED_TICK
 from mirotwin.verify.bare.exchange import NamedCheck
-from mirotwin.verify.bare.machine import BareLine, BareProcessor
+from mirotwin.verify.bare.machine import CHARACTER_BITS, BareLine, BareProcessor
 
 AHEAD_TICKS = 240  # the CPU may look so far beyond the end of a run
-_BITS = 10
 _LOOK = 2_000  # cycles between two looks at whether firmware sleeps
 
 
@@ -45,7 +44,7 @@ class BarePlayback:
 
     def play(self) -> BarePlayback:
         """To the end."""
-        if self.to(self._inputs[-1][0]):
+        if self.to(min(self._inputs[-1][0], self.end_tick)):
             self._end(self.end_tick)
         return self
 
@@ -105,12 +104,12 @@ class BarePlayback:
         for at, value in enumerate(sent.data):
             for place, level in enumerate((0, *(value >> place & 1 for place in range(8)))):
                 rxd.append(tick + place * bit, level)
-            stop = tick + (_BITS - 1) * bit
+            stop = tick + (CHARACTER_BITS - 1) * bit
             if at in sent.bad_stop:
                 rxd.append(stop, 0)
                 stop += 3 * bit // 4
             rxd.append(stop, 1)
-            tick += _BITS * bit
+            tick += CHARACTER_BITS * bit
         self._end_of_last = tick
 
     def _reset(self, action: Reset) -> None:

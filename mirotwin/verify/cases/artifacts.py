@@ -3,7 +3,7 @@
 report.txt        what failed, and the commands that give it again
 case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
 sent.stream       the same without a verdict, where no check can judge the failure
-firmware.ihx      the image, with its .map, .cdb and listings (.rst): `replay` and `report` find it beside the stream; not
+firmware.ihx      the image, with its .map, .cdb and .rst files: `replay` and `report` find it beside the stream; not
                   where it is the robot's own, which every installation has
 """
 
@@ -13,9 +13,11 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_robot.image.debug_info import debug_files
 from mirotwin.shell.command import command_line, operand
+from mirotwin.shell.outputs import reason_of
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
@@ -45,6 +47,11 @@ def leave(
         write_case(folder / name, text)
     if streams:
         leave_image(folder, image)
+
+
+def nothing_left(folder: Path, error: OSError | BadInput) -> str:
+    """The line that says why nothing is in the folder: the verdict stands all the same."""
+    return f"nothing could be left in {folder}: {reason_of(error) if isinstance(error, OSError) else error}"
 
 
 def image_files(folder: Path) -> list[str]:

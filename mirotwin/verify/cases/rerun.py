@@ -13,7 +13,7 @@ from miro_protocol.actions import ScriptItem
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.shell.program import DIVERGENCE, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT
+from mirotwin.shell.verdicts import VERDICTS, Verdict
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks, Expected
@@ -38,6 +38,10 @@ class Rerun(msgspec.Struct, frozen=True):
         """The first one."""
         return self.failures[0] if self.failures else None
 
+    def verdict_on(self, name: str) -> Verdict:
+        """That of one check."""
+        return next(one.verdict for one in self.checks.verdicts() if one.name == name)
+
     def case(self) -> str:
         """The case of the first failure. Raises ValueError if nothing failed."""
         return case_of_checks(self.world, self._known_trace(), self.checks)
@@ -56,17 +60,18 @@ def rerun(
     until_tick: int | None = None,
     expected: Expected | None = None,
     progress: Callable[[int], object] = lambda tick: None,
+    cut: bool = False,
 ) -> Rerun:
     """Runs `world`, which nobody has moved, to `until_tick`, perhaps beyond the end of its scenario.
 
     `until_tick` None: to that end. `expected`: the checks; by default those of its scenario. `progress` is told the
-    tick. Raises TransmissionError for a script that cannot be sent.
+    tick. `cut`: it may be ended before it is over. Raises TransmissionError for a script that cannot be sent.
     """
     end_tick = world.periods * CONTROL_PERIOD_TICKS if until_tick is None else until_tick
     trace = None if world.tick else Trace(world)
     periods: list[Period] = []
     world.observers.append(periods.append)
-    checks = Checks(world, expected)
+    checks = Checks(world, expected, cut)
     while not world.stopped and world.tick < end_tick:
         world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
         progress(world.tick)
@@ -113,16 +118,28 @@ def case_of_expect(world: World, trace: Trace, expect: Mapping[str, Any]) -> str
 
 
 class CaseVerdict(msgspec.Struct, frozen=True):
-    """`code`: the exit code; `lines`: for people; `failure`: the check that failed, as recorded or otherwise."""
+    """`lines`: for people; `failure`: the check that failed, as recorded or otherwise; `fault`: the first one."""
 
-    code: int
+    verdict: Verdict
     lines: tuple[str, ...]
     failure: Failure | None = None
+    fault: Failure | None = None
+
+    @property
+    def code(self) -> int:
+        """The exit code."""
+        return VERDICTS[self.verdict].code
 
 
-def verdict_of(recorded: str, failures: Sequence[Failure], changed: bool, judged: bool = True) -> CaseVerdict:
+def verdict_of(
+    recorded: str,
+    failures: Sequence[Failure],
+    changed: bool,
+    verdict: Verdict = "passed",
+    why: Sequence[str] = (),
+) -> CaseVerdict:
     """From the line that was recorded ("" for none). `changed`: other firmware or settings ran than those of the case;
-    `judged`: its check had an occasion.
+    `verdict`: that of the checks it names, where none failed, and `why` they were not judged.
     """
     name = recorded.partition(":")[0]
     if failures:
@@ -133,12 +150,14 @@ def verdict_of(recorded: str, failures: Sequence[Failure], changed: bool, judged
             lines = [f"fails: {first}"]
         elif not same:
             lines.append(f"recorded: {recorded}")
-        return CaseVerdict(FIRMWARE_FAULT if first.fault else EXPECTATION_FAILED, tuple(lines), first)
+        fault = next((one for one in failures if one.fault), None)
+        if fault not in (None, first):
+            lines.append(f"and a firmware fault: {fault}")
+        return CaseVerdict("failed" if fault is None else "fault", tuple(lines), first, fault)
+    if verdict != "passed":
+        return CaseVerdict(verdict, (*why, *([f"recorded: {recorded}"] if recorded else [])))
     if not recorded:
-        return CaseVerdict(DONE, ("passes",))
-    if not judged:
-        said = f"expectation not judged: the run had no occasion for it; recorded: {recorded}"
-        return CaseVerdict(EXPECTATION_FAILED, (said,))
+        return CaseVerdict("passed", ("passes", *why))
     if changed:
-        return CaseVerdict(DONE, (f"cured: {name} passes; recorded: {recorded}",))
-    return CaseVerdict(DIVERGENCE, (f"not reproduced: {name} passes; recorded: {recorded}",))
+        return CaseVerdict("passed", (f"cured: {name} passes; recorded: {recorded}", *why))
+    return CaseVerdict("differs", (f"not reproduced: {name} passes; recorded: {recorded}", *why))

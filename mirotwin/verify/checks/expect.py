@@ -82,6 +82,14 @@ def expectations_of(scenario: Scenario, origin: str) -> dict[RobotId, list[Check
     return found
 
 
+def named_in(scenario: Scenario) -> set[str]:
+    """Checks that a scenario or one of its steps names: a run that has no occasion for one of them has not passed."""
+    robots = [robot for network in scenario.networks for robot in network.robot]
+    steps = [step.get("check") for step in scenario.step]
+    tables = [scenario.expect, *(robot.expect for robot in robots), *steps]
+    return {name for table in tables if isinstance(table, dict) for name in table}
+
+
 def says_anything(scenario: Scenario) -> bool:
     """Whether a scenario expects more than what every run has to fulfil."""
     return bool(scenario.expect or any(robot.expect for one in scenario.networks for robot in one.robot))

@@ -34,6 +34,7 @@ from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
 from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
+from mirotwin.shell.verdicts import Verdict
 
 Kind = Literal["safety", "liveness"]
 EVENT_KINDS = (
@@ -117,6 +118,8 @@ class Monitor(Generic[C_co]):
     EVENTS: tuple[str, ...] = ()
     """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
+    unseen = ""
+    """Why no run of this robot shows what is judged, such as a symbol that its image lacks: "not observable"."""
     LATER = False
     """Whether it may be told of several control periods at once, which it is if no check hears events of the board. If
     so, it must not read the robot except in `period_over` and `end`."""
@@ -190,15 +193,17 @@ class FirstFailure(msgspec.Struct, frozen=True):
 class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a check, over all robots.
 
-    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
-    occasion for it. `failures`: how many; `first`: the earliest.
+    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, "not judged" where the run had no
+    occasion for it, "not observable" where no run of such robots shows it; `reason` says why. `failures`: how many;
+    `first`: the earliest.
     """
 
     name: str
     kind: str
-    verdict: str
+    verdict: Verdict
     failures: int = 0
     first: FirstFailure | None = None
+    reason: str = ""
 
 
 def checked_monitor(check: Check, subject: Subject) -> Monitor[Any]:

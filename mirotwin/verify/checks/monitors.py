@@ -31,7 +31,8 @@ from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.shell.verdicts import Verdict, worst
+from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_of, named_in
 from mirotwin.verify.checks.interface import (
     Check,
     Expectation,
@@ -77,15 +78,18 @@ class ExpectationFailed(AssertionError):
 class Checks:
     """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
 
-    `expected` replaces that, by network and slot. `cut`: the run may be ended before it is over. Begin with the run: a
-    check does not know what wheels were told before. RuntimeError is raised if the world is loaded meanwhile, because
-    what a check remembers is not saved.
+    `expected` replaces that, by network and slot. `cut`: the run may be ended before it is over. `named`: the checks
+    that somebody asked for. Begin with the run: a check does not know what wheels were told before. RuntimeError is
+    raised if the world is loaded meanwhile, because what a check remembers is not saved.
     """
 
     def __init__(self, world: World, expected: Expected | None = None, cut: bool = False) -> None:
         self.world = world
         if expected is None:
             expected = expectations_of(world.scenario, world.scenario.name)
+        names = {check.name for checks in expected.values() for check in checks}
+        self.named = names - (set(ALWAYS_ON) - named_in(world.scenario))
+        self.cut = cut
         self.robots = [
             _RobotMonitors(world, network, robot, expected.get((network.index, robot.slot), ()), cut)
             for network in world.networks
@@ -156,7 +160,21 @@ class Checks:
         for monitor in self.monitors:
             by_name.setdefault(monitor.check.name, []).append(monitor)
         lost = any(watched.lost for watched in self.robots)
-        return tuple(_verdict(name, monitors, lost) for name, monitors in by_name.items())
+        reason = ENDED if self.ended_early else NO_OCCASION
+        return tuple(_verdict(name, monitors, lost, reason) for name, monitors in by_name.items())
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether who runs the world ended it: what was still to come counts neither for nor against it."""
+        return self.cut and self.world.tick < self.world.periods * CONTROL_PERIOD_TICKS
+
+    def verdict(self) -> Verdict:
+        """Of all checks together. Those that are always on, and are named by nobody, need no occasion."""
+        if any(failure.fault for failure in self.failures):
+            return "fault"
+        optional = "not judged" if self.ended_early else ""
+        found = [one for one in self.verdicts() if one.name in self.named or one.verdict != "not judged"]
+        return worst(one.verdict for one in found if one.verdict != optional)
 
 
 class _RobotMonitors:
@@ -274,15 +292,26 @@ class _RobotMonitors:
         return PluginError(f"{named}: {raised(error)}", "repair the check")
 
 
-def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool) -> Expectation:
+NO_OCCASION = "the run had no occasion for it"
+ENDED = "the run was ended before it"
+LOST = "more events than the robot's log holds"
+
+
+def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool, reason: str) -> Expectation:
     failed, judged = sum(one.failed for one in monitors), sum(one.judged for one in monitors)
-    open_ = judged == 0 or (lost and any(monitor.EVENTS for monitor in monitors))
+    verdict: Verdict = "failed" if failed else "passed"
+    if not failed and judged == 0:
+        unseen = next((one.unseen for one in monitors if one.unseen), "")
+        verdict, reason = ("not observable", unseen) if unseen else ("not judged", reason)
+    elif not failed and lost and any(monitor.EVENTS for monitor in monitors):
+        verdict, reason = "not judged", LOST
     failures = (one for monitor in monitors for one in monitor.failures)
     first = min(failures, key=_BY_TICK, default=None)
     return Expectation(
         name=name,
         kind=monitors[0].check.KIND,
-        verdict="failed" if failed else "not judged" if open_ else "passed",
+        verdict=verdict,
         failures=failed,
         first=None if first is None else msgspec.convert(first, FirstFailure, from_attributes=True),
+        reason="" if verdict in ("failed", "passed") else reason,
     )

@@ -12,6 +12,7 @@ from miro_protocol.frames import ContentError, TeamFrame
 from miro_protocol.robot_rules import NO_WORD, DrivingRule, OriginRule
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
+from miro_sim.world.robot import COUNTERS
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
 from mirotwin.verify.checks.orders import OrdersMonitor, saturated
@@ -208,13 +209,15 @@ class AcceptedMonitor(Monitor[FramesAccepted]):
         super().__init__(check, subject)
         self.counter = 0
         self.frames = 0
+        if subject.robot.counter(0) is None:
+            self.unseen = f"the image has no symbol {COUNTERS[0]}, which its .map or .cdb would name"
 
     def period(self, record: RobotPeriod, tick: int) -> None:
         self._count(record.accepted)
 
     def end(self, tick: int) -> None:
         accepted = self.subject.robot.counter(0)
-        if accepted is None:  # an image without the counter: nothing can be judged
+        if accepted is None:
             return
         self._count(accepted)
         if self.frames < self.check.frames and self.subject.cut and tick < self.subject.end_tick:

@@ -17,17 +17,18 @@ from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, QUIET, SEED, Engine, StackFrom
-from mirotwin.shell.outputs import check_file, told_when_full, whole_file
-from mirotwin.shell.program import (
-    DONE,
-    EXPECTATION_FAILED,
-    FIRMWARE_FAULT,
-    NOTHING_JUDGED,
-    complain,
-    show_line,
-)
+from mirotwin.shell.outputs import check_file, whole_file
+from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.cases.artifacts import FIRMWARE, case_lines, image_files, leave_image, report_line
+from mirotwin.shell.verdicts import VERDICTS, Verdict, worst
+from mirotwin.verify.cases.artifacts import (
+    FIRMWARE,
+    case_lines,
+    image_files,
+    leave_image,
+    nothing_left,
+    report_line,
+)
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
@@ -125,8 +126,8 @@ def conform(options: ConformOptions) -> int:
     observable, one that needs times which the PC cannot keep, or motion that is not allowed, is not judged; neither is
     passed.
 
-    Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials; 5: no rule
-    was judged.
+    Exit code 1: a rule failed, or one of --rule was not judged; 3: the firmware did what it must not (bus, stack, ..)
+    in one of the trials; 5: no rule was judged.
     """
     if options.listing and (given := options.given(*_OF_TRIALS)):
         raise click.UsageError(f"{given[0]} does not go with --list.")
@@ -157,35 +158,48 @@ def conform(options: ConformOptions) -> int:
         tried = try_all(rules, firmware, options.seed, keep=artifacts is not None, ahead=True)
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
+    unwritten = ""
     with ProgressBar("trying rules", len(rules), quiet) as bar:
         try:
             for outcome in tried:
                 outcomes.append(outcome)
                 bar.to(len(outcomes))
-                if artifacts is not None:
-                    with told_when_full(artifacts, "--artifacts"):
-                        for name, text in outcome.cases:
-                            write_case(artifacts / name, text)
-                            leave_image(artifacts, firmware)
+                if artifacts is not None and not unwritten:
+                    unwritten = _keep(outcome, artifacts, firmware)
         except BadInput as error:  # a robot that was lost: what was found before is told
             lost = error
     outcomes = with_faults(outcomes, rules)
     if outcomes or lost is None:
-        _tell(outcomes, rules, options, properties)
+        _tell(outcomes, rules, options)
+    if unwritten:
+        complain(unwritten)
+    code = _report_faults(outcomes)
+    if options.junit is not None and (outcomes or lost is None):  # told first, whatever becomes of the file
+        cases = [_test_case(one, bool(options.ids)) for one in outcomes]
+        with whole_file(options.junit, "--junit") as part:
+            part.write_bytes(junit_xml("mirotwin conform", cases, properties))
     if lost is not None:
         raise lost
-    wrong = any(one.failures or one.cause for one in outcomes)
-    judged = any(one.verdict == "passed" for one in outcomes)
-    code = EXPECTATION_FAILED if wrong else DONE if judged else NOTHING_JUDGED
-    return _report_faults(outcomes) or code
+    return code or VERDICTS[worst(_counting(one, bool(options.ids)) for one in outcomes)].code
 
 
-def _tell(
-    outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions, properties: dict[str, str]
-) -> None:
-    if options.junit is not None:
-        with whole_file(options.junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin conform", list(map(_test_case, outcomes)), properties))
+def _counting(outcome: Outcome, named: bool) -> Verdict:
+    """The verdict that counts for the exit code: that a rule is not judged does only where somebody has named it."""
+    return "not observable" if outcome.verdict == "not judged" and not named else outcome.verdict
+
+
+def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
+    """Leaves the cases of a rule; "" or why it cannot, for when all verdicts are told."""
+    try:
+        for name, text in outcome.cases:
+            write_case(artifacts / name, text)
+            leave_image(artifacts, firmware)
+    except (OSError, BadInput) as error:
+        return nothing_left(artifacts, error)
+    return ""
+
+
+def _tell(outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions) -> None:
     if options.as_json:
         _print_json(outcomes)
         return
@@ -227,14 +241,15 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     show(table)
 
 
-def _test_case(outcome: Outcome) -> TestCase:
-    """Without a time: the same image gives the same bytes."""
+def _test_case(outcome: Outcome, named: bool) -> TestCase:
+    """Without a time: the same image gives the same bytes. `named`: somebody asked for this rule."""
     rule = find(outcome.rule)
     case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
     cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
     if because := cause or outcome.why:
         because = f"{outcome.verdict}: {because}"
-        return msgspec.structs.replace(case, verdict="skipped", lines=(because,))
+        verdict = "skipped" if outcome.cause else VERDICTS[_counting(outcome, named)].junit
+        return msgspec.structs.replace(case, verdict=verdict, lines=(because,))
     if outcome.failures:
         lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
         return msgspec.structs.replace(case, verdict="failure", lines=lines)
@@ -291,7 +306,7 @@ def _counts(outcomes: Sequence[Outcome]) -> str:
 
 def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:
     """The line that gives each failure again, and the one that makes a page of the first."""
-    names = [name for outcome in outcomes for name, _ in outcome.cases]
+    names = [name for outcome in outcomes for name, _ in outcome.cases if (artifacts / name).exists()]
     own = not (artifacts / FIRMWARE).exists()
     for name in names:
         for line in case_lines(f"{artifacts}", own, name):

@@ -26,6 +26,7 @@ from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
+from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
@@ -58,7 +59,7 @@ class Outcome(msgspec.Struct, frozen=True):
     unsure: str = ""
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         if self.failures:
             return "failed"
         return "not judged" if self.cause or self.unsure else "not observable" if self.unseen else "passed"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 
@@ -17,19 +17,19 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.program import show_traceback
-from mirotwin.verify.cases.artifacts import clear, leave, report_line
+from mirotwin.shell.verdicts import VERDICTS, Verdict
+from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text, is_case
 from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import failure_lines
+from mirotwin.verify.expectations import expectation_lines, verdict_of_run
 from mirotwin.verify.steps.keys import ConditionStep, WaitStep
 from mirotwin.verify.steps.player import Player, check_symbols
 from mirotwin.verify.steps.reading import everything, steps_of
 
-Verdict = Literal["passed", "failed", "fault", "error", "not observable"]
 SCENARIO = "scenario.toml"
 """The whole scenario with all that was set, in the folder of a file that failed."""
 
@@ -79,16 +79,14 @@ def outcome_of(
 ) -> Outcome:
     """What `run` makes of the file and of its folder below `artifacts`, which holds nothing of an earlier run."""
     folder = None if artifacts is None else folder_of(artifacts, path)
-    try:
-        if folder is not None:
+    if folder is not None:
+        with suppress(OSError, BadInput):  # who leaves something there says why nothing can be left
             clear(folder, SCENARIO)
+    try:
         return run(folder)
-    except (DomainError, PluginError) as error:
+    except (DomainError, PluginError, OSError) as error:
         show_traceback(error)
         what = f"cannot be run: {error}"
-        return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
-    except OSError as error:
-        what = f"cannot leave anything in {folder}: {error.strerror or error}"
         return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
     except BadInput as error:
         show_traceback(error)
@@ -120,18 +118,25 @@ def _run(
     player.finish()
     checks.finish()
     lines, notes = said_of(player, checks)
-    command = again(bool(saving))
+    command, verdict, left = again(bool(saving)), verdict_of_run(checks, player), False
     if folder is not None and trace is not None:
-        keep_saved(player, folder)
-        if lines:
-            report = "".join(
-                f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), command)
-            )
-            case = case or (case_of_checks(world, trace, checks) if checks.failures else None)
-            leave(folder, report, case, case_text(world, trace, {}, ""), image, {SCENARIO: text.text})
+        try:
+            keep_saved(player, folder)
+            if lines:
+                report = "".join(
+                    f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), command)
+                )
+                case = case or (case_of_checks(world, trace, checks) if checks.failures else None)
+                leave(folder, report, case, case_text(world, trace, {}, ""), image, {SCENARIO: text.text})
+                left = True
+        except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
+            notes += (nothing_left(folder, error),)
+            verdict = "error" if saving and not lines else verdict
+            with suppress(OSError, BadInput):
+                clear(folder, SCENARIO)
     return Outcome(
         path=path,
-        verdict="fault" if world.faults else "failed" if lines else "passed",
+        verdict=verdict,
         lines=lines,
         notes=notes,
         done=player.done,
@@ -140,7 +145,7 @@ def _run(
         seed=seed,
         digest=world.digest,
         firmware_sha256=image.sha256 or "",
-        left=str(folder) if folder is not None and lines else "",
+        left=str(folder) if left else "",
         left_out=text.notes,
         again=command,
     )
@@ -153,7 +158,7 @@ def folder_of(artifacts: Path, path: str) -> Path:
 
 
 def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Failures, and what was not judged, one line each: faults, the step, the checks in the order of their begin."""
+    """What is wrong, and what else to say, one line each: faults, the step, the checks in the order of their begin."""
     lines = [
         f"firmware fault: net{robot.network}/robot{robot.slot}: {fault}"
         for robot in player.world.robots
@@ -161,9 +166,9 @@ def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str,
     ]
     if player.failure is not None:
         lines.append(f"step failed: {player.failure}")
-    found = [one for group in (checks, *player.checks) for one in failure_lines(group)]
-    lines += [line for failed, line in found if failed]
-    return tuple(lines), tuple(line for failed, line in found if not failed)
+    found = [one for group in (checks, *player.checks) for one in expectation_lines(group)]
+    wrong = [line for verdict, line in found if VERDICTS[verdict].junit == "failure"]
+    return (*lines, *wrong), tuple(line for _, line in found if line not in wrong)
 
 
 def stem_of(path: str) -> str:

@@ -275,3 +275,15 @@ def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
     with pytest.raises(BadInput, match="cannot be imported: AttributeError"):
         check_named("absent")
     sys.modules.pop("their_check")
+
+
+def test_a_case_of_a_fault_finds_it_in_a_build_that_comes_to_it_later(tmp_path):
+    slower = SLEEPS.replace("LJMP 4000h", "MOV R7,#0FFh\nDJNZ R7,$\nLJMP 4000h")
+    _, again = rerun_bare_case(case(tmp_path, b"ab!"), image(slower))
+    assert (again.verdict, again.lines[0].partition(":")[0]) == ("fault", "still fails, but not as recorded")
+
+
+def test_a_stream_ends_where_it_says_also_before_its_last_line(tmp_path):
+    said = [Transmission(5000, DOWN, b"a"), Transmission(100_000, DOWN, b"!")]
+    found, verdict = rerun_bare_case(stream_of(tmp_path, said, 50_000), image(SLEEPS))
+    assert (verdict.verdict, found.end_tick) == ("passed", 50_000)

@@ -188,7 +188,7 @@ def test_a_check_without_an_occasion_is_named(mirotwin, short, tmp_path):
     options = ("--no-figure", "--out", tmp_path / "run", "--expect", "failsafe_stop_ms=true")
     code, out, err = mirotwin("run", short, *options)
     said = "mirotwin: expectation not judged: failsafe_stop_ms: the run had no occasion for it\n"
-    assert (code, err) == (0, said)
+    assert (code, err) == (1, said)
     assert "failsafe_stop_ms not judged" in out
 
 

@@ -31,8 +31,8 @@ def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin):
 def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_path):
     built_in(tmp_path, *MISTAKES["stops 15 ms late"][:3])
     image = tmp_path / "out" / "miro.ihx"
-    (tmp_path / "out" / "miro.map").unlink()
-    (tmp_path / "out" / "miro.cdb").unlink()
+    for suffix in (".map", ".cdb", ".rst"):
+        image.with_suffix(suffix).unlink()
     folder = tmp_path / "cases"
     code, out, err = mirotwin("conform", image, "--rule", "P29", "--rule", "P02", "--artifacts", folder)
     assert (code, err) == (1, "")
