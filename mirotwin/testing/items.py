@@ -20,7 +20,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.cases.artifacts import case_lines, clear, leave, report_line
+from mirotwin.verify.cases.artifacts import case_lines, clear, leave, nothing_left, report_line
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.cases.rerun import case_of_expect
@@ -43,13 +43,20 @@ def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
 
 
 def judge(item: pytest.Item) -> None:
-    """Fails the test by the checks that failed."""
+    """Fails the test by the checks that failed, and by those that it names and that had no occasion."""
+    rig = item.stash[RIG]
     try:
-        said = "\n".join(f"check failed: {one}" for one in item.stash[RIG].judge())
+        said = [f"check failed: {one}" for one in rig.judge()]
     except BadInput as error:  # a check of the user's own that breaks
-        said = str(error)
+        pytest.fail(f"{error}", pytrace=False)
+    for one in rig.unjudged():
+        line = f"check {one.verdict}: {one.name}: {one.reason}"
+        if one.verdict == "not observable":
+            item.add_report_section("call", "mirotwin", line)
+        else:
+            said.append(line)
     if said:
-        pytest.fail(said, pytrace=False)
+        pytest.fail("\n".join(said), pytrace=False)
 
 
 def at_the_tests_line(item: pytest.Item, error: ValueError | TimeoutError) -> BaseException:
@@ -86,29 +93,51 @@ def tell(
     report.user_properties += list(facts.items())
     item.user_properties += list(facts.items())  # JUnit takes them with the report of the teardown
     folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
+    text = ""
+    if report.failed:
+        text = story(rig, failures, [again], _failed_at(item, report, failures))
     if folder is not None:
-        clear(folder, SUMMARY)
-    if not report.failed:
-        return
+        try:
+            clear(folder, SUMMARY)
+            if report.failed:
+                text = _leave(item, report, caught, folder, [again], failures)
+        except (OSError, BadInput) as error:  # the failure is shown, whatever becomes of its files
+            text = f"{text}\n{nothing_left(folder, error)}"
+            with suppress(OSError, BadInput):
+                clear(folder, SUMMARY)
+            pages = False
+    if text:
+        report.sections.append(("mirotwin", text.lstrip("\n")))
+    if pages and report.failed and folder is not None and not rig.written:
+        from mirotwin.report.report_command import leave_page  # loads readers of recordings
+
+        try:
+            leave_page(folder, item.nodeid)
+        except (OSError, ValueError) as error:  # also where Bokeh is missing
+            report.sections.append(("mirotwin", f"no page: {error}"))
+
+
+def _leave(
+    item: pytest.Item,
+    report: pytest.TestReport,
+    caught: pytest.ExceptionInfo[BaseException] | None,
+    folder: Path,
+    lines: Sequence[str],
+    failures: Sequence[Failure],
+) -> str:
+    """Writes the folder of a failed test; the story, with the commands that read it. Raises OSError."""
+    rig = item.stash[RIG]
     case = case_of(rig, failures, None if caught is None else caught.value)
-    lines, page = [again], ""
-    if folder is not None:
-        where = f"{_relative(item.config, folder)}"
-        lines += [] if case is None else case_lines(where, foreign_path(rig.options.image) is None)
-        page = "" if rig.written else f"\n{report_line(where)}"
-    text = story(rig, failures, lines) + page
-    report.sections.append(("mirotwin", text))
-    if folder is None:
-        return
+    where = f"{_relative(item.config, folder)}"
+    more = [] if case is None else case_lines(where, foreign_path(rig.options.image) is None)
+    text = story(rig, failures, [*lines, *more], _failed_at(item, report, failures))
+    if not rig.written:
+        text += f"\n{report_line(where)}"
     sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
     leave(folder, text + "\n", case, sent, rig.options.image, others)
-    if pages and not rig.written:
-        from mirotwin.report.report_command import leave_page  # loads readers of recordings
-
-        with suppress(ValueError):  # a report of a failure does not fail, nor where Bokeh is missing
-            leave_page(folder, item.nodeid)
+    return text
 
 
 def let_go(item: pytest.Item) -> None:
@@ -147,13 +176,23 @@ def test_line(nodeid: str, seed: int, firmware: str | None) -> str:
 test_line.__test__ = False  # type: ignore[attr-defined]
 
 
-def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str]) -> str:
-    """The section of a report: what ran, which checks failed, the last events, and `lines` to reproduce it."""
+def _failed_at(item: pytest.Item, report: pytest.TestReport, failures: Sequence[Failure]) -> list[str]:
+    """The assertion that failed and its place; where checks made the test fail, they stand in its story."""
+    crash = getattr(report.longrepr, "reprcrash", None)
+    if crash is None:
+        return [] if failures else [f"failed: {report.longreprtext}"]
+    place = os.path.relpath(crash.path, item.config.invocation_params.dir)
+    return [f"failed: {place}:{crash.lineno}: {crash.message}"]
+
+
+def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str], failed_at: Sequence[str] = ()) -> str:
+    """The section of a report: what ran, what failed where, the last events, and `lines` to reproduce it."""
     image, world = rig.options.image, rig.world
     text = [
         f"scenario {rig.options.scenario.name}, seed {rig.options.seed}, {at(rig.tick)}",
         f"firmware {image.path.name}, {image.sha256[:12]}",
         f"digest {world.digest}",
+        *failed_at,
         *(f"check failed: {one}" for one in failures),
         "last events:",
         *(f"  {line}" for line in rig.last_events() or ["nothing"]),

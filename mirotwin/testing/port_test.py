@@ -6,19 +6,21 @@ out without changing what follows: the test ends there. Neither passes; they are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_sim.scenario.file import load
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import SEEN, NotObservable, RobotPort, check_observable
-from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.replay.replay_port import twin_source
 from mirotwin.shell.outputs import RECORDING, whole_file
+from mirotwin.verify.cases.artifacts import nothing_left
 from mirotwin.verify.steps.keys import CheckStep, ConditionStep, PauseStep, SaveStep, Send, Step, StreamStep
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import everything, steps_of
@@ -63,16 +65,25 @@ def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], fo
     notes += [f"expectation {name}: {NOTED}" for name in text.scenario.expect]
     before_switch = takewhile(lambda step: isinstance(step, _PASSED_OVER) or not unseen(step), steps)
     playable = [step for step in before_switch if not unseen(step)]
-    with ExitStack() as files, RobotPort(desk, text.scenario, path) as port:
-        port.greet()
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            part = files.enter_context(whole_file(folder / RECORDING, "--artifacts"))
-            stream = files.enter_context(part.open("wb"))
-            port.recorder = files.enter_context(Recorder(stream, twin_source(text.scenario, 0, image)))
-        player = Player(cast("World", port), playable, path)  # which asks of it what a PC can see
-        player.play()
-        tick = port.tick
+    with ExitStack() as files:
+        with RobotPort(desk, text.scenario, path) as port:
+            port.greet()
+            if folder is not None:
+                try:
+                    port.recorder = files.enter_context(
+                        _recorder(folder, twin_source(text.scenario, 0, image))
+                    )
+                except (OSError, BadInput) as error:
+                    notes.append(nothing_left(folder, error))
+                    folder = None
+            player = Player(cast("World", port), playable, path)  # which asks of it what a PC can see
+            player.play()
+            tick = port.tick
+        try:
+            files.close()
+        except (OSError, BadInput) as error:
+            notes.append(nothing_left(folder or Path(), error))
+            folder = None
     lines = () if player.failure is None else (f"step failed: {player.failure}",)
     judged = any(isinstance(step, ConditionStep) for step in player.steps[: player.done])
     return Outcome(
@@ -87,3 +98,15 @@ def _run(path: str, image: Image, desk: DeskOptions, settings: Sequence[str], fo
         left_out=text.notes,
         unseen=len(steps) - len(playable) + len(text.scenario.expect),
     )
+
+
+@contextmanager
+def _recorder(folder: Path, source: RunSource) -> Iterator[Recorder]:
+    """The recording below a folder of artifacts, whole or not there. Raises OSError, OutputError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (
+        whole_file(folder / RECORDING, "--artifacts") as part,
+        part.open("wb") as stream,
+        Recorder(stream, source) as recorder,
+    ):
+        yield recorder

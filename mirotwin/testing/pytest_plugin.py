@@ -11,6 +11,7 @@ Sessions that use none of it import nothing else of ours.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,7 +114,7 @@ def _check_options(config: pytest.Config) -> None:
     if number_option(config, "seed", 0) < 0:
         raise pytest.UsageError(f"--mirotwin-seed: {number_option(config, 'seed', 0)}: give 0 or more")
     artifacts = path_option(config, "artifacts")
-    if artifacts is not None and artifacts.exists() and not artifacts.is_dir():
+    if artifacts is not None and os.path.exists(artifacts) and not os.path.isdir(artifacts):
         raise pytest.UsageError(f"--mirotwin-artifacts: {artifacts} is no folder")
     firmware = path_option(config, "firmware")
     if firmware is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from miro_exact.bad_input import BadInput
 from miro_robot.firmware import source_folder
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.counters import Counters
@@ -35,6 +36,7 @@ class FirmwareCoverage:
         self.wanted: float = config.getoption("--firmware-coverage-fail-under") or 0.0
         self.from_workers: list[Counts] = []
         self.counters = Counters()
+        self.problem = ""
         try:
             self.image = load_firmware(config.getoption("--firmware-image"))
             check_file(self.out, "--firmware-coverage", self.image.path)
@@ -54,8 +56,14 @@ class FirmwareCoverage:
         if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
             counts = counts_of(self.counters)
             session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
-        elif session.exitstatus == pytest.ExitCode.OK and self._too_few():
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+            return
+        try:
+            write(self._report.tracefile, self._report, self.out, "--firmware-coverage")
+        except (OSError, BadInput) as error:
+            self.problem = f"cannot be written: {error}"
+        if session.exitstatus == pytest.ExitCode.OK and (self.problem or self._too_few()):
+            failed, usage = pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.USAGE_ERROR
+            session.exitstatus = usage if self.problem else failed
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
@@ -66,8 +74,8 @@ class FirmwareCoverage:
         if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
             return
         report = self._report
-        write(report.tracefile, report, self.out, "--firmware-coverage")
-        terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
+        what = self.problem or f"written to {self.out}"
+        terminalreporter.section(f"coverage of {self.image.path.name}, {what}")
         console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
         with console.capture() as capture:
             console.print(table(report.tracefile))

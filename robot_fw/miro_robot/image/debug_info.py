@@ -168,7 +168,7 @@ NAMES = (".map", ".cdb")
 
 
 def debug_files(image: Path, stem: str) -> dict[str, Path]:
-    """All files that name things in an image, each by the name under which a copy of the image, `stem`.ihx, finds it."""
+    """All files that name things in an image, by the names under which they belong to a copy of it, `stem`.ihx."""
     found = {f"{stem}{suffix}": image.with_suffix(suffix) for suffix in NAMES}
     link_map = read_text(image.with_suffix(".map"))
     modules = set(map(_name, map_modules(link_map)))
