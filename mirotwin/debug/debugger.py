@@ -114,6 +114,15 @@ class Debugger:
             note = "no instruction is known to begin there"
         return self._added(place, addresses, condition, count, note=note)
 
+    def _refuse_unknown(self, condition: str, addresses: Collection[int]) -> None:
+        """Raises NoValue for a condition that has no value at any of the addresses: it would never be true."""
+        for at, address in enumerate(addresses, 1):
+            try:
+                return self.moment().refuse(condition, address)
+            except NoValue:
+                if at == len(addresses):
+                    raise
+
     def watch(
         self, text: str, condition: str = "", count: str = "", place: Value | None = None
     ) -> Breakpoint:
@@ -125,6 +134,8 @@ class Debugger:
         self, text: str, addresses: Collection[int], condition: str, count: str, **more: Any
     ) -> Breakpoint:
         term = expression(condition, self.symbols.known) if condition else None
+        if not more.get("written"):
+            self._refuse_unknown(condition, addresses)
         counts = _counting(count) if count else None
         self._numbers += 1
         whole = f"{text} if {condition}" if condition else text

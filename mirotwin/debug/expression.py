@@ -69,6 +69,15 @@ def expression(text: str, known: Collection[str] = ()) -> Term:
     return term
 
 
+def names_in(text: str) -> list[tuple[str, str]]:
+    """(module or "", name) of what an expression looks up."""
+    tokens = _TOKEN.findall(text)
+    pairs = [(token.rpartition(":"), before) for token, before in zip(tokens, ["", *tokens], strict=False)]
+    return [
+        (word[0], word[2]) for word, before in pairs if word[2].isidentifier() and before not in (".", "->")
+    ]
+
+
 def content(value: Value) -> Any:
     """What it holds: int, float, bool, list, dict. Raises BadInput for bytes of a memory that is not there."""
     if value.members is not None:

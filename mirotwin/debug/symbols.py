@@ -10,25 +10,29 @@ from pathlib import PureWindowsPath as AnyPath
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image import Image
-from miro_robot.image.c_types import CType
-from miro_robot.image.debug_info import DebugInfo, Sources
-from miro_robot.image.registers import RegisterVariable, parse_blocks
+from miro_robot.image.c_types import CType, value_of
+from miro_robot.image.debug_info import DebugInfo, Function, Sources
+from miro_robot.image.registers import STACK, LocalVariable, parse_blocks
 from miro_robot.image.symbol_files import SourceLine, map_overlays, read_text
 from miro_robot.image.variables import Variable, variables_of
+from miro_robot.inspect.data_flow import Callees
 from miro_robot.inspect.frames import StackFrame, Unwinder
 from miro_robot.inspect.listing import ListingRow, rows
+from miro_robot.inspect.local_places import LocalPlaces
+from miro_robot.inspect.stack_depth import StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.tap import CpuTap, port_pins
 from miro_robot.inspect.values import bytes_at
 from miro_robot.inspect.writes import instructions_of
 from miro_robot.lm629.chip import Lm629
 from miro_robot.mcs51.opcodes import BITS, SFRS
-from mirotwin.debug.expression import NoValue, Value, content
+from mirotwin.debug.expression import NoValue, Value, names_in
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
 _BYTE, _BIT = CType("int", 1), CType("bit", 1)
 SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
+_REGISTER_NAMES = {SFRS["ACC"]: "A", **{SFRS[name]: name for name in ("B", "DPL", "DPH")}}
 _MEMORIES = ("iram", "xram", "code")
 SPECIAL = ("A", "DPTR", "PC", "lm629", "pins", "tick", "cycle", *(f"R{number}" for number in range(8)))
 _CHIP = {
@@ -51,6 +55,7 @@ class Symbols:
         self.unwinder = Unwinder(image, self.names)
         self.variables = variables_of(image)
         self.blocks = parse_blocks(read_text(image.path.with_suffix(".cdb")))
+        self._callees, self._places = Callees(StackReader(image)), dict[int, LocalPlaces]()
         self.overlays = map_overlays(read_text(image.path.with_suffix(".map")))
         self.line_begins = {at: line for at, line in self.debug.lines if self.line(at) is not None}
         functions = [first for first, _ in self.names.functions]
@@ -106,6 +111,14 @@ class Symbols:
         address = address_of(text, self.image, str(self.image.path), "")
         return [address], self.line(address)
 
+    def local_places(self, function: Function) -> LocalPlaces:
+        """Where the local variables of a function are."""
+        if function.first not in self._places:
+            self._places[function.first] = LocalPlaces(
+                self.image, self.debug, self.blocks, self.variables, self._callees, function
+            )
+        return self._places[function.first]
+
     @cached_property
     def listing(self) -> list[ListingRow]:
         """The image's instructions and tables in the order of addresses."""
@@ -135,9 +148,11 @@ class Moment:
         symbol = self.symbols.image.symbols.find(name)
         if symbol is None:
             owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
+            placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
             remedy = did_you_mean(name, self.symbols.known)
-            if owners:
-                remedy = f"it is a local variable of {', '.join(sorted(owners))}"
+            if owners | placed:
+                remedy = f"it is a local variable of {', '.join(sorted(owners | placed))}"
+                remedy += f"; give {min(placed)}:{name}" if placed else ""
             elif name == "lm629":
                 remedy = "it is a robot's, and this is the bare processor"
             raise NoValue(f"there is no {name} here", remedy)
@@ -148,11 +163,21 @@ class Moment:
         kind = _BIT if symbol.space == "bit" else _BYTE
         return Value(kind, symbol.space, symbol.address, self, note="of unknown type")
 
+    @property
+    def _function(self) -> str:
+        """The name of the C function that it stands in, "" outside of these."""
+        places = self._places()
+        return "" if places is None else places.name
+
     def _variable(self, name: str, module: str) -> Variable | None:
         """The one of this file before that of all files. Raises NoValue where several others have it."""
         line = self.symbols.line(self.pc)
         own = AnyPath(line.file).stem if line else ""
         there = self.symbols.variables.by_name.get(name, ())
+        if not module:
+            there = tuple(
+                one for one in there if one.scope in ("", one.module) or one.scope == self._function
+            )
         fitting = [one for one in there if not module or module in (one.scope, one.module)]
         near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
         if there and not near and len(fitting) != 1:
@@ -166,6 +191,11 @@ class Moment:
         """What a variable with a place means. Raises NoValue where others use the place."""
         if variable.space == "iram" and variable.scope:
             self._refuse_shared(variable.name, variable.address, variable.scope)
+        places = self._places()
+        if places is not None and variable.scope == places.name:
+            where = self._arrived(places, variable)
+            if where:
+                return self._in_registers(places, variable.name, variable.type, where)
         fields = self.symbols.variables.fields(variable)
         return Value(variable.type, variable.space, variable.address, self, fields=fields)
 
@@ -179,34 +209,88 @@ class Moment:
 
     def locals(self) -> dict[str, Callable[[], Value]]:
         """Of the function that it stands in; what is not live raises NoValue when it is asked for."""
-        function = self.symbols.debug.function_at(self.pc)
-        if function is None:
+        places = self._places()
+        if places is None:
             return {}
-        name = function.name.removeprefix("_")
-        inner_last = reversed(self.symbols.blocks.visible(name, function.first, self.pc))
-        return self.variables(name) | {one.name: partial(self._in_registers, one) for one in inner_last}
+        inner_last = reversed(places.visible(self.pc))
+        in_memory = self.variables(places.name, places.module)
+        return in_memory | {one.name: partial(self._local, places, one) for one in inner_last}
 
-    def variables(self, scope: str) -> dict[str, Callable[[], Value]]:
-        """Those of a function or a file that have a place in memory, or "" of all; by name."""
+    def _places(self) -> LocalPlaces | None:
+        """Of the function that it stands in."""
+        function = self.symbols.debug.function_at(self.pc)
+        return None if function is None else self.symbols.local_places(function)
+
+    def variables(self, scope: str, module: str = "") -> dict[str, Callable[[], Value]]:
+        """Those of a function or a file that have a place in memory, or "" of all; by name.
+
+        `module`: the file whose function is meant where several have one of this name.
+        """
         every = (one for _, each in sorted(self.symbols.variables.by_name.items()) for one in each)
-        own = (one for one in every if one.scope == scope)
+        own = sorted((one for one in every if one.scope == scope), key=lambda one: one.module == module)
         return {one.name: partial(self.placed, one) for one in own if scope or one.space in _MEMORIES}
 
-    def _in_registers(self, one: RegisterVariable) -> Value:
-        why = ""
-        if one.on_stack:
-            why = "it is on the stack, and no debug file says where"
-        elif not one.registers:
-            why = "it was optimised away"
-        elif self.frame:
-            why = "its registers belong to the function that is called"
-        if why:
-            raise NoValue(f"{one.name} is not live: {why}")
-        registers = [self._special(name.upper()) for name in one.registers]
-        data = bytes(content(register) for register in registers if register is not None)
-        number = int.from_bytes(data, "little", signed=one.type.signed and one.type.kind == "int")
-        where = " ".join(one.registers[::-1]).upper()
-        return Value(one.type, number=number, note=f"in {where}: theirs only while the compiler needs it")
+    def refuse(self, text: str, address: int) -> None:
+        """Raises NoValue for an expression with a local variable that has no value wherever `address` is executed."""
+        there = Moment(self.symbols, self.core)
+        there.pc = address
+        for module, name in names_in(text):
+            if not module and there._is_lost(name) and (local := there.locals().get(name)):
+                local()
+
+    def _is_lost(self, name: str) -> bool:
+        """Whether it cannot be told from the code where a local variable is."""
+        places = self._places()
+        if places is None:
+            return False
+        for one in places.visible(self.pc):
+            if one.name == name:
+                return one.storage != STACK and isinstance(places.of(one, self.pc), str)
+        there = self.symbols.variables.by_name.get(name, ())
+        own = [one for one in there if one.scope == places.name]
+        return any(isinstance(self._arrived(places, one), str) for one in own)
+
+    def _arrived(self, places: LocalPlaces, one: Variable) -> tuple[int, ...] | str:
+        memory = range(one.address, one.address + one.type.size)
+        return places.in_memory(one.name, memory, one.space == "iram", self.pc)
+
+    def _local(self, places: LocalPlaces, one: LocalVariable) -> Value:
+        """A local variable in registers or on the stack."""
+        if one.storage == STACK:
+            return self._on_stack(places, one)
+        where = places.of(one, self.pc)
+        if self.frame and not isinstance(where, str):
+            where = "its registers belong to the function that is called"
+        home = " ".join(one.registers[::-1]).upper()
+        remedy = f"its home is {home}: print what that holds" if home else ""
+        return self._in_registers(places, one.name, one.type, where, remedy)
+
+    def _in_registers(
+        self, places: LocalPlaces, name: str, kind: CType, where: tuple[int, ...] | str, remedy: str = ""
+    ) -> Value:
+        """`where`: its bytes, or why they cannot be told. Raises NoValue for that."""
+        cpu = self.core.cpu
+        if (
+            not isinstance(where, str)
+            and cpu.bank != 8 * places.bank
+            and any(place < 0x80 for place in where)
+        ):
+            where = "another register bank is selected"
+        if isinstance(where, str):
+            raise NoValue(f"{name} is not live: {where}", remedy)
+        data = bytes(cpu.sfr(place) if place >= 0x80 else cpu.peek_iram(place) for place in where)
+        names = [_REGISTER_NAMES.get(place, f"R{place & 7}") for place in where[::-1]]
+        return Value(kind, number=value_of(kind, data, {}), note=f"in {' '.join(names)}")
+
+    def _on_stack(self, places: LocalPlaces, one: LocalVariable) -> Value:
+        frame = self.frames()[self.frame]
+        height = self.symbols.unwinder.heights.get(frame.pc, (-1, -1))[0]
+        if not places.has_frame or frame.entry != places.function.first or height < 0:
+            raise NoValue(f"{one.name} is not live: it is on the stack, and no debug file says where")
+        if one.offset > 0 and height < one.offset + one.type.size:
+            raise NoValue(f"{one.name} is not live: it has no place on the stack yet")
+        fields = self.symbols.variables.structs.get(places.module, {})
+        return Value(one.type, "iram", frame.base + 1 + one.offset, self, fields=fields)
 
     def _special(self, name: str) -> Value | None:
         """A register, a bit, a memory, the chips."""

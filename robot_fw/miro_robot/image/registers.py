@@ -15,37 +15,62 @@ import msgspec
 from miro_robot.image.c_types import MOST_BYTES, CType, type_of
 
 _KEPT = 32
+STACK = "B"  # storage, as the debug file has it; R: registers
 _LOCAL = re.compile(
-    r"^S:L(?:[\w.]*\.)?(\w+)\$(\w+)\$([0-9]{1,4})_[0-9]+\$([0-9]{1,6})"
-    r"\(\{([0-9]{1,6})\}([^():]*):([SU])\),([RB]),[0-9],-?[0-9]+(?:,\[([\w,]*)\])?"
+    r"^S:L(?:([\w.]*)\.)?(\w+)\$(\w+)\$([0-9]{1,4})_[0-9]+\$([0-9]{1,6})"
+    r"\(\{([0-9]{1,6})\}([^():]*):([SU])\),([A-Z]),[0-9],(-?[0-9]{1,3})(?:,\[([\w,]*)\])?"
 )
+_FUNCTION = re.compile(r"^F:(?:G|F(\w+))\$(\w+)\$[^(]*\(.*\),[A-Z],-?[0-9]+,-?[0-9]+,[0-9]+,[0-9]+,([0-3])$")
 _LINE = re.compile(r"^L:C\$[^$]+\$[0-9]+\$([0-9]{1,4})_[0-9]+\$([0-9]{1,6}):([0-9A-F]{1,8})$")
 
 
-class RegisterVariable(msgspec.Struct, frozen=True):
-    """`registers`: `r7`, `dpl`, .., low byte first; none where it was optimised away. `on_stack`: it lies there."""
+class LocalVariable(msgspec.Struct, frozen=True):
+    """`registers`: `r7`, `dpl`, .., low byte first; none where it was optimised away. `offset`: from the frame pointer,
+    where `storage` is STACK.
+    """
 
     name: str
+    module: str
     function: str
     level: int
     block: int
     type: CType
+    storage: str
     registers: tuple[str, ...]
-    on_stack: bool
+    offset: int
 
 
 class Blocks(msgspec.Struct, frozen=True, eq=False):
-    """Of one debug file. `places`: (address, level, block) where the code of a block begins or goes on, by address."""
+    """Of one debug file. `places`: (address, level, block) where the code of a block begins or goes on, by address.
+    `banks`: of a function's registers, by its name and its module, which is "" where it is not static.
+    """
 
-    variables: tuple[RegisterVariable, ...]
+    variables: tuple[LocalVariable, ...]
     places: tuple[tuple[int, int, int], ...]
+    banks: dict[tuple[str, str], int]
 
-    def visible(self, function: str, first: int, address: int) -> list[RegisterVariable]:
-        """Those of a function, which begins at `first`, that the C of an instruction could name; inner ones first."""
-        own = [one for one in self.variables if one.function == function]
+    def bank(self, name: str, module: str) -> int:
+        """The number of the register bank that a function was compiled for."""
+        return self.banks.get((name, module), self.banks.get((name, ""), 0))
+
+    def of_function(self, name: str, module: str) -> list[LocalVariable]:
+        """Those of a function; `module` tells static functions of the same name apart."""
+        own = [one for one in self.variables if one.function == name]
+        alike = len({one.module for one in own}) < 2
+        return own if alike else [one for one in own if one.module == module]
+
+    def parameters(self, own: list[LocalVariable], first: int, end: int) -> list[LocalVariable]:
+        """Those of `own` that are parameters of a function: their block is the one before its body's."""
+        begin, after = (bisect.bisect_left(self.places, (address, 0, 0)) for address in (first, end))
+        bodies = [(address, block) for address, level, block in self.places[begin:after] if level <= 1]
+        _, body = min(bodies, default=(0, 0))  # of a function of one line, only its end is recorded
+        return [one for one in own if one.level <= 1 and one.block < body]
+
+    def visible(self, own: list[LocalVariable], first: int, address: int) -> list[LocalVariable]:
+        """Those of `own`, in registers or on the stack, that the C of an instruction could name; inner ones first."""
         around = self._around(first, address)
         seen = [one for one in own if one.level <= 1 or one.block in around]
-        return sorted(seen, key=lambda one: -one.level)
+        return sorted((one for one in seen if one.storage in "RB"), key=lambda one: -one.level)
 
     def _around(self, first: int, address: int) -> set[int]:
         """The blocks around an instruction: the one before with a lower level is the next outer one."""
@@ -66,19 +91,21 @@ class Blocks(msgspec.Struct, frozen=True, eq=False):
 @lru_cache(_KEPT)
 def parse_blocks(text: str) -> Blocks:
     """From a debug file's text; records that are damaged or of an unknown type are left out."""
-    variables, places = [], []
+    variables, places, banks = [], [], {}
     for line in text.splitlines():
         if found := _LOCAL.match(line):
-            kind = type_of(found[6], int(found[5]), found[7] == "S")
-            if kind is not None and not re.fullmatch(r"sloc[0-9]+", found[2]):
-                registers = tuple(found[9].split(",")) if found[9] else ()
-                sound = len(registers) in (0, kind.size)
-                where = registers if sound else ()
+            kind = type_of(found[7], int(found[6]), found[8] == "S")
+            if kind is not None and not re.fullmatch(r"sloc[0-9]+", found[3]):
+                registers = tuple(found[11].split(",")) if found[11] else ()
+                where = registers if len(registers) == kind.size else ()
+                level, block, offset = int(found[4]), int(found[5]), int(found[10])
                 variables.append(
-                    RegisterVariable(
-                        found[2], found[1], int(found[3]), int(found[4]), kind, where, found[8] == "B"
+                    LocalVariable(
+                        found[3], found[1] or "", found[2], level, block, kind, found[9], where, offset
                     )
                 )
+        elif function := _FUNCTION.match(line):
+            banks[function[2], function[1] or ""] = int(function[3])
         elif (place := _LINE.match(line)) and (address := int(place[3], 16)) < MOST_BYTES:
             places.append((address, int(place[1]), int(place[2])))
-    return Blocks(tuple(variables), tuple(sorted(places)))
+    return Blocks(tuple(variables), tuple(sorted(places)), banks)

@@ -127,16 +127,19 @@ class StackReader:
             unknown |= odd
             if size > _LONGEST:  # several instructions, of which the last one moves SP
                 reached.update(dict.fromkeys(range(address, address + size, 2), at))
-            opcode = self.code[address]
-            if goes_on(opcode):
-                waiting.append((address + size, after))
-            to = self._branch(address)
-            if to is not None:
-                waiting.append((to, after))
-            if opcode == JMP_TABLE:
+            if self.code[address] == JMP_TABLE:
                 unknown.add("a jump by a table")
-                waiting += [(place, after) for place in self._table(address + size)]
+            waiting += [(place, after) for place in self.successors(address, size)]
         return {address: at.height for address, at in reached.items()}, unknown
+
+    def successors(self, address: int, size: int = 0) -> list[int]:
+        """Where it may go on after an instruction, or after `size` bytes; calls return."""
+        opcode = self.code[address]
+        size = size or LENGTH[opcode]
+        found = [address + size] if goes_on(opcode) else []
+        to = self._branch(address)
+        found += [] if to is None else [to]
+        return [*found, *self._table(address + size)] if opcode == JMP_TABLE else found
 
     def _table(self, address: int) -> Iterator[int]:
         """The jumps that follow JMP @A+DPTR one after the other, as SDCC writes a table."""

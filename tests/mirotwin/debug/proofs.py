@@ -17,11 +17,14 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import Flat
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
+from miro_robot.image.c_types import value_of
 from miro_robot.inspect.frames import Unwinder
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.watcher import Watcher, attach
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
+from mirotwin.debug.expression import content
+from mirotwin.debug.timeline import Trap
 from mirotwin.rerun.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
@@ -140,6 +143,54 @@ def compiled(folder, source, *options):
     target = Path(folder) / f"{source.stem}{''.join(options)}.ihx"
     children.run(["sdcc", "-mmcs51", "--debug", *options, str(source), "-o", str(target)], check=True)
     return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
+
+
+def arguments(run, end_tick):
+    """{function and parameter: how many calls}, and [(function, parameter, cycle, value)] where the value of an
+    argument at the entry is not that at its home, where the debug file puts it, once the function has brought it there.
+
+    What is passed on from the registers at once has no home.
+    """
+    debugger = debugger_of(run)
+    calls, wrong, due = {}, [], []
+    homes = {}
+    for function in debugger.symbols.debug.functions:
+        places = debugger.symbols.local_places(function)
+        for one in places.parameters:
+            there = debugger.symbols.variables.by_name.get(one.name, ())
+            memory = next((each for each in there if each.scope == places.name), None)
+            registers = tuple(int(name[1]) for name in one.registers)
+            home = registers or ((memory.address, memory.address + 1)[: one.type.size] if memory else ())
+            argument = places.argument
+            arrives = argument is not None and argument.name == one.name
+            after = argument.prologue[-1] if arrives else function.first
+            if home and (not arrives or places.is_brought(argument)):
+                homes.setdefault(function.first, []).append((one, home, after))
+
+    def ask(core):
+        cpu = core.cpu
+        for known in [known for known in due if known[0] == cpu.pc]:
+            due.remove(known)
+            _, name, one, home, found, cycle = known
+            data = bytes(cpu.peek_iram(place) for place in home)
+            if value_of(one.type, data, {}) != found:
+                wrong.append((name, one.name, cycle, found))
+        for one, home, after in homes.get(cpu.pc, ()):
+            name = debugger.symbols.function(cpu.pc)
+            found = content(debugger.moment().locals()[one.name]())
+            calls[name, one.name] = calls.get((name, one.name), 0) + 1
+            due.append((after, name, one, home, found, cpu.cycles))
+            if after == cpu.pc:
+                due.pop()
+                data = bytes(cpu.peek_iram(place) for place in home)
+                if value_of(one.type, data, {}) != found:
+                    wrong.append((name, one.name, cpu.cycles, found))
+        return None
+
+    places = {*homes, *(after for each in homes.values() for _, _, after in each)}
+    with debugger.timeline.interrupted_by(lambda: debugger.timeline.tick >= end_tick):
+        debugger.timeline.find({debugger.timeline.focus: Trap(places, ask)})
+    return calls, wrong
 
 
 MOVES = ("continue", "rcontinue", "step", "next", "finish", "stepi", "goto", "near", "break")

@@ -112,7 +112,7 @@ def shown(debugger, text, frame=0):
         ("cycle * 12", "tick"),
         ("A", "sfr[0xe0]"),
         ("code[PC]", "code[take_body]"),
-        ("from", "R7"),
+        ("from", "DPL"),
     ],
 )
 def test_names_mean_variables_registers_bits_chips_and_memories(debugger, text, same):

@@ -1,0 +1,270 @@
+"""Where the value of a local variable is before an instruction, or why that cannot be told.
+
+The debug file names a home for each variable and no times. Arguments arrive by the compiler's convention: the first
+one that is no bit in DPL, DPH, B, A, low byte first (SDCC manual, "Global Registers used for Parameter Passing"), the
+others in memory or on the stack. What the registers hold later is followed through the code (`data_flow`).
+
+    entry    MOV R7,DPL    ..    MOV DPL,R7    LCALL          `opcode` with the home R7
+    DPL      DPL, R7       R7    R7            nowhere: R7 is not read any more, so it may hold something else
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import PureWindowsPath as AnyPath
+
+from miro_robot.image import Image
+from miro_robot.image.debug_info import DebugInfo, Function
+from miro_robot.image.registers import STACK, Blocks, LocalVariable
+from miro_robot.image.variables import Variables
+from miro_robot.inspect.data_flow import DPH, DPL, ENTRY, SP, A, B, Callees, Effect, Flow, Held, Origin
+from miro_robot.mcs51.opcodes import SFRS
+
+_ARGUMENT = (DPL, DPH, B, A)
+_PLACES = {"dpl": DPL, "dph": DPH, "b": B, "a": A, **{f"r{number}": number for number in range(8)}}
+_FIRST_SFR, _PSW, _PUSH = 0x80, SFRS["PSW"], 0xC0
+
+
+class _Argument:
+    """The one that arrives in registers. `home`: its bytes in registers or `memory`; `prologue`: the instructions that
+    bring it there, and the one after them.
+    """
+
+    def __init__(self, name: str, home: tuple[int, ...], memory: range, prologue: list[int]) -> None:
+        self.name = name
+        self.home = home
+        self.memory = memory
+        self.prologue = prologue
+
+
+class LocalPlaces:
+    """Of one function of an image."""
+
+    def __init__(
+        self,
+        image: Image,
+        debug: DebugInfo,
+        blocks: Blocks,
+        variables: Variables,
+        callees: Callees,
+        function: Function,
+    ) -> None:
+        self.image = image
+        self.blocks = blocks
+        self.function = function
+        self.name = function.name.removeprefix("_")
+        self.module = "" if function.line is None else AnyPath(function.line.file).stem
+        self.bank = blocks.bank(self.name, self.module)
+        self.own = blocks.of_function(self.name, self.module)
+        self.parameters = blocks.parameters(self.own, function.first, function.end)
+        self.flow = Flow(callees, function.first, 8 * self.bank)
+        self.line_begins = [
+            address for address, _ in debug.lines if address in self.flow.held and address != function.first
+        ]
+        self.argument = self._argument(variables)
+
+    # The argument that arrives in registers
+
+    def _argument(self, variables: Variables) -> _Argument | None:
+        """None where there is none, or it cannot be told which one it is."""
+        found = []
+        for one in self.parameters:
+            memory = self._memory(one, variables)
+            if one.storage == STACK or one.type.kind in ("bit", "bits") or one.type.size > len(_ARGUMENT):
+                continue
+            if one.storage == "R" or (memory and not self._is_numbered(memory)):
+                found.append(self._arrives(one, memory))
+        registers = [one for one in found if not one.memory]  # where others are in memory, these cannot be
+        if not registers and len(found) > 1:
+            registers = [one for one in found if self.is_brought(one)]
+        found = registers or found
+        return found[0] if len(found) == 1 else None
+
+    @property
+    def has_frame(self) -> bool:
+        """Whether it has a frame pointer, and so all that is on the stack a known place."""
+        pointer = self.image.symbols.find("_bp")
+        code = self.image.code[self.function.first : self.function.first + 2]
+        return pointer is not None and code == bytes((_PUSH, pointer.address))
+
+    def _memory(self, one: LocalVariable, variables: Variables) -> range:
+        """Where it lies in a memory that has addresses."""
+        there = [each for each in variables.by_name.get(one.name, ()) if each.scope == self.name]
+        there = [each for each in there if each.module == self.module] or there
+        return range(there[0].address, there[0].address + one.type.size) if len(there) == 1 else range(0)
+
+    def _is_numbered(self, memory: range) -> bool:
+        """Whether the caller puts it there: `_f_PARM_2`."""
+        names = self.image.symbols.names.items()
+        return any(
+            name.startswith(f"_{self.name}_PARM_") and one.address == memory.start for name, one in names
+        )
+
+    def _arrives(self, one: LocalVariable, memory: range) -> _Argument:
+        home = tuple(self._place(register) for register in one.registers)
+        address = self.function.first
+        prologue, framing = [address], -1
+        while address in self.flow.effects and len(self.flow.after[address]) == 1:
+            does = self.flow.effects[address]
+            in_frame = does.mnemonic in ("ADD", "MOV") and self.flow.held[address][A] == {(framing, A)}
+            if SP in does.reads or in_frame:
+                framing = address
+            elif not self._brings(does, address, memory):
+                break
+            (address,) = self.flow.after[address]
+            prologue.append(address)
+        return _Argument(one.name, home if -1 not in home else (), memory, prologue)
+
+    def _brings(self, does: Effect, address: int, memory: range) -> bool:
+        """Whether an instruction does no more than to bring arguments to their homes, or to make the frame."""
+        held = self.flow.held[address]
+        if does.mnemonic == "PUSH" or SP in does.writes or does.writes == {_PSW}:
+            return True
+        if does.constant in memory or (memory and does.writes in ({DPL, DPH}, set())):
+            return does.mnemonic in ("MOV", "MOVX", "INC")
+        known = (*self.flow.places, *memory)
+        arguments = [frozenset({(ENTRY, place)}) for place in _ARGUMENT]
+        moved = [to in known and held.get(source) in arguments for to, source in does.moves]
+        return bool(moved) and all(moved) and does.mnemonic in ("MOV", "XCH")
+
+    def is_brought(self, one: _Argument) -> bool:
+        """Whether the code brings it from the registers to its home."""
+        if one.memory:
+            return any(self._names(address, one.memory) for address in one.prologue[:-1])
+        held = self.flow.held.get(one.prologue[-1])
+        return bool(one.home) and held is not None and self._holds(held, one.home)
+
+    def _place(self, register: str) -> int:
+        place = _PLACES.get(register, -1)
+        return place if place >= _FIRST_SFR or place < 0 else place + 8 * self.bank
+
+    def _holds(self, held: Held, home: Collection[int]) -> bool:
+        """Whether it is there still as it arrived."""
+        return all(held[place] == {(ENTRY, there)} for place, there in zip(home, _ARGUMENT, strict=False))
+
+    def _names(self, address: int, memory: range) -> bool:
+        """Whether an instruction reads or writes a memory, or takes its address."""
+        does = self.flow.effects[address]
+        first = self.flow.places[0]
+        pointer = (
+            does.mnemonic == "MOV" and does.constant in memory and does.writes <= {first, first + 1, DPL, DPH}
+        )
+        return pointer or not (does.reads | does.writes).isdisjoint(memory)
+
+    # Where it is
+
+    def visible(self, pc: int) -> list[LocalVariable]:
+        """Those in registers or on the stack that the C of an instruction could name; inner ones first."""
+        return self.blocks.visible(self.own, self.function.first, pc)
+
+    def of(self, one: LocalVariable, pc: int) -> tuple[int, ...] | str:
+        """The bytes of a variable in registers, low byte first, or why they cannot be told."""
+        held = self.flow.held.get(pc)
+        if held is None:
+            return "its code cannot be followed"
+        argument = self.argument
+        if argument is not None and one.name == argument.name and pc in argument.prologue:
+            return self._arrived(one, held)
+        home = self._home(one)
+        if not home or -1 in home:
+            return "it was optimised away"
+        if self.flow.live[pc].isdisjoint(home):
+            return "its value is not needed from here on"
+        if argument is not None and one.name == argument.name and self._holds(held, home):
+            return home
+        if any(address < 0 for place in home for address, _ in held[place]):
+            return "nothing was assigned to it yet"
+        if not self._may_be_of(one, home, pc):
+            return "its registers hold something else"
+        if not self._is_alone(one, home) or self._has_rival(one, home, pc):
+            return "its registers may hold another variable"
+        return home
+
+    def _has_rival(self, one: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
+        """Whether another variable may be there: one with such a home, or one for which the debug file has none.
+
+        SDCC writes for some variables what it did with them before it had done.
+        """
+        for other in self.visible(pc):
+            if other.storage == "R" and other is not one:
+                if not other.registers and other.type.size == one.type.size:
+                    return True
+                if self._shares(other, home) and self._may_be_of(other, self._home(other), pc):
+                    return True
+        return False
+
+    def _home(self, one: LocalVariable) -> tuple[int, ...]:
+        return tuple(self._place(register) for register in one.registers)
+
+    def _shares(self, other: LocalVariable, home: tuple[int, ...]) -> bool:
+        return not set(home).isdisjoint(self._home(other))
+
+    def _may_be_of(self, one: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
+        """Whether all bytes that its home holds are needed later, and at the begin of a C line that may name it.
+
+        So what the compiler keeps there within a line is not taken for it.
+        """
+        here = self.flow.held[pc]
+        needed = self.flow.live[pc].issuperset(home)
+        return needed and any(self._same(here, there, home) for there in self._kept(one, home))
+
+    def _kept(self, one: LocalVariable, home: tuple[int, ...]) -> list[Held]:
+        """What is held where a C line begins that may name it, and its home is needed later."""
+        return [
+            self.flow.held[address]
+            for address in self.line_begins
+            if self.flow.live[address].issuperset(home) and one in self.visible(address)
+        ]
+
+    def _same(self, one: Held, other: Held, home: tuple[int, ...]) -> bool:
+        return all(not one[place].isdisjoint(other[place]) for place in home)
+
+    def _is_alone(self, one: LocalVariable, home: tuple[int, ...]) -> bool:
+        """Whether its home holds one thing only that outlasts a line: then no other variable has been there."""
+        waiting = self._kept(one, home)
+        reached = waiting[:1]
+        for held in reached:
+            reached += [other for other in waiting if other not in reached and self._same(held, other, home)]
+        return len(reached) == len(waiting)
+
+    def in_memory(self, name: str, memory: range, in_ram: bool, pc: int) -> tuple[int, ...] | str:
+        """The registers where a parameter is that has a place in memory, none if it is there, or why it cannot be told.
+
+        `in_ram`: the memory is internal RAM, so that instructions name its bytes.
+        """
+        one = next((one for one in self.parameters if one.name == name), None)
+        if one is None or pc not in self.flow.held:
+            return ()
+        argument = self.argument
+        named = [address for address in self.flow.effects if self._names(address, memory)]
+        if argument is not None and argument.name == name:
+            if pc in argument.prologue[:-1]:
+                return self._arrived(one, self.flow.held[pc])
+            if pc in self.flow.reached_without(self.function.first, named):
+                return "nothing was assigned to it yet"
+        elif pc == self.function.first:
+            return ()
+        changes = in_ram and any(not self.flow.effects[address].reads & set(memory) for address in named)
+        if changes or pc in self.flow.leads_to(named):
+            return ()
+        return "its value is not needed from here on"  # which may have been changed in registers
+
+    def _arrived(self, one: LocalVariable, held: Held) -> tuple[int, ...] | str:
+        """In any of the registers, while no C line of the body has begun."""
+        found = []
+        for there in _ARGUMENT[: one.type.size]:
+            places = [place for place in self.flow.places if held[place] == {(ENTRY, there)}]
+            if not places:
+                return "its registers hold something else"
+            found.append(places[0])
+        return tuple(found)
+
+    def _outlasts_a_line(self, one: LocalVariable, home: tuple[int, ...], origins: frozenset[Origin]) -> bool:
+        """Whether what its home holds is needed where a C line begins: then it is no value of the compiler's own."""
+        for address in self.line_begins:
+            held = self.flow.held[address]
+            kept = not origins.isdisjoint(frozenset[Origin]().union(*(held[place] for place in home)))
+            if kept and not self.flow.live[address].isdisjoint(home):
+                if one in self.visible(address):
+                    return True
+        return False
