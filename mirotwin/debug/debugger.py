@@ -27,6 +27,7 @@ from mirotwin.rerun.inspected_run import RobotRun
 
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
 _BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}
+_FLAGS = 0xC5  # of PSW: CY, AC, OV, P
 _COUNTS: dict[str, Callable[[int, int], bool]] = {
     "": int.__eq__, "=": int.__eq__, "==": int.__eq__, ">": int.__gt__, ">=": int.__ge__, "<": int.__lt__,
     "<=": int.__le__, "%": lambda index, every: index % every == 0,
@@ -146,15 +147,19 @@ class Debugger:
         """Where `text` lies. Raises NoValue for what lies in no memory that is written."""
         value = place or expression(text)(self.moment())
         space, address, size = value.space, value.address, value.kind.size if value.kind else 0
+        mask = -1
+        if value.kind is not None and value.kind.kind == "bits":
+            mask = (1 << value.kind.bits) - 1 << value.kind.first_bit
         if space == "bit":
+            mask = 1 << (address & 7)
             space, address = "sfr" if address >= 0x80 else "iram", byte_of_bit(address)
         if not size or space not in ("iram", "sfr", "xram") or not 0 <= address <= SIZES[space] - size:
             raise NoValue(
                 f"{text} lies in no memory that can be watched", "name a variable: `print` says what it is"
             )
-        if space == "sfr" and address in _BY_THE_WAY:
+        if space == "sfr" and address in _BY_THE_WAY and (address != SFRS["PSW"] or mask & _FLAGS):
             raise NoValue(f"{text} changes with nearly every instruction", "watch a variable")
-        return Bytes(space, address, size)
+        return Bytes(space, address, size, mask)
 
     def _writers(self, written: Bytes) -> Collection[int]:
         """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""

@@ -308,13 +308,17 @@ def _member_of(term: Term, name: str, text: str) -> Term:
     """A member, or by a number a bit. `text` is the term's own."""
     if not name.isdecimal():
         return lambda moment: _member(term(moment), name, text)
-    index = int(name)
+    index = int(name[:9])
 
     def bit(moment: Moment) -> Value:
         value = term(moment)
         bits = 32 if value.kind is None else 1 if value.kind.kind == "bit" else 8 * value.kind.size
         if index >= bits:
-            raise NoValue(f"{text} has no bit {name}", f"give 0 to {bits - 1}")
-        return value
+            raise NoValue(f"{text} has no bit {shortened(name)}", f"give 0 to {bits - 1}")
+        if value.moment is not None and value.kind is not None and value.kind.kind == "int":
+            kind = CType("bits", value.kind.size, first_bit=index, bits=1)
+            return msgspec.structs.replace(value, kind=kind, note="")
+        return number_of(lambda moment: value)(moment)
 
-    return _applied(lambda word: word >> index & 1, f".{name}", bit)
+    number_of = partial(_applied, lambda word: word >> index & 1, f".{name}")
+    return bit

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from miro_exact.state import Flat
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import LENGTH, ROW, byte_of_bit, is_call
+from miro_robot.mcs51.opcodes import LENGTH, ROW, SFRS, byte_of_bit, is_call
 
 _DIRECT = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x86, 0x88, 0xC5, 0xD0, 0xD5, 0xF5}  # rows
 _BIT = {0x10, 0x92, 0xB2, 0xC2, 0xD2}
@@ -20,12 +21,18 @@ _BANKS, _FIRST_SFR, _P2 = 0x20, 0x80, 0xA0
 
 
 class Bytes:
-    """`count` bytes of a memory: "iram", "sfr" or "xram"."""
+    """`count` bytes of a memory: "iram", "sfr" or "xram"; of them the bits of `mask` (the first byte's are the lowest).
 
-    def __init__(self, space: str, first: int, count: int) -> None:
+    All of a byte is written by any write to it. Single bits are written by instructions that name them, and by those
+    that write their byte and change one of them.
+    """
+
+    def __init__(self, space: str, first: int, count: int, mask: int = -1) -> None:
         self.space = space
         self.first = first
         self.end = first + count
+        self.mask = mask & (1 << 8 * count) - 1
+        self._copied: tuple[Cpu, Flat, Cpu, Flat] | None = None
 
     def writers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
         """Those of the `instructions` that may write one of them. `on_stack`: the stack may reach them."""
@@ -33,25 +40,32 @@ class Bytes:
 
     def are_written(self, cpu: Cpu) -> bool:
         """Whether the instruction that `cpu` executes next writes one of them."""
-        pc, opcode = cpu.pc, cpu.code_at(cpu.pc)
-        row = ROW[opcode]
-        direct = _direct(row, cpu.code_at((pc + 1) & 0xFFFF), cpu.code_at((pc + 2) & 0xFFFF))
-        if row == _JBC and not cpu_bit(cpu, cpu.code_at((pc + 1) & 0xFFFF)):
-            return False
-        if direct >= 0:
-            return self._holds("iram" if direct < _FIRST_SFR else "sfr", direct)
-        if row in _REGISTER:
-            return self._holds("iram", cpu.bank + (opcode & 7))
-        if row in _INDIRECT:
-            return self._holds("iram", cpu.peek_iram(cpu.bank + (opcode & 1)))
-        if row == _PUSH or is_call(opcode):
-            pushed = range(1, 2 if row == _PUSH else 3)
-            return any(self._holds("iram", (cpu.sp + at) & 0xFF) for at in pushed)
-        if row == _MOVX_DPTR:
-            return self._holds("xram", cpu.dptr)
-        if row == _MOVX_PAGE:
-            return self._holds("xram", cpu.sfr(_P2) << 8 | cpu.peek_iram(cpu.bank + (opcode & 1)))
+        for space, address in _written_places(cpu):
+            if self._holds(space, address):
+                mask = self.mask >> 8 * (address - self.first) & 0xFF
+                if mask == 0xFF or (mask and self._changed(cpu, address) & mask):
+                    return True
         return False
+
+    def _changed(self, cpu: Cpu, address: int) -> int:
+        """The bits of a byte that the next instruction names or changes, by executing it on a copy of the processor."""
+        opcode, first, _ = code = _code(cpu)
+        if ROW[opcode] in _BIT:
+            return 1 << (first & 7)
+        if self.space == "xram":
+            return cpu.bus.movx_read(address, 0) ^ cpu.sfr(SFRS["ACC"])
+        if self._copied is None or self._copied[0] is not cpu or _code(self._copied[2], cpu.pc) != code:
+            copy = Cpu()
+            copy.load(bytes(cpu.code))
+            self._copied = cpu, Flat(cpu), copy, Flat(copy)
+        _, state, copy, copied = self._copied
+        copied.load(state.save())
+        before, executed = self._byte(copy, address), copy.instructions
+        copy.step()
+        return before ^ self._byte(copy, address) if copy.instructions != executed else 0
+
+    def _byte(self, cpu: Cpu, address: int) -> int:
+        return cpu.sfr(address) if self.space == "sfr" else cpu.peek_iram(address)
 
     def _holds(self, space: str, address: int) -> bool:
         return space == self.space and self.first <= address < self.end
@@ -67,6 +81,34 @@ class Bytes:
         if row in _INDIRECT or (on_stack and (row == _PUSH or is_call(opcode))):
             return self.space == "iram"
         return row in (_MOVX_DPTR, _MOVX_PAGE) and self.space == "xram"
+
+
+def _code(cpu: Cpu, pc: int = -1) -> tuple[int, int, int]:
+    """The bytes of the instruction at `pc`, or the next one."""
+    place = cpu.pc if pc < 0 else pc
+    return cpu.code_at(place), cpu.code_at((place + 1) & 0xFFFF), cpu.code_at((place + 2) & 0xFFFF)
+
+
+def _written_places(cpu: Cpu) -> list[tuple[str, int]]:
+    """The bytes that the next instruction writes, or of which it writes a bit."""
+    opcode, first, second = _code(cpu)
+    row = ROW[opcode]
+    if row == _JBC and not cpu_bit(cpu, first):
+        return []
+    direct = _direct(row, first, second)
+    if direct >= 0:
+        return [("iram" if direct < _FIRST_SFR else "sfr", direct)]
+    if row in _REGISTER:
+        return [("iram", cpu.bank + (opcode & 7))]
+    if row in _INDIRECT:
+        return [("iram", cpu.peek_iram(cpu.bank + (opcode & 1)))]
+    if row == _PUSH or is_call(opcode):
+        return [("iram", (cpu.sp + at) & 0xFF) for at in range(1, 2 if row == _PUSH else 3)]
+    if row == _MOVX_DPTR:
+        return [("xram", cpu.dptr)]
+    if row == _MOVX_PAGE:
+        return [("xram", cpu.sfr(_P2) << 8 | cpu.peek_iram(cpu.bank + (opcode & 1)))]
+    return []
 
 
 def _direct(row: int, first: int, second: int) -> int:

@@ -13,6 +13,7 @@ from miro_exact.state import Flat
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.marks import MarkInspector
+from miro_robot.inspect.writes import cpu_bit
 from miro_robot.mcs51.opcodes import disassemble
 from mirotwin.debug import timeline as timelines
 from mirotwin.debug.console import Console
@@ -323,7 +324,7 @@ sum = ticks % 7 % 5 % 3 % 7 % 5 % 3 % 7 % 5 % 3 % 7 % 5 % 3;
 def test_a_line_back_from_an_interrupt_goes_to_what_it_interrupted(tmp_path, verb):
     (tmp_path / "busy.c").write_text("#include <8052.h>\n" + BUSY)
     debugger = debugger_of(proofs.compiled(tmp_path, tmp_path / "busy.c"))
-    debugger.go_to(24_000)
+    debugger.go_to(6_000)
     debugger.add("tick")
     for _ in range(20):
         debugger.move("continue")
@@ -481,3 +482,66 @@ def test_marks_of_the_owner_still_end_its_run():
     assert run.cpu.pc == until
     assert found[-1] == until
     assert EXECUTED[3][1] in found
+
+
+BITS = """
+LJMP main
+ORG 0Bh
+CPL 01h
+RETI
+ORG 30h
+main:
+MOV SP,#50h
+MOV 20h,#0
+MOV TMOD,#02h
+MOV IE,#82h
+SETB TR0
+again:
+SETB 00h
+INC 20h
+SETB TR1
+MOV R0,#20h
+MOV @R0,#05h
+CLR 02h
+ORL 20h,#80h
+CLR TR1
+ANL TCON,#0BFh
+MOV C,01h
+MOV 02h,C
+JBC 02h,again
+SJMP again
+"""
+"""Bits of one byte that instructions of all forms write, beside an interrupt that writes another one."""
+
+
+def bit_changes(run, bit, end_tick):
+    """The cycles before instructions that change a bit, or name it."""
+    cpu, found = run.cpu, []
+    while run.cpu.cycles * CYCLE_TICKS < end_tick:
+        cycle, pc, executed = cpu.cycles, cpu.pc, cpu.instructions
+        opcode, operand = cpu.code_at(pc), cpu.code_at(pc + 1)
+        old = cpu_bit(cpu, bit)
+        run.to(cycle * CYCLE_TICKS + 1)
+        if cpu.instructions == executed:
+            continue
+        named = opcode in (0x92, 0xB2, 0xC2, 0xD2) and operand == bit
+        if named or cpu_bit(cpu, bit) != old:
+            found.append(cycle)
+    return found
+
+
+@pytest.mark.parametrize("bit", [0, 1, 2, 7, 0x8C, 0x8E])
+def test_a_watched_bit_stops_where_it_is_written_itself(bit):
+    expected = bit_changes(proofs.assembled(BITS), bit, 6_000)
+    debugger = debugger_of(proofs.assembled(BITS))
+    name = {0x8C: "TR0", 0x8E: "TR1"}.get(bit) or f"iram[0x20].{bit}"
+    debugger.watch(name)
+    found = []
+    debugger.go_to(6_000)
+    while debugger.move("rcontinue") == "breakpoint 1":
+        found.append(debugger.cpu.cycles)
+    assert found[::-1] == expected
+    debugger.go_to(6_000)
+    writer = debugger.last_writer(debugger.bytes_of(name))
+    assert writer is not None
+    assert writer[0] // CYCLE_TICKS == expected[-1]
