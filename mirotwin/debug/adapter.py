@@ -10,7 +10,9 @@ from __future__ import annotations
 import base64
 import bisect
 import re
+import secrets
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from operator import attrgetter
 from pathlib import PureWindowsPath as AnyPath
@@ -19,9 +21,10 @@ from typing import Any
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
+from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.opcodes import SFRS
 from mirotwin.debug.console import VERBS, Console, shown_value
-from mirotwin.debug.debugger import STEPPED, Debugger
+from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
 from mirotwin.debug.subject import launched, open_subject
 from mirotwin.debug.symbols import SIZES, Moment
@@ -41,8 +44,16 @@ _MOVES = {
     "continue": "continue", "reverseContinue": "rcontinue", "next": "next", "stepBack": "rnext", "stepIn": "step",
     "stepOut": "finish",
 }  # fmt: skip
+_QUIET = (
+    "completions", "dataBreakpointInfo", "disassemble", "evaluate", "readMemory", "scopes", "stackTrace", "threads",
+    "variables",
+)  # fmt: skip
+"""What an editor asks by itself, or shows in its place: a failure of these needs no window of its own."""
 _MOST_FRAMES = 1000
-_IN_BRACES = re.compile(r"\{(.*?)\}")
+_MOST_LOG, _MOST_TERMS = 4096, 32  # characters and expressions of a message
+_IN_BRACES = re.compile(r"\{([^{}]*)\}")
+_PLACE = re.compile(r"(iram|sfr|xram):([0-9]{1,5}):([0-9]{1,5})(?::([0-9]{1,20}))?")
+_PATH = re.compile(r"(?:(\w+):)?([A-Za-z_]\w*)((?:\.\w+|\[[0-9]{1,6}\])*)")
 _REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
 _REASONS = {
     "breakpoint": "breakpoint", "begin": "entry", "case": "exception", "firmware": "exception", "goto": "goto",
@@ -54,14 +65,15 @@ Shown = Callable[[], Value]
 
 
 class Adapter:
-    """One client."""
+    """One client. `token`: it has to be in its launch, before which nothing is served; "" where none is needed."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire, token: str = "") -> None:
         self.wire = wire
+        self.token = token
         self.its: Debugger
         self.console: Console
         self.began = False
-        self.children: list[dict[str, Shown]] = []
+        self.children: list[tuple[dict[str, Shown], str]] = []
         self.paused = self.ended = False
         self.run_after: Callable[[], object] | None = None
         self.begin: Callable[[], object] = lambda: None
@@ -101,7 +113,7 @@ class Adapter:
         if refused:
             why = one_line(refused)
             text = why.replace("{", "(").replace("}", ")")
-            body = {"error": {"id": 1, "format": text, "showUser": True}}
+            body = {"error": {"id": 1, "format": text, "showUser": request["command"] not in _QUIET}}
             message["message"] = why
         self.wire.send({"type": "response", "success": not refused, **message, "body": body})
 
@@ -116,6 +128,13 @@ class Adapter:
         return {f"supports{one}": True for one in CAPABILITIES}
 
     def on_launch(self, given: Message) -> None:
+        if (
+            not secrets.compare_digest(str(given.get("token") or "").encode(), self.token.encode())
+            and self.token
+        ):
+            raise BadInput(
+                "", "launch", "the token is not the one that was printed", 'add "token" to launch.json'
+            )
         debugger, said, why = open_subject(launched(given), everyone=True)
         self.use(debugger)
 
@@ -189,8 +208,7 @@ class Adapter:
                 if one.get("accessType", "write") != "write":
                     raise ValueError("only what is written can be stopped at")
                 if kind == "data breakpoint":
-                    space, address, size = where.split(":")
-                    made = self.its.watch(where, *asked, Value(CType("int", int(size)), space, int(address)))
+                    made = self._watched(where, *asked)
                 else:
                     made = self.its.add(where, *asked)
             except _UNUSABLE as error:
@@ -205,19 +223,51 @@ class Adapter:
             found.append(at)
         return {"breakpoints": found}
 
+    def _watched(self, data: str, condition: str, count: str) -> Breakpoint:
+        """A data breakpoint by its `dataId`: a name, or for what has none the place in this run."""
+        if place := _PLACE.fullmatch(data):
+            value = Value(CType("int", int(place[3])), place[1], int(place[2]))
+            whole = self.its.bytes_of(data, value)
+            mask = -1 if place[4] is None else int(place[4])
+            return self.its.watch(data, condition, count, whole.bits(mask))
+        parts = _PATH.fullmatch(data)
+        if parts is None or self._moment(None).scope_of(parts[2], parts[1] or "") is None:
+            raise BadInput("", data, "is no variable of this firmware")
+        return self.its.watch(data, condition, count)
+
     def on_dataBreakpointInfo(self, given: Message) -> Message:
         name = given["name"]
+        moment = self._moment(given.get("frameId"))
         try:
             if given.get("variablesReference"):
-                value = self.children[given["variablesReference"] - 1][name]()
+                values, path = self.children[given["variablesReference"] - 1]
+                value, path = values[name](), _joined(path, name)
             else:
-                value = expression(name)(self._moment(given.get("frameId")))
+                value, path = expression(name)(moment), name
             written = self.its.bytes_of(name, value)
         except BadInput as error:
             return {"dataId": None, "description": str(error)}
-        data = f"{written.space}:{written.first}:{written.end - written.first}"
-        said = f"before {name} is written"
-        return {"dataId": data, "description": said, "accessTypes": ["write"], "canPersist": True}
+        data = self._named(path, moment, written)
+        keeps = bool(data)  # a name finds its variable after a build too; a place is another variable's then
+        size = written.end - written.first
+        bits = "" if written.is_whole else f":{written.mask}"
+        data = data or f"{written.space}:{written.first}:{size}{bits}"
+        return {
+            "dataId": data,
+            "description": f"before {name} is written",
+            "accessTypes": ["write"],
+            "canPersist": keeps,
+        }
+
+    def _named(self, path: str, moment: Moment, written: Bytes) -> str:
+        """What means the same in all functions and files, "" where it has no such name."""
+        parts = _PATH.fullmatch(path)
+        with suppress(BadInput):
+            if parts is not None and (scope := moment.scope_of(parts[2], parts[1] or "")) is not None:
+                name = f"{scope}:{parts[2]}{parts[3]}" if scope else parts[2] + parts[3]
+                if self.its.bytes_of(name).same(written):
+                    return name
+        return ""
 
     # Running
 
@@ -278,7 +328,7 @@ class Adapter:
             "stopped",
             reason=kind.partition(" in ")[0] or _REASONS.get(word, "pause"),
             description=text or why,
-            text=text or None,
+            text=text or (why if _REASONS.get(word) == "exception" else None),
             threadId=self.timeline.focus + 1,
             allThreadsStopped=True,
             hitBreakpointIds=[number] if kind else None,
@@ -326,7 +376,12 @@ class Adapter:
     def on_scopes(self, given: Message) -> Message:
         found = []
         for title, hint, values in self._scopes(self._moment(given["frameId"])):
-            kept = {"variablesReference": self._kept(values), "expensive": False}
+            path = (
+                f"{title.removeprefix('Statics of ').removesuffix('.c')}:"
+                if title.startswith("Statics")
+                else ""
+            )
+            kept = {"variablesReference": self._kept(values, path), "expensive": False}
             found.append({"name": title, "presentationHint": hint, **kept})
         return {"scopes": found}
 
@@ -346,9 +401,9 @@ class Adapter:
             yield "Radio", None, self._radio()
         yield "Pins", None, children(moment.find("pins", ""))
 
-    def _kept(self, values: Iterable[tuple[str, Shown]]) -> int:
-        """The reference by which these are asked for until the next stop."""
-        self.children.append(dict(values))
+    def _kept(self, values: Iterable[tuple[str, Shown]], path: str = "") -> int:
+        """The reference by which these are asked for until the next stop. `path`: the expression before their names."""
+        self.children.append((dict(values), path))
         return len(self.children)
 
     def _radio(self) -> Iterator[tuple[str, Shown]]:
@@ -361,10 +416,11 @@ class Adapter:
         reference = given["variablesReference"]
         if not 0 < reference <= len(self.children):
             raise BadInput("", f"reference {reference}", "is of a moment that is left")
-        there = self.children[reference - 1]
-        return {"variables": [{"name": name, **self._shown(get)} for name, get in there.items()]}
+        there, path = self.children[reference - 1]
+        shown = [(name, self._shown(get, _joined(path, name))) for name, get in there.items()]
+        return {"variables": [{"name": name, **value} for name, value in shown]}
 
-    def _shown(self, get: Shown, key: str = "value") -> Message:
+    def _shown(self, get: Shown, path: str, key: str = "value") -> Message:
         """A value; one that is not live says so in its place."""
         try:
             value = get()
@@ -379,7 +435,7 @@ class Adapter:
             place = f"{thread}:{value.space}:{value.address:#x}"
         return {
             key: text + (f"   ({value.note})" if value.note else ""),
-            "variablesReference": self._kept(inner) if inner else 0,
+            "variablesReference": self._kept(inner, path) if inner else 0,
             "type": None if value.kind is None else str(value.kind),
             "memoryReference": place,
         }
@@ -388,7 +444,7 @@ class Adapter:
         text = given["expression"].strip()
         if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
             value = expression(text)(self._moment(given.get("frameId")))
-            return self._shown(lambda: value, "result")
+            return self._shown(lambda: value, text, "result")
         there, self.paused, self.console.why = self.its.breakpoints[:], False, ""
         self.console.do(text)
         for one in there:
@@ -431,9 +487,18 @@ class Adapter:
         return {"address": f"{row.address:#06x}", **data, **place}
 
 
+def _joined(path: str, name: str) -> str:
+    """The expression for a member or an element of `path`, or for a name after a scope."""
+    return f"{path}{name}" if not path or path.endswith(":") or name.startswith("[") else f"{path}.{name}"
+
+
 def _logged(text: str) -> Callable[[Moment], str]:
     """A message with its `{expressions}` as values. Raises NoValue."""
-    terms = {one: expression(one) for one in _IN_BRACES.findall(text)}
+    names = set(_IN_BRACES.findall(text[: _MOST_LOG + 1]))
+    if len(text) > _MOST_LOG or len(names) > _MOST_TERMS:
+        most = f"give {_MOST_LOG} characters and {_MOST_TERMS} expressions at most"
+        raise BadInput("", "message", "is too long", most)
+    terms = {one: expression(one) for one in names}
 
     def value(term: Term, moment: Moment) -> str:
         try:

@@ -55,7 +55,10 @@ VERBS = {
 
 
 class Console(Cmd):
-    """Does commands. `lines`: what came of the last one; `done`: whether all could be done."""
+    """Does commands. `lines`: what came of the last one; `done`: whether all could be done.
+
+    `interrupted`: Ctrl-C ended the last one.
+    """
 
     prompt = "(mirotwin) "
 
@@ -68,7 +71,7 @@ class Console(Cmd):
         self.tell = self.lines.append
         self.frame = 0
         self.done = True
-        self.ended = False
+        self.ended = self.interrupted = False
         self.last = self.why = ""
 
     def completenames(self, text: str, *ignored: object) -> list[str]:
@@ -93,9 +96,16 @@ class Console(Cmd):
             self.done = False
         finally:
             signal.signal(signal.SIGINT, before)
+            self.interrupted = bool(stopped)
             for told in self.lines:
                 show_line(told)
         return self.ended
+
+    def postcmd(self, stop: bool, line: str) -> bool:
+        """Nothing more of a list of commands is done after Ctrl-C; who types goes on."""
+        if self.interrupted and not self.prompt:
+            raise KeyboardInterrupt
+        return stop
 
     def do(self, line: str) -> str:
         """The same, which shows nothing; returns the verb. Raises BadInput."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import secrets
 import socket
 import sys
 from contextlib import redirect_stdout, suppress
+from pathlib import Path
 from typing import Annotated, TextIO
 
 from miro_exact.bad_input import BadInput
@@ -27,6 +29,8 @@ LISTEN = Option(
     apart="subject",
     help="Speak it to one client of 127.0.0.1:PORT; 0 takes a free port.",
 )
+
+_TCP = Path("/proc/net/tcp")  # Linux: who has which connection
 
 
 class DebugOptions(DebugSubject, frozen=True, kw_only=True):
@@ -60,25 +64,50 @@ def debug(options: DebugOptions) -> int:
         return _interact(console)
     for line in options.commands:
         show_line(f"{console.prompt}{line}")
-        if console.onecmd(line) or not console.done:
+        ended = console.onecmd(line)
+        if console.interrupted:
+            raise KeyboardInterrupt
+        if ended or not console.done:
             break
     return DONE if console.done else BAD_INPUT
 
 
 def _listen(port: int) -> int:
+    """Serves the first client of this user. Where the system does not tell whose it is, it needs the token."""
+    token = "" if _TCP.exists() else secrets.token_hex(16)
     try:
         with socket.create_server(("127.0.0.1", port)) as server:
-            complain(f"listening on 127.0.0.1:{server.getsockname()[1]}")
+            words = f", token {token}" if token else ""
+            complain(f"listening on 127.0.0.1:{server.getsockname()[1]}{words}")
             client, _ = server.accept()
+            while not token and not _is_own(client):
+                client.close()
+                complain("a client of another user was sent away")
+                client, _ = server.accept()
     except OSError as error:
         raise BadInput("--listen", str(port), str(error.strerror), "choose another port") from None
     with client, client.makefile("wb") as sink:
-        return _serve(Wire(client.makefile("rb"), sink))
+        return _serve(Wire(client.makefile("rb"), sink), token)
 
 
-def _serve(wire: Wire) -> int:
+def _is_own(client: socket.socket) -> bool:
+    """Whether the other end of a connection within this machine belongs to the user of this process."""
+    try:
+        ends = [_written(*end) for end in (client.getpeername(), client.getsockname())]
+        rows = [line.split() for line in _TCP.read_text().splitlines()[1:]]
+    except OSError:  # it has gone already
+        return False
+    return any(row[1:3] == ends and int(row[7]) == os.getuid() for row in rows)
+
+
+def _written(host: str, port: int) -> str:
+    """An address as the system's table has it: the bytes of the host as a number of this machine."""
+    return f"{int.from_bytes(socket.inet_aton(host), sys.byteorder):08X}:{port:04X}"
+
+
+def _serve(wire: Wire, token: str = "") -> int:
     """One client, until it leaves."""
-    adapter = Adapter(wire)
+    adapter = Adapter(wire, token)
     with suppress(OSError):
         adapter.serve()
     if not adapter.ended:
@@ -95,6 +124,8 @@ def _interact(console: Console) -> int:
         try:
             console.cmdloop()
         except KeyboardInterrupt:
+            if not terminal:
+                raise
             complain("interrupted; `quit` leaves")
     return DONE if console.done or terminal else BAD_INPUT
 

@@ -7,6 +7,7 @@ and the static height of the instruction, so calls and interrupts in between cos
 from __future__ import annotations
 
 import bisect
+from array import array
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -39,7 +40,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     `written` is written, and `count` fits how often that was so since the run began.
 
     `text`: as one asks for it; `note`: what is to be told about its place; `kind`: an editor's, which it sets together.
-    `hits`: (cycle, processor) of those that are counted, up to `counted_to`.
+    `hits`: those that are counted, up to `counted_to`; each a number that grows with its cycle and its processor.
     """
 
     number: int
@@ -51,7 +52,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     note: str = ""
     kind: str = ""
     log: Callable[[Moment], str] | None = None
-    hits: list[tuple[int, int]] = []
+    hits: array[int] = msgspec.field(default_factory=lambda: array("q"))
     counted_to: int = 0
 
 
@@ -125,10 +126,10 @@ class Debugger:
                     raise
 
     def watch(
-        self, text: str, condition: str = "", count: str = "", place: Value | None = None
+        self, text: str, condition: str = "", count: str = "", written: Bytes | None = None
     ) -> Breakpoint:
-        """A data breakpoint: before an instruction that writes what `text` means. Raises BadInput."""
-        written = self.bytes_of(text, place)
+        """A data breakpoint: before an instruction that writes `written`, or what `text` means. Raises BadInput."""
+        written = written or self.bytes_of(text)
         return self._added(f"watch {text}", self._writers(written), condition, count, written=written)
 
     def _added(
@@ -212,9 +213,10 @@ class Debugger:
             return False
         at = (core.cpu.cycles, self.timeline.cores.index(core))
         if one.count is not None:
-            if not one.hits or at > one.hits[-1]:
-                one.hits.append(at)
-            if not one.count(bisect.bisect_left(one.hits, at) + 1):
+            hit = self._numbered(at)
+            if not one.hits or hit > one.hits[-1]:
+                one.hits.append(hit)
+            if not one.count(bisect.bisect_left(one.hits, hit) + 1):
                 return False
         if one.log is not None:
             self.told.append(LogOutput(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
@@ -229,12 +231,17 @@ class Debugger:
             if one.count is not None and one.counted_to < self.timeline.tick:
                 ask = Trap(one.addresses, lambda core, one=one: self._is_met(one, core) or None)  # type: ignore[misc]
                 with self.timeline.staying():
-                    hits = [hit[:2] for hit in self.timeline.hits_back(dict.fromkeys(self._traps(), ask))]
+                    found = self.timeline.hits_back(dict.fromkeys(self._traps(), ask))
+                    hits = array("q", (self._numbered(hit[:2]) for hit in found))
                     whole = self.timeline.at_begin
                 if not whole:
                     return False
                 one.hits, one.counted_to = hits[::-1], self.timeline.tick
         return True
+
+    def _numbered(self, at: Position) -> int:
+        """Eight bytes for each of millions of hits."""
+        return at[0] * len(self.timeline.cores) + at[1]
 
     # Moving
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mirotwin.debug.symbols import Moment
 
 _TOKEN = re.compile(r"\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
-_MOST_TOKENS, _MOST_SHIFT = 128, 64
+_MOST_CHARACTERS, _MOST_TOKENS, _MOST_SHIFT, _MOST_DIGITS = 4096, 128, 64, 80
 _LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 _RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
 _ESCAPES = {"n": 10, "r": 13, "t": 9, "0": 0}
@@ -216,8 +216,8 @@ class _Reader:
         self.text = text
         self.known = known
         self.taken: list[str] = []
-        self.tokens = _TOKEN.findall(text)
-        if len(self.tokens) > _MOST_TOKENS:
+        self.tokens = _TOKEN.findall(text[:_MOST_CHARACTERS])
+        if len(self.tokens) > _MOST_TOKENS or len(text) > _MOST_CHARACTERS:
             raise self.refused("is too long")
 
     def refused(self, what: str) -> NoValue:
@@ -296,6 +296,8 @@ def _constant(token: str) -> int | float | None:
     if len(token) > 2 and token[0] == "'":
         return _ESCAPES.get(token[2], ord(token[2])) if token[1] == "\\" else ord(token[1])
     with suppress(ValueError):
+        if len(token) > _MOST_DIGITS:
+            return None
         return float(token) if "." in token else int(token, 16 if token[:2].lower() == "0x" else 10)
     return None
 

@@ -163,6 +163,12 @@ class Moment:
         kind = _BIT if symbol.space == "bit" else _BYTE
         return Value(kind, symbol.space, symbol.address, self, note="of unknown type")
 
+    def scope_of(self, name: str, module: str) -> str | None:
+        """The file or function of a variable with a place, "" for a global or a register; None for what is neither."""
+        if variable := self._variable(name, module):
+            return variable.scope
+        return "" if name in SFRS or name in BITS else None
+
     @property
     def _function(self) -> str:
         """The name of the C function that it stands in, "" outside of these."""

@@ -300,7 +300,10 @@ class Timeline:
             begin_tick, first = self._kept[at].tick, at == 0
             self._load(at)
             with self._asking(traps) as found:
-                self._run_to(end_tick)
+                self._run_to(end_tick, self.interrupted)
+            if self._now < end_tick and not self.run.over:  # of this stretch the latest hits are missing
+                begin_tick = end_tick - 1
+                break
             found.sort(key=_ORDER, reverse=True)
             yield from (hit for hit in found if hit[:2] < here)
             end_tick, first = begin_tick, first or self.interrupted()

@@ -13,7 +13,8 @@ from miro_exact.bad_input import BadInput, shortened
 
 MOST_BYTES = 16 << 20
 _MOST_HEAD = 4096
-_LENGTH = re.compile(rb"^Content-Length:[ \t]*([0-9]{1,9})[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+_LENGTH = re.compile(rb"Content-Length:[ \t]*([0-9]{1,9})[ \t]*\r?\n", re.IGNORECASE)
+_TYPE = re.compile(rb"Content-Type:[^\n]*\n", re.IGNORECASE)
 _NULL = ("dataId",)  # what the protocol wants as null where there is none
 Message = dict[str, Any]
 
@@ -71,19 +72,25 @@ class Wire:
             self.came.put(found)
 
     def _read(self) -> Message | None:
-        head = line = self.source.readline(_MOST_HEAD)
-        while line.strip() and len(head) < _MOST_HEAD:
+        """Raises BadInput for a head with anything but the protocol's own fields: it may be a web browser's."""
+        line = self.source.readline(_MOST_HEAD)
+        while line in (b"\n", b"\r\n"):  # between messages
             line = self.source.readline(_MOST_HEAD)
-            head += line
-        if not head:
+        if not line:
             return None
-        found = _LENGTH.search(head)
-        if found is None or int(found[1]) > MOST_BYTES:
-            raise _garbage(head, f"a head without a Content-Length up to {MOST_BYTES >> 20} MiB")
-        data = self.source.read(int(found[1]))
+        size = -1
+        while line not in (b"\n", b"\r\n"):
+            if found := _LENGTH.fullmatch(line):
+                size = int(found[1])
+            elif not _TYPE.fullmatch(line):
+                raise _garbage(line, "no field of a head")
+            line = self.source.readline(_MOST_HEAD)
+        if not 0 <= size <= MOST_BYTES:
+            raise _garbage(b"%d" % size, f"no Content-Length up to {MOST_BYTES >> 20} MiB")
+        data = self.source.read(size)
         try:
             request = msgspec.json.decode(data, type=Request)
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, ValueError, RecursionError) as error:  # not UTF-8, long numbers, nested
             raise _garbage(data, f"no request: {error}") from None
         return msgspec.structs.asdict(request) | {"arguments": request.arguments or {}}
 
@@ -95,5 +102,5 @@ def _given(value: Any) -> Any:
 
 
 def _garbage(data: bytes, what: str) -> BadInput:
-    said = f"the client sends no message of the protocol: {shortened(repr(data))} is {what}"
+    said = f"the client sends no message of the protocol: {shortened(repr(data[:_MOST_HEAD]))} is {what}"
     return BadInput("--dap", "", said, "check what is connected")

@@ -34,6 +34,19 @@ class Bytes:
         self.mask = mask & (1 << 8 * count) - 1
         self._copied: tuple[Cpu, Flat, Cpu, Flat] | None = None
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all bits are meant."""
+        return self.mask == (1 << 8 * (self.end - self.first)) - 1
+
+    def bits(self, mask: int) -> Bytes:
+        """Some bits of these."""
+        return Bytes(self.space, self.first, self.end - self.first, mask)
+
+    def same(self, other: Bytes) -> bool:
+        mine, others = ((one.space, one.first, one.end, one.mask) for one in (self, other))
+        return mine == others
+
     def writers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
         """Those of the `instructions` that may write one of them. `on_stack`: the stack may reach them."""
         return {address for address in instructions if self._may(code, address, on_stack)}

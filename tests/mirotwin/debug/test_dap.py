@@ -415,3 +415,94 @@ def test_each_thread_shows_the_memory_of_its_own_robot(adapter, short):
         memory = client.ask("readMemory", memoryReference=listed["memoryReference"], count=1)["body"]["data"]
         slots.append((evaluated["result"], listed["value"], base64.b64decode(memory)))
     assert slots == [("0", "0", b"\0"), ("2", "2", b"\2")]
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"POST / HTTP/1.1\r\nContent-Length: 2\r\n\r\n{}",
+        b"Host: localhost\r\nContent-Length: 2\r\n\r\n{}",
+        b"Content-Length: 9000\r\n\r\n" + b'{"arguments": {"a": ' + b"[" * 8980,
+        b"Content-Length: 200000\r\n\r\n" + b"[" * 200000,
+        b'Content-Length: 63\r\n\r\n{"seq": 1, "type": "request", "command": "\xff\xfe", "arguments": {}}',
+        b"Content-Length: 6000\r\n\r\n" + b'{"seq": ' + b"9" * 5990 + b" }",
+        b"Content-Length: 100\r\n\r\n{",
+    ],
+)
+def test_what_is_no_request_ends_it_and_so_does_the_end_of_input(adapter, garbage):
+    process, client = adapter
+    client.raw(garbage)
+    client.sink.close()
+    process.stdin = None
+    code, err = ended(process)
+    assert code in (0, 2)
+    assert err.count("\n") == 1
+
+
+def test_a_deeply_nested_argument_ends_it_with_one_line(adapter):
+    process, client = adapter
+    data = b'{"seq": 1, "type": "request", "command": "x", "arguments": {"a": %b1%b}}' % (
+        b"[" * 1500,
+        b"]" * 1500,
+    )
+    client.raw(b"Content-Length: %d\r\n\r\n%b" % (len(data), data))
+    code, err = ended(process)
+    assert (code, err.count("\n")) == (2, 1)
+
+
+def test_blank_lines_between_messages_do_not_matter(adapter):
+    _, client = adapter
+    client.raw(b"\r\n\n\r\n")
+    assert client.ask("initialize")["success"]
+    client.raw(b"\r\n")
+    assert client.ask("launch", subject="fig6")["success"]
+
+
+def test_only_what_a_user_asked_for_raises_a_window(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    for context in ("hover", "watch", "repl"):
+        failed = client.ask("evaluate", expression="nothing", context=context)
+        assert failed["body"]["error"]["showUser"] is False
+    assert client.ask("variables", variablesReference=99)["body"]["error"]["showUser"] is False
+    assert client.ask("launch", subject="nothing")["body"]["error"]["showUser"] is True
+
+
+def test_a_data_breakpoint_keeps_a_name_and_not_a_place(adapter):
+    _, client = adapter
+    client.begin(subject="fig6", at="100ms")
+    info = client.ask("dataBreakpointInfo", name="failsafe:age")["body"]
+    assert (info["dataId"], info["canPersist"]) == ("failsafe:age", True)
+    frame = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]["id"]
+    scopes = client.ask("scopes", frameId=frame)["body"]["scopes"]
+    reference = next(
+        one["variablesReference"] for one in scopes if one["name"] == "Special function registers"
+    )
+    listed = client.ask("variables", variablesReference=reference)["body"]["variables"]
+    inner = next(one["variablesReference"] for one in listed if one["name"] == "TCON")
+    info = client.ask("dataBreakpointInfo", variablesReference=inner, name="TR1")["body"]
+    assert (info["dataId"], info["canPersist"]) == ("TCON.TR1", True)
+    info = client.ask("dataBreakpointInfo", name="iram[0x30]")["body"]
+    assert (info["dataId"], info["canPersist"]) == ("iram:48:1", False)
+    gone = [{"dataId": "failsafe:gone"}, {"dataId": "TCON.TR1"}]
+    found = client.ask("setDataBreakpoints", breakpoints=gone)["body"]["breakpoints"]
+    assert [one["verified"] for one in found] == [False, True]
+
+
+def test_a_long_message_is_refused_at_once(adapter):
+    _, client = adapter
+    client.begin(subject="fig6")
+    messages = ["{" * 200_000, "".join(f"{{{number}}}" for number in range(1000)), "{tick}"]
+    lines = [{"line": 146, "logMessage": one} for one in messages]
+    found = client.ask("setBreakpoints", source={"path": "failsafe.c"}, breakpoints=lines)["body"][
+        "breakpoints"
+    ]
+    assert [one["verified"] for one in found] == [False, False, True]
+
+
+def test_a_number_of_many_digits_is_refused():
+    from mirotwin.debug.expression import NoValue, expression
+
+    for text in ("9" * 5000, "0x" + "f" * 5000, "iram." + "9" * 5000, "1 +" * 5000):
+        with pytest.raises(NoValue):
+            expression(text)(None)
