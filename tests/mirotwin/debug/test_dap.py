@@ -2,11 +2,14 @@
 
 import base64
 import json
+import queue
 import socket
+import threading
 
 import pytest
 
 from miro_robot.bare.machine import BareMachine
+from mirotwin.debug import debug_command
 from mirotwin.debug.adapter import Adapter
 from mirotwin.rerun.inspected_run import BareRun
 from tests import children
@@ -506,3 +509,64 @@ def test_a_number_of_many_digits_is_refused():
     for text in ("9" * 5000, "0x" + "f" * 5000, "iram." + "9" * 5000, "1 +" * 5000):
         with pytest.raises(NoValue):
             expression(text)(None)
+
+
+def listening(monkeypatch, **patches):
+    """What `debug --listen` says, in a thread, and the port."""
+    for name, value in patches.items():
+        monkeypatch.setattr(debug_command, name, value)
+    thread = threading.Thread(target=debug_command._listen, args=(0,), daemon=True)
+    said = queue.SimpleQueue()
+    monkeypatch.setattr(debug_command, "complain", said.put)
+    thread.start()
+    return thread, said, said.get(timeout=60)
+
+
+def test_a_client_of_another_user_is_sent_away(monkeypatch):
+    answers = [False, True]
+    thread, said, line = listening(monkeypatch, _is_own=lambda client: answers.pop(0))
+    address = ("127.0.0.1", int(line.rpartition(":")[2]))
+    with socket.create_connection(address) as other:
+        assert other.recv(1) == b""
+    assert said.get(timeout=60) == "a client of another user was sent away"
+    with socket.create_connection(address) as connection, connection.makefile("rwb") as stream:
+        client = Client(stream, stream)
+        assert client.ask("initialize")["success"]
+        client.ask("disconnect")
+    thread.join(60)
+
+
+def test_a_connection_within_this_machine_is_known_to_be_its_users_own():
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()):
+        client, _ = server.accept()
+        with client:
+            assert debug_command._is_own(client)
+
+
+def test_where_the_system_does_not_tell_nothing_is_served_without_the_token(monkeypatch, tmp_path):
+    thread, _, line = listening(monkeypatch, _TCP=tmp_path / "none")
+    place, _, token = line.partition(", token ")
+    assert len(token) == 32
+    address = ("127.0.0.1", int(place.rpartition(":")[2]))
+    with socket.create_connection(address) as connection, connection.makefile("rwb") as stream:
+        client = Client(stream, stream)
+        client.ask("initialize")
+        for given in ({}, {"token": "0" * 32}, {"token": 7}):
+            refused = client.ask("launch", subject="fig6", **given)
+            assert "token" in refused["message"]
+            assert not client.ask("threads")["success"]
+        assert client.ask("launch", subject="fig6", token=token)["success"]
+        client.ask("disconnect")
+    thread.join(60)
+
+
+def test_a_stop_at_a_firmware_fault_says_which(adapter, tmp_path):
+    _, client = adapter
+    image = hex_file(
+        tmp_path / "bad.ihx", assemble("NOP\nMOV SP,#0FEh\nPUSH ACC\nPUSH ACC\nPUSH ACC\nSJMP $")
+    )
+    client.begin(subject=str(image))
+    client.send("continue", threadId=1)
+    stopped = client.until(event="stopped")["body"]
+    assert stopped["reason"] == "exception"
+    assert stopped["text"].startswith("firmware fault: ")

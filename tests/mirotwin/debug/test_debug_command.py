@@ -4,8 +4,11 @@ import os
 import shutil
 
 import pytest
+from click.testing import CliRunner
 
 from miro_robot.firmware import image_path
+from mirotwin.debug.console import Console
+from mirotwin.debug.debug_command import debug
 from tests import children
 from tests.mirotwin import program
 from tests.mirotwin.conftest import hex_file, hex_text
@@ -234,3 +237,15 @@ def test_a_closed_standard_input_is_told(what):
     done = program.run("debug", what, preexec_fn=lambda: os.close(0))
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "stdin: is closed; " in done.stderr
+
+
+def test_ctrl_c_ends_a_list_of_commands(monkeypatch):
+    def interrupted(console, line):
+        console.interrupted = True
+        return False
+
+    monkeypatch.setattr(Console, "onecmd", interrupted)
+    done = CliRunner().invoke(debug, ["fig6", "-x", "continue", "-x", "print tick"])
+    assert "continue" in done.output
+    assert "print tick" not in done.output
+    assert done.exit_code != 0

@@ -545,3 +545,27 @@ def test_a_watched_bit_stops_where_it_is_written_itself(bit):
     writer = debugger.last_writer(debugger.bytes_of(name))
     assert writer is not None
     assert writer[0] // CYCLE_TICKS == expected[-1]
+
+
+def test_a_search_backwards_ends_at_once_where_it_is_interrupted():
+    debugger = debugger_of(robot_run())
+    debugger.go_to(SECOND)
+    debugger.timeline._kept[1:] = []  # one stretch of a second
+    asked = []
+    with debugger.timeline.interrupted_by(lambda: asked.append(debugger.timeline.tick) or len(asked) >= 3):
+        for _ in debugger.timeline.hits_back({0: Trap({0x5E3}, lambda core: True)}):
+            pass
+    assert len(asked) == 3
+    assert not debugger.timeline.at_begin
+
+
+def test_counting_hits_is_interrupted_and_counts_on():
+    debugger = debugger_of(robot_run())
+    debugger.add("lm629_command", count=">= 40")
+    debugger.go_to(SECOND)
+    with debugger.timeline.interrupted_by(lambda: True):
+        assert debugger.move("continue") == "interrupted"
+    counted = debugger.breakpoints[0]
+    assert len(counted.hits) == 0
+    assert debugger.move("rcontinue") == "breakpoint 1"
+    assert counted.hits.itemsize * len(counted.hits) < 10_000
