@@ -1,13 +1,15 @@
-"""How much faster than real time the built-in scenarios run, with and without recording: ratios, best of N.
+"""How much faster than real time the built-in scenarios run, with and without recording, and with slip: best of N.
 
     python benchmarks/realtime.py [RUNS]
 
-One process, one core. The clock covers the loop over control periods, as `wall_s` in summary.json does.
+One process, one core. The clock covers the loop over control periods, as `wall_s` in summary.json does. Runs with slip
+alternate with those without.
 """
 
 import io
 import sys
 import time
+from statistics import median
 
 from miro_exact import engine
 from miro_exact.clock import seconds
@@ -18,11 +20,13 @@ from miro_sim.world.world import World
 from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
 
+GRIP = "network.robot.drive.tyre.grip=0.8"
 
-def ratio(name: str, recorded: bool) -> float:
+
+def ratio(name: str, recorded: bool, *settings: str) -> float:
     """Simulated seconds per second of one run."""
     image = load_hex(image_path())
-    text = scenario_file.load(name)
+    text = scenario_file.load(name, settings)
     world = World(text.scenario, 0, image)
     source = RunSource(name, text.text, 0, image.path.read_bytes(), image.sha256)
     with Recorder(io.BytesIO(), source) as recorder:
@@ -39,6 +43,10 @@ def main() -> None:
         for recorded in (True, False):
             best = max(ratio(name, recorded) for _ in range(runs))
             print(f"{name} {'recorded' if recorded else 'bare    '} {best:6.1f} x real time")
+    pairs = [(ratio("fig6", False), ratio("fig6", False, GRIP)) for _ in range(runs)]
+    share = median(slipping / rolling for rolling, slipping in pairs)
+    best = max(slipping for _, slipping in pairs)
+    print(f"fig6 bare, {GRIP}: {best:.1f} x real time, {share:.2f} of the speed without (median of pairs)")
 
 
 if __name__ == "__main__":

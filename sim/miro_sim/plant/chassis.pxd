@@ -12,7 +12,9 @@ cdef class Body:
 
     cdef int _push(self, double left_nms, double right_nms, int ticks, int step) except -1
     @cython.final
-    cdef void _rub(self, double left, double right, double most) noexcept
+    cdef inline void _slide(self, double left, double right, double most_left, double most_right) noexcept
+    @cython.final
+    cdef void _rub(self, double left, double right, double most_left, double most_right) noexcept
     cdef int _roll(self, int steps) except -1
     @cython.locals(v=double, w=double, half=double)
     cpdef tuple pose_after(self, long long ticks)

@@ -2,7 +2,7 @@
 # No divisor below is ever zero: track and masses are positive.
 """The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
 
-Wheels roll without slipping (keep below 7.8 m/s2).
+Wheels roll without slipping (keep below 6.28 m/s2: see the README).
 
 With the shaft speeds w = (left, right) and c = wheel radius / gear ratio the robot goes at
 v = (cl wl + cr wr) / 2 and turns at (cr wr - cl wl) / b; its energy is w' M w / 2 with
@@ -75,32 +75,39 @@ class Body:
         self.turned_right_rad[step] = 0.0
         if old_left != 0.0 or old_right != 0.0 or left_nms != 0.0 or right_nms != 0.0:
             half_s = 0.5 * TICK_S * ticks
-            left = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
-            right = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
             most = 2.0 * half_s * self.friction_nm
-            left_rub = most if left < 0.0 else -most
-            right_rub = most if right < 0.0 else -most
-            new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
-            new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
-            if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
-                self.left_rad_s = new_left
-                self.right_rad_s = new_right
-            else:
-                self._rub(left, right, most)
+            self._slide(
+                old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms,
+                old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms,
+                most,
+                most,
+            )
             self.turned_left_rad[step] = half_s * (old_left + self.left_rad_s)
             self.turned_right_rad[step] = half_s * (old_right + self.right_rad_s)
 
-    def _rub(self, left: float, right: float, most: float) -> None:
-        """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
+    def _slide(self, left: float, right: float, most_left: float, most_right: float) -> None:
+        """Shaft speeds after friction impulses of at most these, from what they would be without friction."""
+        left_rub = most_left if left < 0.0 else -most_left
+        right_rub = most_right if right < 0.0 else -most_right
+        new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
+        new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
+        if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
+            self.left_rad_s = new_left
+            self.right_rad_s = new_right
+        else:
+            self._rub(left, right, most_left, most_right)
+
+    def _rub(self, left: float, right: float, most_left: float, most_right: float) -> None:
+        """Friction impulses of at most `most_left` and `most_right`, opposing the speed that is left after them.
 
         They minimise the kinetic energy within the box |impulse| <= most (maximum dissipation): a shaft that
         can be held is held at exactly zero. The two easy cases are solved directly (that of two sliding shafts in
-        `push`), the rest by projected Gauss-Seidel sweeps; each of these lowers the energy: friction never drives,
+        `_slide`), the rest by projected Gauss-Seidel sweeps; each of these lowers the energy: friction never drives,
         however many there are.
         """
         left_rub = -(self.mass_ll * left + self.mass_lr * right)
         right_rub = -(self.mass_lr * left + self.mass_rr * right)
-        if -most <= left_rub <= most and -most <= right_rub <= most:  # both stick
+        if -most_left <= left_rub <= most_left and -most_right <= right_rub <= most_right:  # both stick
             self.left_rad_s = 0.0
             self.right_rad_s = 0.0
             return
@@ -108,13 +115,13 @@ class Body:
         right_rub = 0.0
         for _ in range(SWEEPS):
             new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
-            left_rub = min(most, max(-most, left_rub - new_left / self.inverse_ll))
+            left_rub = min(most_left, max(-most_left, left_rub - new_left / self.inverse_ll))
             new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
-            right_rub = min(most, max(-most, right_rub - new_right / self.inverse_rr))
+            right_rub = min(most_right, max(-most_right, right_rub - new_right / self.inverse_rr))
         new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
         new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
-        self.left_rad_s = 0.0 if -most < left_rub < most else new_left
-        self.right_rad_s = 0.0 if -most < right_rub < most else new_right
+        self.left_rad_s = 0.0 if -most_left < left_rub < most_left else new_left
+        self.right_rad_s = 0.0 if -most_right < right_rub < most_right else new_right
 
     def _roll(self, steps: int) -> None:
         """Moves the posture along the arcs that both wheels have rolled (chords, exact to the 4th power).

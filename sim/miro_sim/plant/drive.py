@@ -421,7 +421,7 @@ class DifferentialDrive(Plant):
                 if steps == _MOST_STEPS:
                     self._move(steps)
                     steps = 0
-                if self.rough is not None:
+                if self.rough is not None and self.rough.forces.is_on:
                     self.rough.forces.at(begin + (ticks >> 1))
                 left_charge = self.left_winding._pass(ticks, constant * self.body.left_rad_s)
                 right_charge = self.right_winding._pass(ticks, constant * self.body.right_rad_s)
@@ -441,7 +441,9 @@ class DifferentialDrive(Plant):
 
     def _stands(self) -> bool:
         """Whether all steps up to the next edge of PWM change nothing."""
-        still = self.body.left_rad_s == 0.0 and self.body.right_rad_s == 0.0 and self.rough is None
+        if self.body.left_rad_s != 0.0 or self.body.right_rad_s != 0.0:
+            return False
+        still = self.rough is None or self.rough.stands()
         return still and self.left_winding.rests() and self.right_winding.rests()
 
     def _move(self, steps: int) -> None:

@@ -1,9 +1,11 @@
+# cython: cdivision=True
+# No divisor below is ever zero: masses, inertias and lengths are positive, and so is what `_drag` divides by.
 """The robot where `chassis` is too kind: wheels slip, a ball drags, shafts stick, gears have play, a force pushes.
 
     motor --> shaft (inertia, Coulomb friction) --c--> contact (grip times load) --> chassis <-- ball, disturbing force
 
-A step turns the velocity into the new heading, adds the impulses of motors and disturbance, and then looks for the
-friction impulses that leave the least kinetic energy (maximum dissipation), each within its bound:
+A step adds the impulses of motors and disturbance, and then looks for the friction impulses that leave the least
+kinetic energy (maximum dissipation), each within its bound:
 
     shaft    friction * time, times the stiction ratio if the shaft stood when the step began; to this comes
              `gear_load_friction` times the torque through the gear, its mean over about a PWM period before the step
@@ -13,10 +15,13 @@ friction impulses that leave the least kinetic energy (maximum dissipation), eac
              taken from the step before
     ball     friction * load of the ball * time, in any direction; against its way over the ground
 
-A few sweeps over wheel, wheel, ball and axle, until one changes nothing; each part is solved exactly while the others
-hold still, so each lowers the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel
-without `grip` has all that it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the
-ball does not carry.
+First the body rolls, as `chassis.Body` does: two speeds, in closed form. If contacts and axle can give the impulses
+that this takes, they are the ones of least energy. While no wheel slips, all bits of the way are those of `Body`.
+
+Else the velocity turns into the new heading, and a few sweeps go over wheel, wheel, ball and axle, until one changes
+nothing; each part is solved exactly while the others hold still, so each lowers the energy: friction never drives. What
+ends inside its bounds ends at exactly zero. A ball that drags always takes the sweeps. A wheel without `grip` has all
+that it needs. Loads are those of the robot at rest: half each of what the ball does not carry.
 
 Backlash: the wheel has no mass, so while the teeth do not touch it goes with the ground and the shaft turns alone.
 Teeth that touch again do not bounce. They touch at the end of the step in which the play is used up, at most one
@@ -37,6 +42,7 @@ TICKS_PER_S = 24e6
 TICK_S = 1.0 / TICKS_PER_S
 PWM_TICKS = 2048.0
 SWEEPS = 12
+_ANGLES = 1.6e6  # `dmath.ANGLE_LIMIT`
 NEWTON_STEPS = 8
 NEAR = 1.0 - 1e-13
 ALL_GRIP_N = 1e30
@@ -107,6 +113,7 @@ class RoughBody(Body):
         *("grip_n", "ball_n", "ball_m"),
         *("mass_kg", "yaw_kg_m2", "rotor_kg_m2", "hub_per_kg", "ball_x_per_kg", "ball_y_per_kg"),
         *("_rub_nms", "_push_ns", "_ball_x_ns", "_ball_y_ns", "_ball_z"),
+        *("forward_m", "leftward_m", "turned_rad"),
     )
 
     def __init__(
@@ -150,9 +157,18 @@ class RoughBody(Body):
         self._ball_x_ns = 0.0
         self._ball_y_ns = 0.0
         self._ball_z = 0.0
+        self.forward_m = [0.0] * 16  # the ways of the last pushes, in the robot's own axes
+        self.leftward_m = [0.0] * 16
+        self.turned_rad = [0.0] * 16
+
+    def stands(self) -> bool:
+        """Whether steps change nothing while no motor drives: nothing moves, pushes or is about to relax."""
+        still = self.v_m_s == 0.0 and self.u_m_s == 0.0 and self.w_rad_s == 0.0 and not self.forces.is_on
+        forceless = self.left_force_n == 0.0 and self.right_force_n == 0.0
+        return still and forceless and self.left_load_n == 0.0 and self.right_load_n == 0.0
 
     def _push(self, left_nms: float, right_nms: float, ticks: int, step: int) -> None:
-        """Applies motor impulses, disturbance and friction over `ticks`; moves on at the mean of old and new speed."""
+        """Applies motor impulses, disturbance and friction over `ticks`; the way at the mean of old and new speed."""
         step_s = TICK_S * ticks
         half_s = 0.5 * step_s
         old_left = self.left_rad_s
@@ -160,21 +176,38 @@ class RoughBody(Body):
         old_v = self.v_m_s
         old_u = self.u_m_s
         old_w = self.w_rad_s
-        old_left_slip, old_right_slip = self.slips_m_s()
+        left_rim = self.left_m_rad * old_left
+        right_rim = self.right_m_rad * old_right
+        rolling_v = 0.5 * (left_rim + right_rim)
+        rolling_w = (right_rim - left_rim) / self.track_m
+        rolls = old_v == rolling_v and old_w == rolling_w and old_u == 0.0
         most_left = step_s * self.friction_nm * (self.stiction_ratio if old_left == 0.0 else 1.0)
         most_right = step_s * self.friction_nm * (self.stiction_ratio if old_right == 0.0 else 1.0)
         if self.load_friction > 0.0:
             most_left += step_s * self.load_friction * abs(self.left_m_rad * self.left_load_n)
             most_right += step_s * self.load_friction * abs(self.right_m_rad * self.right_load_n)
-        self._turn_frame(0.5 * step_s * old_w)
-        self.left_rad_s = old_left + left_nms / self.rotor_kg_m2
-        self.right_rad_s = old_right + right_nms / self.rotor_kg_m2
-        self.v_m_s = self.v_m_s + step_s * self.forces.force_n / self.mass_kg
-        self.w_rad_s = old_w + step_s * self.forces.torque_nm / self.yaw_kg_m2
+        if old_u != 0.0:
+            self._turn_frame(half_s * old_w)
+            aside = self.u_m_s
+        else:  # on its arc a body that does not slide sideways loses no speed
+            aside = -step_s * old_w * old_v
+        if self.forces.is_on:
+            self.v_m_s += step_s * self.forces.force_n / self.mass_kg
+            self.w_rad_s += step_s * self.forces.torque_nm / self.yaw_kg_m2
         if self.rolling_n > 0.0:
             self._resist(-self.half_track_m, step_s)
             self._resist(self.half_track_m, step_s)
-        self._dissipate(most_left, most_right, step_s)
+        more_v = self.v_m_s - rolling_v
+        more_w = self.w_rad_s - rolling_w
+        if self.ball_n > 0.0 or not self._roll_on(
+            left_nms, right_nms, most_left, most_right, more_v, more_w, aside, step_s
+        ):
+            rolls = False
+            if old_u == 0.0:
+                self._turn_frame(half_s * old_w)
+            self.left_rad_s = old_left + left_nms / self.rotor_kg_m2
+            self.right_rad_s = old_right + right_nms / self.rotor_kg_m2
+            self._dissipate(most_left, most_right, step_s)
         if self.load_friction > 0.0:
             share = float(ticks) / PWM_TICKS
             self.left_load_n += share * (self.left_force_n - self.left_load_n)
@@ -182,17 +215,95 @@ class RoughBody(Body):
         if self.play_m > 0.0:
             left_slip, right_slip = self.slips_m_s()
             if self.left_force_n == 0.0:
-                self.left_play_m -= half_s * (old_left_slip + left_slip)
+                self.left_play_m -= half_s * (old_v - self.half_track_m * old_w - left_rim + left_slip)
             if self.right_force_n == 0.0:
-                self.right_play_m -= half_s * (old_right_slip + right_slip)
-        self.turned_left_rad[step] = half_s * (old_left + self.left_rad_s)
-        self.turned_right_rad[step] = half_s * (old_right + self.right_rad_s)
-        self._glide(
-            half_s * (old_v + self.v_m_s), half_s * (old_u + self.u_m_s), half_s * (old_w + self.w_rad_s)
+                self.right_play_m -= half_s * (old_v + self.half_track_m * old_w - right_rim + right_slip)
+        left_rad = half_s * (old_left + self.left_rad_s)
+        right_rad = half_s * (old_right + self.right_rad_s)
+        self.turned_left_rad[step] = left_rad
+        self.turned_right_rad[step] = right_rad
+        if rolls:  # with the bits of `Body._roll`
+            left_m = self.left_m_rad * left_rad
+            right_m = self.right_m_rad * right_rad
+            self.forward_m[step] = 0.5 * (left_m + right_m)
+            self.leftward_m[step] = 0.0
+            self.turned_rad[step] = (right_m - left_m) / self.track_m
+        else:
+            self.forward_m[step] = half_s * (old_v + self.v_m_s)
+            self.leftward_m[step] = half_s * (old_u + self.u_m_s)
+            self.turned_rad[step] = half_s * (old_w + self.w_rad_s)
+
+    def _roll_on(
+        self,
+        left_nms: float,
+        right_nms: float,
+        most_left: float,
+        most_right: float,
+        more_v: float,
+        more_w: float,
+        aside: float,
+        step_s: float,
+    ) -> bool:
+        """Rolls, if contacts and axle can give the impulses for it; else leaves all but the shafts as it was.
+
+        `more_v` and `more_w` are what the chassis has beyond its wheels, `aside` the speed that the axle has to stop.
+        """
+        if more_v != 0.0 or more_w != 0.0:
+            along = 0.5 * self.mass_kg * more_v
+            across = self.yaw_kg_m2 * more_w / self.track_m
+            left_nms += self.left_m_rad * (along - across)
+            right_nms += self.right_m_rad * (along + across)
+        self._slide(
+            self.left_rad_s + self.inverse_ll * left_nms + self.inverse_lr * right_nms,
+            self.right_rad_s + self.inverse_lr * left_nms + self.inverse_rr * right_nms,
+            most_left,
+            most_right,
         )
+        left_rim = self.left_m_rad * self.left_rad_s
+        right_rim = self.right_m_rad * self.right_rad_s
+        v = 0.5 * (left_rim + right_rim)
+        w = (right_rim - left_rim) / self.track_m
+        along = 0.5 * self.mass_kg * (v - self.v_m_s)
+        across = self.yaw_kg_m2 * (w - self.w_rad_s) / self.track_m
+        left_n = (along - across) / step_s + 0.0  # no -0.0: a step of a robot at rest changes no bit
+        right_n = (along + across) / step_s + 0.0
+        axle = self._grip_left_n(self.left_force_n) + self._grip_left_n(self.right_force_n)
+        if not (
+            self._most_back_n(self.left_play_m) <= left_n <= self._most_ahead_n(self.left_play_m)
+            and self._most_back_n(self.right_play_m) <= right_n <= self._most_ahead_n(self.right_play_m)
+            and self.mass_kg * abs(aside) <= axle * step_s
+        ):
+            return False
+        self.left_force_n = left_n
+        self.right_force_n = right_n
+        self.v_m_s = v
+        self.u_m_s = 0.0
+        self.w_rad_s = w
+        return True
 
     def _roll(self, steps: int) -> None:
-        """A push has moved the posture already."""
+        """Moves the posture along the arcs of the ways of these pushes; the axes turn on the way."""
+        x_m = self.x_m
+        y_m = self.y_m
+        theta_rad = self.theta_rad
+        for step in range(steps):
+            turned = self.turned_rad[step]
+            half = 0.5 * turned
+            shrink = 1.0 - half * half / 6.0
+            forward = self.forward_m[step] * shrink
+            leftward = self.leftward_m[step] * shrink
+            if forward == 0.0 and leftward == 0.0 and turned == 0.0:
+                continue
+            angle = theta_rad + half
+            if not -_ANGLES < angle < _ANGLES:
+                dmath.sincos(angle)  # raises DomainError
+            sine, cosine = dmath.sincos_within(angle)
+            x_m = x_m + (forward * cosine - leftward * sine)
+            y_m = y_m + (forward * sine + leftward * cosine)
+            theta_rad = theta_rad + turned
+        self.x_m = x_m
+        self.y_m = y_m
+        self.theta_rad = theta_rad
 
     def _resist(self, lever_m: float, step_s: float) -> None:
         """Rolling resistance of the wheel at `lever_m` to the right of the middle."""
@@ -214,13 +325,13 @@ class RoughBody(Body):
 
     def _dissipate(self, most_left: float, most_right: float, step_s: float) -> None:
         """Friction impulses of one step, by sweeps from one part to the next."""
-        grip = self.grip_n * step_s
         axle = step_s * (self._grip_left_n(self.left_force_n) + self._grip_left_n(self.right_force_n))
         left_rub = right_rub = left_push = right_push = sideways = 0.0
-        left_back = -grip if self.left_play_m <= -self.play_m else 0.0
-        left_ahead = grip if self.left_play_m >= self.play_m else 0.0
-        right_back = -grip if self.right_play_m <= -self.play_m else 0.0
-        right_ahead = grip if self.right_play_m >= self.play_m else 0.0
+        left_back = step_s * self._most_back_n(self.left_play_m)
+        left_ahead = step_s * self._most_ahead_n(self.left_play_m)
+        right_back = step_s * self._most_back_n(self.right_play_m)
+        right_ahead = step_s * self._most_ahead_n(self.right_play_m)
+        most_ball = self.ball_n * step_s
         self._ball_x_ns = 0.0
         self._ball_y_ns = 0.0
         self._ball_z = 0.0
@@ -255,19 +366,15 @@ class RoughBody(Body):
             changed += abs(self._rub_nms - right_rub) + abs(self._push_ns - right_push)
             right_rub = self._rub_nms
             right_push = self._push_ns
-            if self.ball_n > 0.0:
-                self._drag(self.ball_n * step_s)
+            if most_ball > 0.0:
+                changed += self._drag(most_ball)
             before = sideways
             sideways = min(axle, max(-axle, before - self.mass_kg * self.u_m_s))
             self.u_m_s = self.u_m_s + (sideways - before) / self.mass_kg
-            if changed + abs(sideways - before) == 0.0 and self.ball_n == 0.0:
-                # The other sweeps would change nothing but the sign of a zero.
-                speeds = self.v_m_s * self.w_rad_s * self.left_rad_s * self.right_rad_s
-                signed = self.u_m_s != 0.0 or -axle < sideways < axle  # this one is set below
-                if signed and speeds * left_rub * left_push * right_rub * right_push * sideways != 0.0:
-                    break
-        self.left_force_n = left_push / step_s
-        self.right_force_n = right_push / step_s
+            if changed + abs(sideways - before) == 0.0:
+                break
+        self.left_force_n = left_push / step_s + 0.0  # no -0.0, as in `_roll_on`
+        self.right_force_n = right_push / step_s + 0.0
         if -axle < sideways < axle:
             self.u_m_s = 0.0
         left_stands = -most_left < left_rub < most_left
@@ -280,6 +387,14 @@ class RoughBody(Body):
         if left_held and right_stands and right_back < right_push < right_ahead:
             self.v_m_s = 0.0
             self.w_rad_s = 0.0
+
+    def _most_back_n(self, play_m: float) -> float:
+        """The least force along a wheel, by its grip and its teeth."""
+        return -self.grip_n if play_m <= -self.play_m else 0.0
+
+    def _most_ahead_n(self, play_m: float) -> float:
+        """The largest."""
+        return self.grip_n if play_m >= self.play_m else 0.0
 
     def _grip_left_n(self, along_n: float) -> float:
         """What the friction circle of a wheel leaves sideways."""
@@ -329,8 +444,8 @@ class RoughBody(Body):
         self._rub_nms = rub  # rounding at an edge: as it was
         self._push_ns = push
 
-    def _drag(self, most: float) -> None:
-        """The ball's impulse (Ns) that leaves the least energy within the circle of `most`; applied.
+    def _drag(self, most: float) -> float:
+        """Applies the ball's impulse (Ns) that leaves the least energy within the circle of `most`. Returns its change.
 
         Outside of it the answer is p / (a + z) for the z that puts it on the circle: Newton's method on 1 / length,
         which is nearly straight (More and Sorensen 1983), from the z of the sweep before.
@@ -358,23 +473,14 @@ class RoughBody(Body):
                 x = x * (most / length)
                 y = y * (most / length)
             self._ball_z = z
+        more_x = x - self._ball_x_ns
         more_y = y - self._ball_y_ns
-        self.v_m_s = self.v_m_s + (x - self._ball_x_ns) / self.mass_kg
+        self.v_m_s = self.v_m_s + more_x / self.mass_kg
         self.u_m_s = self.u_m_s + more_y / self.mass_kg
         self.w_rad_s = self.w_rad_s + self.ball_m * more_y / self.yaw_kg_m2
         self._ball_x_ns = x
         self._ball_y_ns = y
-
-    def _glide(self, forward_m: float, left_m: float, turn_rad: float) -> None:
-        """Moves the posture along the arc of a way in the robot's own axes, which turn on the way."""
-        if forward_m == 0.0 and left_m == 0.0 and turn_rad == 0.0:
-            return
-        half = 0.5 * turn_rad
-        shrink = 1.0 - half * half / 6.0
-        sine, cosine = dmath.sincos(self.theta_rad + half)
-        self.x_m = self.x_m + shrink * (forward_m * cosine - left_m * sine)
-        self.y_m = self.y_m + shrink * (forward_m * sine + left_m * cosine)
-        self.theta_rad = self.theta_rad + turn_rad
+        return abs(more_x) + abs(more_y)
 
     def pose_after(self, ticks: int) -> tuple[float, float, float]:
         """Posture (m, m, rad) `ticks` after the last push at the speeds of now; changes nothing."""

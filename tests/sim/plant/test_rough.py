@@ -2,7 +2,6 @@
 
 import math
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,6 +11,7 @@ from miro_sim.plant.chassis import Body
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, OpticalEncoder, RollingBall, Tyre
 from miro_sim.plant.rough import DisturbingForce, RoughBody
+from tests.naive import rough_step
 from tests.naive.plant import NaiveRoughDrive
 from tests.sim.plant.runs import kinetic_energy_j, pwm
 from tests.states import snapshot, values
@@ -75,19 +75,92 @@ def test_a_push_gives_no_more_energy_than_to_shafts_without_any_friction(
     assert kinetic_energy_j(one) <= kinetic_energy_j(free) * (1.0 + 1e-15)
 
 
-@pytest.mark.parametrize("kind", ["slip", "ice", "stiction", "load friction", "slip, play and load friction"])
-@settings(max_examples=60)
-@given(FAST, FAST, FAST, WAYS, FAST, st.lists(st.tuples(IMPULSES, IMPULSES, TICKS), max_size=8))
-def test_sweeps_that_end_where_nothing_changes_end_as_all_of_them_do(kind, left, right, v, u, w, pushes):
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=100)
+@given(
+    SPEEDS, SPEEDS, WAYS, WAYS, TURNS, st.lists(st.tuples(IMPULSES, IMPULSES, TICKS), min_size=1, max_size=3)
+)
+def test_a_step_leaves_the_motion_of_least_energy(kind, left, right, v, u, w, pushes):
+    assert_steps_are_those_of_the_slow_twin(KINDS[kind], moving(KINDS[kind], left, right, v, u, w), pushes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=100)
+@given(
+    *(st.floats(0.5, 1.5), st.floats(-40.0, 40.0)),
+    st.lists(st.tuples(*[st.floats(-6.0, 6.0)] * 2, TICKS), min_size=1, max_size=3),
+)
+def test_so_does_a_step_of_wheels_that_roll_or_just_begin_to_slip(kind, v, w, pushes):
+    """Impulses in multiples of what the default tyre holds on a wheel."""
     params = KINDS[kind]
-    weightless = msgspec.structs.replace(
-        params, ball=RollingBall(friction=1e-60)
-    )  # with a ball all sweeps are done
-    bodies = [moving(each, 150.0 * left, 150.0 * right, v, u, 5.0 * w) for each in (params, weightless)]
+    roll, half_m = 0.020 / 8, 0.034
+    body = moving(
+        *(params, (v - half_m * w) / params.radius_m(0) * 8, (v + half_m * w) / params.radius_m(1) * 8, v),
+        w=w,
+    )
+    limit_nms = roll * min(body.grip_n, 2.0) / 24e6
+    nms = [(limit_nms * left * ticks, limit_nms * right * ticks, ticks) for left, right, ticks in pushes]
+    assert_steps_are_those_of_the_slow_twin(params, body, nms)
+
+
+def assert_steps_are_those_of_the_slow_twin(params, body, pushes):
+    for left_nms, right_nms, ticks in pushes:
+        before = rough_step.Motion(*(body.left_rad_s, body.right_rad_s, body.v_m_s, body.u_m_s, body.w_rad_s))
+        motion, forces = rough_step.step(
+            params,
+            before,
+            (left_nms, right_nms),
+            ticks,
+            (body.left_force_n, body.right_force_n),
+            (body.left_load_n, body.right_load_n),
+            (body.left_play_m, body.right_play_m),
+        )
+        body.push(left_nms, right_nms, ticks)
+        arc = before.w * ticks / 24e6  # the twin turns the axes first, so a body on an arc loses v arc^2 / 2
+        sweeps = 1e-5 if params.ball.friction else 1e-7  # what twelve sweeps leave to do
+        near = sweeps + abs(before.v) * arc * arc
+        assert (body.v_m_s, body.u_m_s) == pytest.approx((motion.v, motion.u), abs=near)
+        assert 0.034 * body.w_rad_s == pytest.approx(0.034 * motion.w, abs=near)
+        rims = (0.0025 * body.left_rad_s, 0.0025 * body.right_rad_s)
+        assert rims == pytest.approx((0.0025 * motion.left, 0.0025 * motion.right), abs=near)
+        if not params.ball.friction:
+            near_n = 0.25 * near / (ticks / 24e6)
+            assert (body.left_force_n, body.right_force_n) == pytest.approx(forces, abs=near_n)
+
+
+@settings(max_examples=300)
+@given(
+    st.floats(0.9, 1.1),
+    st.floats(0.9, 1.1),
+    st.lists(st.tuples(*[st.floats(-2e-6, 2e-6) | st.just(0.0)] * 2, TICKS), min_size=1, max_size=16),
+)
+def test_while_no_wheel_slips_every_bit_is_that_of_the_body_that_only_rolls(left, right, pushes):
+    params = DriveParams(chassis=Chassis(left_radius_factor=left, right_radius_factor=right))
+    body, plain = RoughBody(params, 0.1, 0.2, 3.0), Body(params, 0.1, 0.2, 3.0)
     for push in pushes:
-        for one in bodies:
-            one.push(*push)
-        assert values(bodies[0]) == values(bodies[1])
+        body.push(*push)
+        plain.push(*push)
+        assert {name: values(body)[name] for name in values(plain)} == values(plain)
+        assert body.velocity() == plain.velocity()
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if "play" not in kind]
+)  # with it some never rest exactly
+@settings(max_examples=40)
+@given(st.lists(st.tuples(IMPULSES, IMPULSES, TICKS), max_size=6), SPEEDS, WAYS, WAYS, TICKS)
+def test_steps_of_a_robot_at_rest_change_no_bit_and_may_be_left_out(kind, pushes, left, v, u, ticks):
+    body = moving(KINDS[kind], left=left, v=0.05 * v, u=0.05 * u)
+    for push in pushes:
+        body.push(*push)
+    for _ in range(20_000):
+        body.push(0.0, 0.0, 2048)
+        if body.stands() and body.left_rad_s == body.right_rad_s == 0.0:
+            break
+    assert body.stands()
+    before = snapshot(body)
+    body.push(0.0, 0.0, ticks)
+    assert snapshot(body) == before
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -121,9 +194,9 @@ def test_with_all_grip_that_it_needs_it_goes_as_the_body_that_only_rolls(magnitu
         pwm(drive, *stretch, 300)
         pwm(plain, *stretch, 300)
     assert isinstance(drive.body, RoughBody)
-    assert drive.velocity_at(drive.tick) == pytest.approx(plain.velocity_at(plain.tick), rel=1e-3, abs=1e-6)
-    assert drive.pose_at(drive.tick) == pytest.approx(plain.pose_at(plain.tick), rel=1e-3, abs=1e-6)
-    assert drive.left_encoder.position == pytest.approx(plain.left_encoder.position, rel=1e-3)
+    assert drive.velocity_at(drive.tick) == plain.velocity_at(plain.tick)
+    assert drive.pose_at(drive.tick) == plain.pose_at(plain.tick)
+    assert drive.left_encoder.position == plain.left_encoder.position
 
 
 @pytest.mark.slow
@@ -164,20 +237,24 @@ def test_full_duty_on_ice_accelerates_with_grip_and_the_encoders_run_ahead_of_th
     assert rolled_m > 4.0 * drive.pose_at(drive.tick)[0] > 0.0
 
 
-def test_a_wheel_slips_beyond_its_grip_and_not_below():
-    """With grip 0.8 and the whole weight on the wheels: 7.8 m/s2, as the README says."""
-    params = DriveParams(tyre=Tyre(grip=0.8), ball=RollingBall(load_share=0.0), motor=Motor(friction_nm=0.0))
-    limit_ns = 0.8 * 0.5 * 9.81 * 0.5 * 2048 / 24e6
-    roll, rotor = 0.020 / 8, 2.7e-7
+@pytest.mark.parametrize(("load_share", "limit_m_s2"), [(0.2, 6.28), (0.0, 7.85)])
+def test_a_wheel_slips_beyond_its_grip_and_not_below(load_share, limit_m_s2):
+    """With grip 0.8 at 6.28 m/s2, as the README says; with the whole weight on the wheels at 7.85."""
+    params = DriveParams(
+        tyre=Tyre(grip=0.8), ball=RollingBall(load_share=load_share), motor=Motor(friction_nm=0.0)
+    )
+    roll, rotor, step_s = 0.020 / 8, 2.7e-7, 2048 / 24e6
     slips = {}
-    for share in (0.95, 1.05):
+    for share in (0.99, 1.01):
         one = moving(params)
-        shaft_rad_s = share * 2.0 * limit_ns / 0.5 / roll  # all of the robot at this share of the limit
-        impulse = rotor * shaft_rad_s + roll * share * limit_ns + params.friction_nm() * 2048 / 24e6
-        one.push(impulse, impulse, 2048)
+        speed_m_s = share * limit_m_s2 * step_s
+        shaft_nms = rotor * speed_m_s / roll + roll * 0.25 * speed_m_s + params.friction_nm() * step_s
+        one.push(shaft_nms, shaft_nms, 2048)
         slips[share] = max(abs(slip) for slip in one.slips_m_s())
-    assert slips[0.95] < 1e-12
-    assert slips[1.05] > 1e-5
+        if share < 1.0:
+            assert one.v_m_s == pytest.approx(speed_m_s)
+    assert slips[0.99] < 1e-12
+    assert slips[1.01] > 1e-5
 
 
 def test_a_turn_that_needs_more_than_the_grip_drifts_outwards():
