@@ -52,6 +52,11 @@ def one_line(text: str) -> str:
     return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
 
 
+def encodable(text: str) -> str:
+    """The text in characters that UTF-8 has: a byte of a file's name that is none is escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 def shortened(text: str) -> str:
     """The text without its middle where it is too long to be read: a value or a key of a megabyte."""
     return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"

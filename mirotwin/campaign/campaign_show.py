@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import click
-import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput, amount
@@ -19,6 +18,7 @@ from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as show_table
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import JSON, PATH, FiniteNumber
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 
@@ -217,4 +217,4 @@ def _interval(found: Interval | None) -> str:
 
 
 def _print_json(document: dict[str, Any]) -> None:
-    click.echo(msgspec.json.format(msgspec.json.encode(document), indent=2).decode())
+    click.echo(json_bytes(document, indent=2).decode())

@@ -21,6 +21,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.plan import Head
 from mirotwin.campaign.worker import RunOutcome
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.outputs import locked_elsewhere
 
 SYNC_S = 1.0
@@ -68,7 +69,7 @@ class Journal:
         """Writes the outcome of a run; a second one of the same run is left out."""
         if self.done[outcome.run]:
             return
-        self._stream.write(msgspec.json.encode(outcome) + b"\n")
+        self._stream.write(json_bytes(outcome) + b"\n")
         self._count(outcome.run)
         if perf_counter() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
@@ -93,7 +94,7 @@ class Journal:
             difference and next(outcomes(self.path), None) is None
         ):  # there is nothing to lose
             self._stream.truncate(0)
-            self._stream.write(msgspec.json.encode(self.head) + b"\n")
+            self._stream.write(json_bytes(self.head) + b"\n")
             return
         if difference:
             what = f"holds the unfinished results of another campaign: {difference}"

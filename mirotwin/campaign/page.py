@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import msgspec
-
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.settings import EXPECT
 from mirotwin.campaign.comparison import GATED, SHOWN, differences
@@ -19,6 +17,7 @@ from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, render, write_page
 from mirotwin.run.run_options import RunOptions
 from mirotwin.shell.command import Argument, Options, command_of
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import FORCE, NAME, OUT, QUIET
 
 
@@ -156,7 +155,7 @@ def _data(rows: ResultRows) -> bytes:
     for number, members in enumerate(arms.values()):
         for row in members:
             arm_of[row] = number
-    return msgspec.json.encode(
+    return json_bytes(
         {
             "arms": [arm_line(about, dict(zip(factors, levels, strict=True))) for levels in arms],
             "runs": numbers,

@@ -24,6 +24,7 @@ from mirotwin.campaign.single import prepared
 from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageFile, Work
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.steps.keys import CheckStep
 from mirotwin.verify.steps.player import check_symbols
 
@@ -85,7 +86,7 @@ class Plan(msgspec.Struct, frozen=True):
             [(one.name, [(level.value, level.settings) for level in one.levels]) for one in design.factors],
             self.checks,
         )
-        return hashlib.sha256(msgspec.json.encode(content)).hexdigest()
+        return hashlib.sha256(json_bytes(content)).hexdigest()
 
     @property
     def head(self) -> Head:

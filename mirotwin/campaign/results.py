@@ -24,6 +24,7 @@ from mirotwin.campaign.design import Level, kind_of
 from mirotwin.campaign.journal import in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Head, Plan
 from mirotwin.campaign.worker import RunOutcome
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.outputs import OutputError, whole_file
 
 if TYPE_CHECKING:
@@ -100,11 +101,13 @@ def write(plan: Plan, journal: Path, results: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = _schema(plan).with_metadata({META: msgspec.json.encode(about(plan))})
+    schema = _schema(plan).with_metadata({META: json_bytes(about(plan))})
     wall = pa.schema([("run", pa.int64()), ("wall_s", pa.float64())])
     with (
-        whole_file(wall_path(results), OPTION) as wall_file,
-        whole_file(results, OPTION) as file,
+        whole_file(wall_path(results), OPTION) as staged_wall,
+        whole_file(results, OPTION) as staged,
+        staged_wall.open("wb") as wall_file,  # pyarrow takes no path that is not UTF-8
+        staged.open("wb") as file,
         pq.ParquetWriter(file, schema, compression="zstd") as rows,
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
@@ -144,7 +147,7 @@ def _opened(path: str | Path, remedy: str = GIVE) -> Iterator[tuple[pq.ParquetFi
 
     check_regular(path)
     try:
-        with pq.ParquetFile(path, thrift_string_size_limit=META_BYTES) as file:
+        with open(path, "rb") as raw, pq.ParquetFile(raw, thrift_string_size_limit=META_BYTES) as file:
             _check_size(path, file.metadata)
             yield file, msgspec.json.decode((file.schema_arrow.metadata or {})[META], type=ResultsInfo)
     except FileNotFoundError:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import click
-import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.inspect.counters import Activity, Counters
@@ -27,6 +26,7 @@ from mirotwin.firmware.subject import WindowOptions, look, open_window
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import SourceFolders, source_folders, with_debug_files
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import FORCE, JSON, OUT
 from mirotwin.shell.outputs import check_new
 
@@ -51,7 +51,7 @@ def profile(options: ProfileOptions) -> int:
     code = look(run, options, counters, activity)
     result = profile_of(image, counters, activity)
     if options.as_json:
-        click.echo(msgspec.json.format(msgspec.json.encode(result), indent=2))
+        click.echo(json_bytes(result, indent=2))
     else:
         _print(result, run.image.path.name)
     return code

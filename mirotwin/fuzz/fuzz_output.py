@@ -18,6 +18,7 @@ from mirotwin.firmware.coverage_files import table, write
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
@@ -206,4 +207,4 @@ def _write_summary(
             for crash in campaign.triage.found
         ],
     }
-    campaign.triage.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")
+    campaign.triage.folder.write("", SUMMARY, json_bytes(document, indent=2) + b"\n")

@@ -5,6 +5,7 @@ Nothing here imports a hot module: the process that reads a specification choose
 
 from __future__ import annotations
 
+import json
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -50,8 +51,11 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     maker: str = ""
 
     def text(self) -> str:
-        """JSON of one line. `@@` never stands in it: afl-fuzz would put the name of a file there."""
-        return msgspec.json.encode(self).decode().replace("@@", "@\\u0040")
+        """JSON of one line, in ASCII: paths come back whole that are not UTF-8, which msgspec does not write.
+
+        `@@` never stands in it: afl-fuzz would put the name of a file there.
+        """
+        return json.dumps(msgspec.to_builtins(self)).replace("@@", "@\\u0040")
 
     def make(self) -> Target:
         """The target, on the engine that the specification names. Raises BadInput for what cannot be had."""
@@ -69,7 +73,7 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
 def spec_of(text: str) -> TargetSpec:
     """The specification that `text` is the JSON of. Raises BadInput, which names the field."""
     try:
-        return msgspec.json.decode(text, type=TargetSpec)
-    except msgspec.DecodeError as error:  # a ValidationError is one too
+        return msgspec.convert(json.loads(text), TargetSpec)
+    except (ValueError, msgspec.ValidationError) as error:
         remedy = f"give JSON with {', '.join(TargetSpec.__struct_fields__)}"
         raise BadInput("target", "", f"{error}", remedy) from None

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import click
-import msgspec
 
 from miro_exact.bad_input import amount
 from miro_exact.clock import seconds
@@ -22,6 +21,7 @@ from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.instructions import InstructionDifference
 from mirotwin.rerun.job import Job
 from mirotwin.shell.console import plain_table, show
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.program import complain
 
 LISTED = 5
@@ -99,7 +99,7 @@ def differences_as_json(
 
 
 def print_json(document: dict[str, Any]) -> None:
-    click.echo(msgspec.json.format(msgspec.json.encode(document), indent=2))
+    click.echo(json_bytes(document, indent=2))
 
 
 SHOWN = 20

@@ -14,6 +14,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import ErrorSample, Tracks
 from mirotwin.report.learnt import LearntCalibration, LearntWheels
 from mirotwin.report.theory import SlidingGains, Theory, gains_of, rms, theory_of
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.checks.interface import Expectation
 
 if TYPE_CHECKING:
@@ -251,4 +252,4 @@ def vision_text(vision: VisionCounts) -> str:
 
 def to_json(summary: Summary) -> bytes:
     """`summary.json`: indented, keys in the order above, a newline at the end."""
-    return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"
+    return json_bytes(summary, indent=2) + b"\n"

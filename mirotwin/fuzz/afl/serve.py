@@ -149,7 +149,7 @@ def main(arguments: Sequence[str]) -> int:
 def _complain(beside: str, text: str) -> None:
     print(text, file=sys.stderr)
     if beside:
-        Path(f"{beside}.target").write_text(text, encoding="utf-8")
+        Path(f"{beside}.target").write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 if __name__ == "__main__":

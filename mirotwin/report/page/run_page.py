@@ -28,6 +28,7 @@ from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 from mirotwin.rerun.job import Job
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.verdicts import worst
 from mirotwin.verify.cases.case import tables_of
 
@@ -182,7 +183,7 @@ def _data(
     """What the page's JavaScript needs: postures as 64-bit floats in base64, so that none is rounded."""
     lanes = lanes_of(marks)
     kinds = list(dict.fromkeys(mark.kind for mark in marks))
-    return msgspec.json.encode(
+    return json_bytes(
         {
             "first": tracks.first,
             "ticks": tracks.ticks,

@@ -25,7 +25,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from miro_exact.bad_input import one_line
+from miro_exact.bad_input import encodable, one_line
 from miro_exact.inputs import replace_file
 from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
@@ -131,7 +131,7 @@ def case_of_checks(world: World, trace: Trace, checks: Checks) -> str:
 
 def write_case(path: str | os.PathLike[str], text: str) -> None:
     """Writes it whole or not at all."""
-    replace_file(Path(path), text.encode())
+    replace_file(Path(path), encodable(text).encode())
 
 
 def is_case(path: str | Path) -> bool:

@@ -15,6 +15,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, QUIET, SEED, Engine, StackFrom
 from mirotwin.shell.outputs import check_file, whole_file
@@ -233,7 +234,7 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     if as_json:
         for rule in rules:
             line = {"rule": rule.id, "name": rule.name, "text": rule.text, "source": rule.source}
-            click.echo(msgspec.json.encode(line | {"presupposes": rule.presupposes}))
+            click.echo(json_bytes(line | {"presupposes": rule.presupposes}))
         return
     table = plain_table("rule", "name", "what a robot has to do")
     for rule in rules:
@@ -268,7 +269,7 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
             "first": outcome.failures[0] if outcome.failures else None,
             "faults": outcome.fault_count,
         }
-        click.echo(msgspec.json.encode(line))
+        click.echo(json_bytes(line))
 
 
 def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool, everything: bool) -> None:

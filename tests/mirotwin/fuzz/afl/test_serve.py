@@ -220,7 +220,7 @@ def test_the_target_runs_on_the_engine_that_is_asked_for():
 
 
 UNUSABLE = {
-    "{": "target: Input data was truncated; give JSON with board, image,",
+    "{": "target: Expecting property name",
     '{"board": "x"}': "target: Invalid enum value 'x' - at `$.board`; ",
     '{"bord": "miro"}': "target: Object contains unknown field `bord`; ",
     '{"robots": -1}': "target: Expected `int` >= 0 - at `$.robots`; ",
