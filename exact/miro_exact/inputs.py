@@ -8,7 +8,7 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, one_line, shortened
 
 TEXT_BYTES = 64 << 20
 """For what is written by hand or by a tool chain: scenarios, symbol files, listings, streams, serial input."""
@@ -44,6 +44,24 @@ def check_regular(path: str | os.PathLike[str]) -> None:
     check_no_folder(path)
     if os.path.exists(path) and not os.path.isfile(path):
         raise InputError(str(path), "is not a regular file", "copy the content to a file first")
+
+
+def path_beside(file: str | os.PathLike[str], name: str) -> str:
+    """The path of what `file` names: it has to lie, links resolved, in the folder of that file or below.
+
+    Raises InputError: whoever wrote the file does not choose what else of this machine is read.
+    """
+    folder = os.path.dirname(file)
+    path = os.path.join(folder, name)
+    try:
+        real = os.path.realpath(folder)
+        inside = os.path.commonpath([real, os.path.realpath(path)]) == real
+    except ValueError:  # a NUL, another drive
+        inside = False
+    if not inside:
+        what = f"{one_line(shortened(name))} lies outside of the folder of the file that names it"
+        raise InputError(str(file), what, "put it into that folder, or the file above both")
+    return path
 
 
 def read_input(

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
-from miro_exact.inputs import read_input
+from miro_exact.inputs import InputError, path_beside, read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
 from miro_sim.scenario.base import beside
 from miro_sim.scenario.file import decode
@@ -85,26 +85,37 @@ def _parsed(text: str, path: Path) -> Plan:
         check_numbers(raw)
         found = struct_of(raw, Document)
         design = _design(found, path)
+        scenario, firmware = _scenario(found.scenario, path, SCENARIO), _image(found.firmware, path, FIRMWARE)
     except TomlError as error:
         raise BadInput(path, error.place, error.what, error.remedy) from None
     settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
     settings += [(f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()]
     return Plan(
         path=str(path),
-        scenario=beside(str(path), found.scenario),
-        firmware=_image(found.firmware, path),
+        scenario=scenario,
+        firmware=firmware,
         settings=tuple(settings),
         allowed_failed_share=found.allowed_failed_share,
         design=design,
     )
 
 
-def _image(name: str, path: Path) -> str:
-    return str((path.parent / name).resolve()) if name else ""
+def _scenario(name: str, path: Path, place: str) -> str:
+    """Raises TomlError, as all below."""
+    try:
+        return beside(str(path), name)
+    except InputError as error:
+        raise TomlError(error.what, error.remedy, place) from None
+
+
+def _image(name: str, path: Path, place: str) -> str:
+    try:
+        return str(Path(path_beside(path, name)).resolve()) if name else ""
+    except InputError as error:
+        raise TomlError(error.what, error.remedy, place) from None
 
 
 def _design(found: Document, path: Path) -> Design:
-    """Raises TomlError, as all below."""
     try:
         seeds = seeds_of(str(found.seeds), MOST_RUNS)
     except ValueError as error:
@@ -146,8 +157,8 @@ def _level(key: str, value: Any, place: str, path: Path) -> Level:
     if not isinstance(value, str):
         raise TomlError(f"expected a name or a path, got {value!r}", place=place)
     if key == SCENARIO:
-        return Level(value, scenario=beside(str(path), value), place=place)
-    return Level(value, firmware=_image(value, path) or OWN_IMAGE, place=place)
+        return Level(value, scenario=_scenario(value, path, place), place=place)
+    return Level(value, firmware=_image(value, path, place) or OWN_IMAGE, place=place)
 
 
 def _factors(table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:

@@ -123,6 +123,13 @@ def test_a_named_pipe_is_refused_for(name, tmp_path):
     refused(tmp_path, *words)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+@pytest.mark.parametrize("words", [("decode", "pipe"), ("export", "pipe", "--out", "x.stream")])
+def test_a_named_pipe_is_not_waited_for_where_any_bytes_are_read(words, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert "is a named pipe, which may never end" in refused(tmp_path, *words)
+
+
 @pytest.mark.parametrize(
     ("reader", "line"),
     [

@@ -1,6 +1,6 @@
 """A scenario that is another one with a few keys changed: `scenario = "silent"` at the top of a file.
 
-    scenario = "silent"                    a built-in one, or a file beside this one (a path that ends in .toml)
+    scenario = "silent"                    a built-in one, or a .toml file in this folder or below
     duration_s = 1.0                       any key of a scenario: stands instead of the other one's, a table as a whole
     set = { network.robot.slot = 1 }       single keys of tables, as `--set` on the command line
 
@@ -8,10 +8,11 @@ The words are those of a stream file's header. The result is a whole scenario, w
 depends on no other file.
 """
 
+import os
 from collections.abc import Callable
-from pathlib import PurePath
 from typing import Any
 
+from miro_exact.inputs import InputError, path_beside
 from miro_protocol.toml_text import TomlError, check_numbers
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.settings import Setting, in_text, make
@@ -37,8 +38,13 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     if not isinstance(settings, dict):
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
     _check_no_part_of_network(own.get(NETWORK), origin, name)
+    if is_path(name) and ": " in origin and not os.path.exists(origin):
+        what = "stands in a file that depends on no other one"
+        raise ScenarioError(origin, SCENARIO, what, "name a built-in scenario, or record the run again")
     try:
         base = tables_of(beside(origin, name))
+    except InputError as error:
+        raise ScenarioError(origin, SCENARIO, error.what, error.remedy) from None
     except ScenarioError as error:
         place = ": ".join(part for part in (f"{error.path}", f"{error.place}") if part)
         raise ScenarioError(origin, SCENARIO, f"{place}: {error.what}", error.remedy) from None
@@ -85,5 +91,5 @@ def is_path(name: str) -> bool:
 
 
 def beside(origin: str, name: str) -> str:
-    """The scenario that a file names, as it is called from here."""
-    return str(PurePath(origin).parent / name) if is_path(name) else name
+    """The scenario that a file names, as it is called from here. Raises InputError for one outside of its folder."""
+    return path_beside(origin, name) if is_path(name) else name
