@@ -16,6 +16,7 @@ be repeated one that is ().
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable, Iterator
 from copy import copy
@@ -27,6 +28,8 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, get_args
 import click
 import msgspec
 
+from miro_exact.bad_input import encodable
+
 
 def operand(path: str | PathLike[str]) -> str:
     """The path as a word of a command: one that begins with a hyphen would be an option."""
@@ -36,7 +39,16 @@ def operand(path: str | PathLike[str]) -> str:
 
 def command_line(*words: str) -> str:
     """`mirotwin` with these words, quoted for a shell."""
-    return shlex.join(["mirotwin", *words])
+    return " ".join(map(_quoted, ("mirotwin", *words)))
+
+
+def _quoted(word: str) -> str:
+    """The word for a shell. One that is not UTF-8, which no screen shows, has its bytes as $'..' takes them."""
+    if encodable(word) == word:
+        return shlex.quote(word)
+    plain = set(range(0x20, 0x7F)) - {*b"'\\"}
+    shown = (chr(byte) if byte in plain else f"\\{byte:03o}" for byte in os.fsencode(word))
+    return f"$'{''.join(shown)}'"
 
 
 class Word(click.ParamType):  # type: ignore[type-arg, unused-ignore]

@@ -1,6 +1,8 @@
 """A record of options is the parser, the defaults and the line that gives the command again; times have their unit."""
 
+import os
 import shlex
+import shutil
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
@@ -11,9 +13,10 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.command import Argument, Option, Options, command_line, command_of
 from mirotwin.shell.options import NAME, PATH, Whole
 from mirotwin.shell.times import UNITS_S, Time, TimeType, wall_time
+from tests import children
 
 
 class WindowOptions(Options, frozen=True, kw_only=True):
@@ -181,3 +184,14 @@ def test_the_wall_clock_has_no_ticks():
         with pytest.raises(click.BadParameter) as refused:
             wall_time(100.0).convert(text, None, None)
         assert "ticks" not in refused.value.message
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+@pytest.mark.parametrize("name", [b"f\xff", b"\xff1 'a'\\", b"a b", "ä".encode(), b"\xfe\n"])
+def test_a_command_to_copy_names_the_same_file_also_where_its_name_is_not_utf8(name):
+    line = command_line("replay", os.fsdecode(name))
+    assert line.isprintable()
+    done = children.run(
+        ["bash", "-c", f'mirotwin() {{ printf %s "$2"; }}; {line}'], capture_output=True, check=True
+    )
+    assert done.stdout == name
