@@ -1,18 +1,19 @@
 """A target that is any 8051 firmware with a serial port, on a bare processor.
 
 Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
-for ever, 10 ms (at 24 MHz) after the last character.
+for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
 """
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.plugins import PluginError, Registry
 from miro_host.raised import at_place, defined_at, raised, raised_at
 from miro_host.raised import described as described_error
@@ -28,7 +29,14 @@ from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target, TargetFailure, described
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, Exchange, NamedCheck, check_named
+from mirotwin.verify.bare.exchange import (
+    NEVER_SLEEPS,
+    NO_FAULT,
+    Exchange,
+    NamedCheck,
+    check_named,
+    module_of,
+)
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 
 OPTION = "--protocol"
@@ -42,12 +50,11 @@ PROTOCOLS: Registry[Protocol] = Registry(
 
 
 def protocol_named(text: str) -> Protocol:
-    """The protocol that `NAME` or `NAME:KEY=VALUE,KEY=VALUE` means; values as in TOML. Raises BadInput."""
-    name, _, parameters = text.partition(":")
-    try:
-        found = PROTOCOLS.find(name)
-    except PluginError as error:
-        raise BadInput("", OPTION, error.what, error.remedy) from error
+    """The protocol that `NAME` or `FILE.py:CLASS` means, with parameters behind it: `:KEY=VALUE,KEY=VALUE`, as in TOML.
+
+    A file is run: `text` must come from the command line. Raises BadInput.
+    """
+    found, name, parameters = _class_in_file(text) or _installed(text)
     try:
         given = tomllib.loads(f"given = {{{parameters}}}")["given"]
     except tomllib.TOMLDecodeError:
@@ -75,8 +82,8 @@ class BareTarget(Target):
     """`image` on a bare processor, up and in silence.
 
     `protocol` makes frames of bodies; without it they are sent as they are. `check` judges each run, `baud` 0 takes the
-    rate of the receiver. `run(data)` returns 0 or what `failure` is: a fault, no sleep, what the check says.
-    Raises BadInput where the firmware does not come up.
+    rate of the receiver, `after_ticks` is how long a run goes on after its last character. `run(data)` returns 0 or
+    what `failure` is: a fault, no sleep, what the check says. Raises BadInput where the firmware does not come up.
     """
 
     def __init__(
@@ -88,6 +95,7 @@ class BareTarget(Target):
         crystal_hz: int = CRYSTAL_HZ,
         baud: int = 0,
         boot_ms: int = BOOT_MS,
+        after_ticks: int | None = None,
     ) -> None:
         if input not in INPUTS:
             raise BadInput("", "--input", f"{input!r} is no class of inputs", f"use {', '.join(INPUTS)}")
@@ -102,7 +110,8 @@ class BareTarget(Target):
         bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
         self.line = BareLine(crystal_hz, bit_ticks, self.processor.begin_tick)
         self.oracle = BareOracle(self.processor.bus, self.processor.cpu)
-        harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks)
+        after = -1 if after_ticks is None else after_ticks
+        harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks, after_ticks=after)
         program = Program(
             INPUTS.index(input),
             repair=lambda body: self._repaired(body, self.program.frames),
@@ -199,6 +208,36 @@ class BareTarget(Target):
         return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"
 
 
+def _installed(text: str) -> tuple[type[Protocol], str, str]:
+    """The class, its name and the parameters of `NAME:PARAMETERS`."""
+    name, _, parameters = text.partition(":")
+    try:
+        return PROTOCOLS.find(name), name, parameters
+    except PluginError as error:
+        raise BadInput("", OPTION, error.what, error.remedy) from error
+
+
+def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:
+    """The same of `FILE.py:CLASS:PARAMETERS`; None for another text."""
+    match = re.match(r"(.+?\.py)(?::([^:]*))?(?::(.*))?$", text, re.DOTALL)
+    if match is None:
+        return None
+    path, name, parameters = match[1], match[2] or "", match[3] or ""
+    module = module_of(path, OPTION)
+    classes = {key: value for key, value in vars(module).items() if _is_protocol(value)}
+    if name not in classes:
+        remedy = did_you_mean(name, list(classes), f"it has {', '.join(classes) or 'none'}")
+        what = f"there is no class {name!r} derived from Protocol"
+        raise BadInput(path, OPTION, what, remedy)
+    if not classes[name].__struct_config__.frozen:
+        raise BadInput(path, OPTION, f"{name} can change", "give the class frozen=True")
+    return classes[name], name, parameters
+
+
+def _is_protocol(value: object) -> bool:
+    return isinstance(value, type) and issubclass(value, Protocol) and value is not Protocol
+
+
 def _asked(method: Callable[..., object], call: Callable[[], T]) -> T:
     """What a protocol's method gives. Raises BadInput where it fails itself."""
     try:
@@ -227,5 +266,6 @@ def bare_target(spec: TargetSpec) -> BareTarget:
         protocol_named(spec.protocol) if spec.protocol else None,
         check_named(spec.check) if spec.check else None,
         baud=spec.baud,
+        after_ticks=spec.after_ticks,
         **spec.parameters,
     )

@@ -35,7 +35,7 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
 from mirotwin.shell.program import Terminated, complain, cores
-from mirotwin.shell.times import wall_time
+from mirotwin.shell.times import Time, TimeType, wall_time
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import CHECK, EXPECT, as_settings
@@ -68,6 +68,14 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             type=PATH,
             metavar="DIR",
             help="Folder of recordings, stream files, captures and inputs of earlier campaigns to begin with.",
+        ),
+    ] = None
+    after: Annotated[
+        Time | None,
+        Option(
+            type=TimeType(),
+            help="How long each run goes on after its last character, such as 200ms. Default: until the firmware"
+            f" sleeps; {1000 * AWAKE_TICKS // TICKS_PER_SECOND}ms if it never does.",
         ),
     ] = None
     expected: Annotated[
@@ -124,7 +132,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
         str | None,
         Option(
             metavar="NAME[:KEY=VALUE,..]",
-            help="The format that makes frames of bodies.",
+            help="The format that makes frames of bodies: by its name, or FILE.py:CLASS[:KEY=VALUE,..].",
             heading=BARE,
             needs="bare",
         ),
@@ -143,7 +151,6 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = False
 
 
-AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at after a Ctrl-C."""
 
@@ -179,6 +186,9 @@ def fuzz(options: FuzzOptions) -> int:
         protocol=options.protocol or "",
         check=(options.check or "") if options.check_all else "",
         baud=options.baud or 0,
+        after_ticks=None
+        if options.after is None
+        else options.after.ticks(options.crystal or TICKS_PER_SECOND),
         parameters={name: value for name, value in parameters.items() if value is not None},
         engine=cast(Literal["compiled", "python"], engines.active()),
     )
@@ -202,7 +212,7 @@ def _campaign(
         inputs |= dict.fromkeys(found)
         for note in notes:
             complain(note)
-    _check_at_rest(target, image)
+    _check_at_rest(target, image, options.crystal or TICKS_PER_SECOND)
     reached = InputCoverage(image, spec.make)
     if covering is not None and covering.address in reached.total:
         what = f"{covering.name} runs while the firmware starts, before any input"
@@ -289,14 +299,15 @@ def _covering(symbol: str | None, image: Image) -> Covering | None:
     return Covering(symbol, address_of(symbol, image, str(image.path), f"--covering {symbol}"))
 
 
-def _check_at_rest(target: Target, image: Image) -> None:
+def _check_at_rest(target: Target, image: Image, crystal_hz: int) -> None:
     """Raises BadInput for firmware in which something is wrong before it has heard anything."""
     target.run(b"")
     failure = target.failure
-    if not target.harness.sleeps:
-        complain(
-            f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms after its last character"
+    if not target.harness.sleeps and target.harness.after_ticks < 0:
+        after = (
+            f"{1000 * AWAKE_TICKS / crystal_hz:.3g} ms after its last character (--after gives another time)"
         )
+        complain(f"{image.path}: never sleeps (IDL); each run goes on for {after}")
     if failure is not None:
         what = f"fails before it has heard anything: {failure.check}: {failure.what}"
         raise BadInput(image.path, "", what, "mend that first: each input would find it")

@@ -157,6 +157,7 @@ def _print_crashes(campaign: Campaign, check: str | None) -> None:
 
 def _print_crash(crash: Crash, campaign: Campaign, check: str | None) -> None:
     where = f" in {crash.function}" if crash.function else ""
+    where += f", which {crash.cause}" if crash.cause else ""
     more = campaign.triage.more[crash.name]
     again = f"; {amount(more, 'more input')}" if more else ""
     before, after = crash.sizes

@@ -55,7 +55,8 @@ class RobotOracle:
         if asks or any(struct_of(name).KIND == "safety" for name in {*expected} - {*ALWAYS_ON}):
             # firmware that was mended, and does not what it must not, has to show that it lives
             script += _questions(script, last_tick, target.robots, target.slot)
-        until_tick = max(last_tick, _end_tick(script)) + AFTER_TICKS
+        after_ticks = max(AFTER_TICKS, target.harness.after_ticks)
+        until_tick = max(last_tick, _end_tick(script)) + after_ticks
         return rerun_robot(target.image, target.robots, target.slot, script, expected, until_tick)
 
 

@@ -34,7 +34,8 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session"). `robots` and `slot` are the
     MIRO's. `protocol`: name of the wire format of frames, "" for the board's own; `check`: name of the check that
     judges in each execution, "" for the board's own; `baud`: rate of the bare CPU's UART, 0 for what its maker takes;
-    `parameters`: what else a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
+    `after_ticks`: how long a run goes on after its last character, None for the harness's own. `parameters`: what else
+    a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
     `maker`: "module:function" in the place of the board's own maker.
     """
 
@@ -46,6 +47,7 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     protocol: str = ""
     check: str = ""
     baud: Whole = 0
+    after_ticks: Whole | None = None
     parameters: dict[str, Any] = {}
     engine: Literal["", "compiled", "python"] = ""
     maker: str = ""

@@ -145,14 +145,22 @@ class RobotTarget(Target):
     A kind of failure is the place of its name in `fast_oracle.NAMES`. `accepted`: fresh frames of the last run.
     """
 
-    def __init__(self, image: Image, input: str = "session", robots: int = 3, slot: int = 0) -> None:
+    def __init__(
+        self,
+        image: Image,
+        input: str = "session",
+        robots: int = 3,
+        slot: int = 0,
+        after_ticks: int | None = None,
+    ) -> None:
         if input not in INPUTS:
             raise BadInput("", "", f"input {input!r}", f"use {', '.join(INPUTS)}")
         self.robots = robots
         self.board = _booted(image, slot, robots)
         self.oracle = FastOracle(self.board, slot, robots)
         cpu, bit_ticks = self.board.cpu, downlink(robots).bit_ticks
-        harness = Harness(self.board, cpu, self.oracle, bit_ticks, self.board)
+        after = -1 if after_ticks is None else after_ticks
+        harness = Harness(self.board, cpu, self.oracle, bit_ticks, self.board, after)
         super().__init__(image, harness, Program(INPUTS.index(input), slot, robots), slot)
         self.code = 0
 
@@ -188,7 +196,8 @@ class RobotTarget(Target):
 
 def robot_target(spec: TargetSpec) -> RobotTarget:
     """The target of a specification. Raises BadInput."""
-    return RobotTarget(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
+    image = load_firmware(spec.image, named=False)
+    return RobotTarget(image, spec.input, spec.robots, spec.slot, spec.after_ticks)
 
 
 def _booted(image: Image, slot: int, robots: int) -> Board:

@@ -1,14 +1,15 @@
 """What becomes of an input that failed: minimised, told apart from the others, confirmed in a World, left as files.
 
-Two crashes are the same where check, PC and path are. The PC is that of the instruction that did it, a fault; where no
-instruction did it (nothing came in time, say) there is none. The path is that of the minimised input (`reached`).
-
-Of inputs with the same check and PC only the first few are minimised, unless a new path comes of them: an easy mistake
-fails thousands of inputs, which are counted.
+Two crashes are the same where check and cause are. The cause of a fault is the instruction that went wrong first
+(`cause.py`). Where no instruction did it (nothing came in time, say) it is what the check says, but for its numbers.
+Inputs of a crash that is known are counted, and only the first few without a fault are looked at at all: an easy
+mistake fails thousands of inputs.
 """
 
 from __future__ import annotations
 
+import hashlib
+import re
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -20,6 +21,7 @@ import msgspec
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.coverage import Counts
 from mirotwin.firmware.coverage_files import Report, collect, write
+from mirotwin.fuzz.cause import Cause
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
@@ -30,21 +32,37 @@ MINIMISE_S = 10.0
 TRIES = 50_000
 TRIES_IN_A_WORLD = 400
 SAME_TRIED = 6
-"""Inputs of one check and PC in a row that are minimised although nothing new comes of them."""
+"""Inputs of one check and PC in a row that are looked at although nothing new comes of them."""
 CONFIRMED, UNCONFIRMED = "crashes", "unconfirmed"
+_NUMBER = re.compile(r"0x[0-9a-fA-F]+|[0-9]+(\.[0-9]+)?")
+_DIGITS = 6
+
+
+class CrashKey(msgspec.Struct, frozen=True):
+    """By what crashes are told apart. `said`: of a check without an instruction, what was wrong without its numbers."""
+
+    check: str
+    cause: Cause | None
+    said: str
+
+    @property
+    def name(self) -> str:
+        if self.cause is not None:
+            return f"{self.check}-{self.cause.pc:04x}"
+        return f"{self.check}-{hashlib.sha256(self.said.encode()).hexdigest()[:_DIGITS]}"
 
 
 class Crash(msgspec.Struct, frozen=True, kw_only=True):
     """A mistake that an input shows. `verdict`: of the World, or of the target where that is not confirmed.
 
-    `pc` None: no instruction did it. `folder`: `crashes` or `unconfirmed`. `sizes`: bytes of the input as it was found
-    and as it is left.
+    `pc`: the instruction behind it, which did what `cause` says, in `function`; None: no instruction did it. `folder`:
+    `crashes` or `unconfirmed`. `sizes`: bytes of the input as it was found and as it is left.
     """
 
     name: str
     check: str
     pc: int | None
-    path: str
+    cause: str
     function: str
     verdict: str
     folder: str
@@ -75,7 +93,7 @@ class Triage:
         self.found: list[Crash] = []
         self.more: Counter[str] = Counter()
         self.unrepeated = 0
-        self._by_key: dict[tuple[str, int | None, str], Crash] = {}
+        self._by_name: dict[str, Crash] = {}
         self._in_vain: Counter[tuple[str, int | None]] = Counter()
         self._last: dict[tuple[str, int | None], Crash] = {}
 
@@ -127,60 +145,72 @@ class Triage:
     ) -> Crash | None:
         """`fails`: whether an input is still of the group; `judged`: the verdict on one, and what the target says."""
         if self._in_vain[group] >= SAME_TRIED:
-            self.more[self._last[group].name] += 1
+            self._count(self._last[group], group)
+            return None
+        key = self._key(group, data, *((None, "") if group[1] is not None else judged(data)))
+        known = self._by_name.get(key.name)
+        if known is not None and known.confirmed:
+            self._count(known, group)
             return None
         small = minimise(data, fails, tries, self.minimise_s, self.tell)
-        counts = self.reached.run(small)
-        key = (*group, self.reached.path(counts))
-        known = self._by_key.get(key)
-        if known is not None:
-            self.more[known.name] += 1
-            self._in_vain[group] += 1
-            if known.confirmed:
-                return None
         verdict, what = judged(small)
         if verdict.failure is None and small != data:
             whole, said = judged(data)
             if whole.failure is not None:  # smaller, it is only the target's
-                small, verdict, what, counts = data, whole, said, self.reached.run(data)
+                small, verdict, what = data, whole, said
+        key = self._key(group, small, verdict, what)
+        known = self._by_name.get(key.name)
+        if known is None and group[1] is None:  # unconfirmed ones are told apart by what the target says
+            known = self._by_name.pop(self._key(group, small, None, what).name, None)
         if known is not None:
-            if verdict.failure is None:
+            self._count(known, group)
+            if known.confirmed or verdict.failure is None:
                 return None
             self.found.remove(known)  # another input shows now that it is real
             self.folder.remove(known.folder, known.name)
-        return self._keep(key, small, what, verdict, counts, (len(data), len(small)))
+            self.more[key.name] = self.more.pop(known.name)
+        crash = self._keep(key, small, what, verdict, (len(data), len(small)))
+        self._last[group] = crash
+        self._in_vain[group] = 0
+        return crash
+
+    def _count(self, known: Crash, group: tuple[str, int | None]) -> None:
+        self.more[known.name] += 1
+        self._in_vain[group] += 1
+        self._last[group] = known
+
+    def _key(
+        self, group: tuple[str, int | None], data: bytes, verdict: OracleVerdict | None, what: str
+    ) -> CrashKey:
+        """By what an input is told apart. A fault needs no verdict for that."""
+        check, pc = group
+        if pc is not None:
+            return CrashKey(check, self.reached.cause(data, pc), "")
+        failure = None if verdict is None else verdict.failure
+        return CrashKey(check, None, _NUMBER.sub("#", what if failure is None else failure.found))
 
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None
 
     def _keep(
-        self,
-        key: tuple[str, int | None, str],
-        data: bytes,
-        what: str,
-        verdict: OracleVerdict,
-        counts: Counts,
-        sizes: tuple[int, int],
+        self, key: CrashKey, data: bytes, what: str, verdict: OracleVerdict, sizes: tuple[int, int]
     ) -> Crash:
-        check, pc, path = key
-        failure = verdict.failure
+        failure, cause = verdict.failure, key.cause
         crash = Crash(
-            name="-".join([check, *([] if pc is None else [f"{pc:04x}"]), path]),
-            check=check,
-            pc=pc,
-            path=path,
-            function="" if pc is None else self.reached.function(pc),
-            verdict=f"{check}: {what}" if failure is None else str(failure),
+            name=key.name,
+            check=key.check,
+            pc=None if cause is None else cause.pc,
+            cause="" if cause is None else cause.what,
+            function="" if cause is None else self.reached.function(cause.pc),
+            verdict=f"{key.check}: {what}" if failure is None else str(failure),
             folder=UNCONFIRMED if failure is None else CONFIRMED,
             sizes=sizes,
             fault=failure is not None and failure.fault,
         )
         again = self.oracle.judged(data, {}).stream() if failure is None else verdict.case()
-        self.leave(crash.folder, crash.name, data, again, counts)
+        self.leave(crash.folder, crash.name, data, again, self.reached.run(data))
         self.found.append(crash)
-        self._by_key[key] = crash
-        self._last[key[:2]] = crash
-        self._in_vain[key[:2]] = 0
+        self._by_name[crash.name] = crash
         return crash
 
     def leave(self, folder: str, name: str, data: bytes, stream: str, counts: Counts) -> Path:

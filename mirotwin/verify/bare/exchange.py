@@ -158,7 +158,7 @@ def check_named(text: str) -> NamedCheck:
         if function in OWN:
             what = f"check {function!r} is in mirotwin (always on), too"
             raise BadInput("", f"{OPTION} {text}", what, "give the function another name")
-        return NamedCheck(function, text, _callable(_module(path, text), function, text), True)
+        return NamedCheck(function, text, _callable(module_of(path, OPTION), function, text), True)
     return installed_check(text)
 
 
@@ -182,9 +182,10 @@ def installed_check(name: str) -> NamedCheck:
     return NamedCheck(name, name, found, False)
 
 
-def _module(path: str, text: str) -> ModuleType:
+def module_of(path: str, option: str) -> ModuleType:
+    """Runs a file that the command line names. Raises BadInput, which names the option."""
     if not Path(path).is_file():
-        raise BadInput(path, OPTION, "there is no such file", "give FILE.py:FUNCTION")
+        raise BadInput(path, option, "there is no such file", "give the path of a file in Python")
     spec = importlib.util.spec_from_file_location(Path(path).stem, path)
     assert spec is not None
     assert spec.loader is not None
@@ -192,7 +193,7 @@ def _module(path: str, text: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise BadInput(path, OPTION, f"cannot be run: {raised(error)}", "repair it") from error
+        raise BadInput(path, option, f"cannot be run: {raised(error)}", "repair it") from error
     return module
 
 

@@ -42,7 +42,7 @@ cdef class Harness:
     cdef readonly Board board
     cdef readonly Cpu cpu
     cdef readonly LiveOracle oracle
-    cdef readonly long long bit_ticks, begin_tick, now_tick, end_tick
+    cdef readonly long long bit_ticks, begin_tick, now_tick, end_tick, after_ticks
     cdef readonly int sleeps
     cdef Moment _start, _opening
     cdef int _opening_mask

@@ -29,7 +29,7 @@ LEAD_TICKS = 1200
 SETTLE_TICKS = 30 * TICKS_PER_SECOND // 1000
 """How long after its last character firmware that sleeps may stay awake."""
 AWAKE_TICKS = 10 * TICKS_PER_SECOND // 1000
-"""How long after the last character a run goes on where firmware never sleeps."""
+"""How long after the last character a run goes on where firmware never sleeps and nothing else is asked for."""
 AHEAD_TICKS = 240  # an instruction and what looks ahead may overrun a stop by so much
 
 DONE, STOPPED, AWAKE = range(3)
@@ -126,15 +126,23 @@ class Harness:
     """`machine` is what the state tables of are saved: a `Board`, or something that holds a `Cpu`.
 
     `bit_ticks`: of the line. The machine is where it shall begin, with nothing on RXD. `sleeps`: whether its firmware
-    does when it has nothing to do.
+    does when it has nothing to do. `after_ticks`: how long a run goes on after its last character at least, -1 for
+    what its firmware needs.
     """
 
     NOT_STATE = ("*",)
 
     def __init__(
-        self, machine: Any, cpu: Cpu, oracle: LiveOracle, bit_ticks: int, board: Board | None = None
+        self,
+        machine: Any,
+        cpu: Cpu,
+        oracle: LiveOracle,
+        bit_ticks: int,
+        board: Board | None = None,
+        after_ticks: int = -1,
     ) -> None:
         self.machine = machine
+        self.after_ticks = after_ticks
         self.board = board
         self.cpu = cpu
         self.oracle = oracle
@@ -288,8 +296,13 @@ class Harness:
 
     def _settle(self, tick: int) -> int:
         """Until the firmware sleeps and the oracle waits for nothing."""
+        if self.after_ticks >= 0:
+            tick += self.after_ticks
+            if self._run(tick):
+                return _STOPPED
         if not self.sleeps:
-            return _STOPPED if self._run(tick + _AWAKE_TICKS) else _DONE
+            until = tick if self.after_ticks >= 0 else tick + _AWAKE_TICKS
+            return _STOPPED if self._run(until) else _DONE
         if not self._falls_asleep(tick + _SETTLE):
             faulted = self.board is not None and self.board.fault_count > 0
             return _STOPPED if self.oracle.code or faulted else _AWAKE

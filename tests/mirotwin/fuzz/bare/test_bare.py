@@ -275,6 +275,69 @@ def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
     sys.modules.pop("their_lines")
 
 
+def test_a_file_may_hold_one(tmp_path):
+    path = tmp_path / "my_lines.py"
+    path.write_text(THEIRS)
+    assert protocol_named(f"{path}:Lines").encode(b"a") == b"ax"
+    assert protocol_named(f'{path}:Lines:end="\\n"').encode(b"a") == b"a\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nowhere.py:Lines", "nowhere.py: --protocol: there is no such file"),
+        ("{}", "there is no class '' derived from Protocol; it has Lines"),
+        ("{}:Line", "there is no class 'Line' derived from Protocol; did you mean Lines?"),
+        ("{}:Other", "there is no class 'Other' derived from Protocol"),
+        ("{}:Lines:end", "'end' are no parameters"),
+        ("{}:Lines:rate=1", "rate: unknown key; Lines has end"),
+    ],
+)
+def test_what_a_file_does_not_hold_is_refused(tmp_path, text, said):
+    path = tmp_path / "my_lines.py"
+    path.write_text(THEIRS)
+    with pytest.raises(BadInput) as caught:
+        protocol_named(text.format(path))
+    assert said in str(caught.value)
+
+
+def test_a_file_that_cannot_be_run_is_refused(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("1 / 0")
+    with pytest.raises(BadInput, match="--protocol: cannot be run: ZeroDivisionError"):
+        protocol_named(f"{path}:Lines")
+
+
+LATE = f"""{SERIAL}
+JNB RI,$
+MOV R5,#4
+wait:
+MOV R6,#0
+outer:
+MOV R7,#0
+DJNZ R7,$
+DJNZ R6,outer
+DJNZ R5,wait
+LJMP 4000h
+"""
+"""Runs into nothing 263 ms after the first character, at 24 MHz."""
+
+
+@pytest.mark.parametrize(("after_ms", "code"), [(None, 0), (1, 0), (200, 0), (300, NO_FAULT_CODE)])
+def test_a_run_goes_on_after_its_last_character_as_long_as_it_was_told(after_ms, code):
+    after_ticks = None if after_ms is None else after_ms * 24_000
+    target = BareTarget(image(LATE), "bytes", after_ticks=after_ticks)
+    assert target.run(b"a") == code
+    ms = (target.end_tick() - target.harness.end_tick) / 24_000
+    assert code or ms == pytest.approx(10 if after_ms is None else after_ms, abs=0.1)
+
+
+def test_firmware_that_sleeps_is_watched_that_long_too():
+    target = BareTarget(image(SLEEPS), "bytes", after_ticks=24_000 * 70)
+    assert target.run(b"a") == 0
+    assert target.end_tick() - target.harness.end_tick >= 24_000 * 70
+
+
 # The page about foreign firmware: its check and its format work as they stand there
 
 PAGE = (Path(__file__).parents[4] / "docs" / "fuzz-any-8051.md").read_text(encoding="utf-8")
