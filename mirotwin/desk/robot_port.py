@@ -266,7 +266,9 @@ class RobotPort:
             with suppress(PortError, *PORT_ERRORS):
                 if not self._serial.is_open:
                     self._serial = _opened(self.url)
-                self._serial.reset_output_buffer()
+                if not self.url.lower().startswith("rfc2217:"):  # it would wait up to 3 s for a confirmation
+                    with suppress(*PORT_ERRORS):
+                        self._serial.reset_output_buffer()
                 self._serial.write(frames)
                 if not self._virtual:
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
@@ -329,6 +331,13 @@ class RobotPort:
     def _read(self, wait_ticks: int) -> bytes:
         """What is there, or is the first to come in this time."""
         port, wait_s = self._serial, wait_ticks / TICKS_PER_SECOND
+        unread = getattr(
+            port, "_read_buffer", None
+        )  # of rfc2217://, which a thread of pyserial fills without end
+        if unread is not None and unread.qsize() > BURST_BYTES:
+            with unread.mutex:
+                self.dropped += len(unread.queue)
+                unread.queue.clear()
         with self._told():
             if self._virtual:
                 port.timeout = wait_s

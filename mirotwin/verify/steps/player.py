@@ -136,7 +136,7 @@ class Player:
             except ValueError as error:
                 if isinstance(error, ScenarioError):
                     raise
-                what, _, remedy = f"{error}".partition("; ")
+                what, _, remedy = f"{error}".removeprefix(f"{self.origin}: ").partition("; ")
                 raise ScenarioError(self.origin, f"step {step.number}", what, remedy) from error
             self.done += 1
 

@@ -10,6 +10,8 @@ import termios
 import threading
 import tty
 from contextlib import suppress
+from queue import Queue
+from unittest.mock import Mock
 
 import pytest
 import serial
@@ -22,6 +24,7 @@ from miro_protocol.events import Received
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from mirotwin import Telemetry
+from mirotwin.desk import robot_port
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.testing.link import Link
@@ -299,6 +302,31 @@ def test_a_port_that_vanishes_with_ctrl_c_is_opened_again_for_the_stop_frames(pt
 
     broken_off(pty.path, do, KeyboardInterrupt)
     assert stops(pty.read())
+
+
+@pytest.mark.parametrize("scheme", ["", "rfc2217://"])
+def test_stop_frames_do_not_depend_on_what_is_taken_back_before_them(pty, monkeypatch, scheme):
+    """`rfc2217://` waits for a confirmation, which is late behind a flood of characters."""
+
+    def refuse():
+        assert not scheme, "it would wait"
+        raise serial.SerialException("timeout while waiting for option 'purge'")
+
+    with robots_at(pty.path) as port:
+        port.inject(DRIVE)
+        port.url = f"{scheme}{pty.path}"
+        monkeypatch.setattr(port._serial, "reset_output_buffer", refuse)
+        monkeypatch.setattr(robot_port, "_opened", Mock(side_effect=PortError("", "", "gone")))
+    assert stops(pty.read())
+
+
+def test_what_a_thread_of_the_port_has_read_is_bounded(pty):
+    with robots_at(pty.path) as port:
+        unread = port._serial._read_buffer = Queue()
+        for _ in range(70_000):
+            unread.put(b"\x55")
+        port.run_for(MS)
+        assert (unread.qsize(), port.dropped) == (0, 70_000)
 
 
 def test_a_port_that_refuses_to_be_set_up_is_told_in_one_line(pty, monkeypatch):
