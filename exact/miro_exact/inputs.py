@@ -19,6 +19,8 @@ PICTURE_BYTES = 4 << 20
 """320 x 240 pixels of 48 bits are 0.5 MB."""
 WORLD_BYTES = 64 << 20
 RECORDING_BYTES = 1 << 30
+RECORDING_NEEDS = 7
+"""Memory that reading a whole recording takes at most, in sizes of the file (docs/measured.md)."""
 CHUNK_BYTES = 1 << 20
 _OF_PROCESSES = ("/dev/", "/proc/self/fd/")
 """Where a shell puts the pipe of `<(command)`."""
@@ -76,16 +78,25 @@ def read_input(
     check_ends(path)
     with open(path, "rb") as file:
         state = os.fstat(file.fileno())
-        data = bytearray(file.read(min(CHUNK_BYTES, limit + 1)))
-        if prefix and data.startswith(prefix):
+        head = file.read(min(CHUNK_BYTES, limit + 1))
+        if prefix and head.startswith(prefix):
             limit = prefix_limit
-        if stat.S_ISREG(state.st_mode) and state.st_size > limit:
-            raise _too_long(path, limit)
-        while len(data) <= limit and (more := file.read(CHUNK_BYTES)):
-            data += more
+        if stat.S_ISREG(state.st_mode):
+            if state.st_size > limit:
+                raise _too_long(path, limit)
+            if limit == RECORDING_BYTES:
+                check_memory(path, state.st_size)
+            file.seek(0)
+            data = file.read()  # in one piece: joining chunks takes its size once more
+        else:
+            chunks, length = [head], len(head)
+            while length <= limit and (more := file.read(CHUNK_BYTES)):
+                chunks.append(more)
+                length += len(more)
+            data = b"".join(chunks)
     if len(data) > limit:
         raise _too_long(path, limit)
-    return bytes(data)
+    return data
 
 
 def check_ends(path: str | os.PathLike[str]) -> None:
@@ -98,6 +109,42 @@ def check_ends(path: str | os.PathLike[str]) -> None:
         raise InputError(str(path), "is a device", "name a file or a pipe")
     if stat.S_ISFIFO(mode) and not os.fspath(path).startswith(_OF_PROCESSES):
         raise InputError(str(path), "is a named pipe, which may never end", "give a file, or <(COMMAND)")
+
+
+def check_memory(path: str | os.PathLike[str], size: int) -> None:
+    """Refuses a recording that would take more memory than there is: the system would end this program, or others."""
+    available = available_bytes()
+    if available is not None and size * RECORDING_NEEDS > available:
+        what = f"takes up to {_in_mb(size * RECORDING_NEEDS)} of memory to read, and {_in_mb(available)} are available"
+        raise InputError(str(path), what, "end other programs, or read it on a machine with more")
+
+
+def available_bytes() -> int | None:
+    """Memory that this process may take yet: by the system, its control group and its limits; None if none says."""
+    found = []
+    with suppress(OSError, KeyError, ValueError):
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        kb = {name: int(value.split()[0]) for name, _, value in (line.partition(":") for line in lines)}
+        found.append((kb["MemAvailable"] + kb["SwapFree"]) << 10)
+    with suppress(OSError, ValueError):
+        inner = Path("/proc/self/cgroup").read_text(encoding="utf-8").rpartition("0::/")[2].strip()
+        group = Path("/sys/fs/cgroup") / inner
+        for folder in (group, *group.parents[: len(Path(inner).parts)]):
+            with suppress(OSError, ValueError):  # "max", and the topmost group has no such files
+                limit, used = (int((folder / name).read_text()) for name in ("memory.max", "memory.current"))
+                found.append(limit - used)
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
+            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+            found.append(limit - pages * resource.getpagesize())
+    return max(0, min(found)) if found else None
+
+
+def _in_mb(size: int) -> str:
+    return f"{size / 1e6:.0f} MB"
 
 
 def _too_long(path: str | os.PathLike[str], limit: int) -> InputError:

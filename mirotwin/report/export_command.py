@@ -11,6 +11,7 @@ from typing import Annotated
 import click
 
 from miro_exact.bad_input import BadInput, amount
+from miro_exact.inputs import check_memory
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.recording.capture import render
 from mirotwin.recording.capture.detect import NAMES, TIMED, detect
@@ -33,6 +34,8 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
         raise BadInput(given.label, "", what, "give a run.mcap that `mirotwin run` wrote")
     from mirotwin.report.foxglove.convert import Conversion  # loads most of the package
 
+    if given.size is not None:
+        check_memory(given.label, given.size)
     made = BytesIO()
     conversion = Conversion(b"".join(iter(given.read_some, b"")), given.label, made)
     _write(out, [made.getvalue()])

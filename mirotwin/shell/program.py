@@ -261,6 +261,8 @@ class MainGroup(LazyGroup):
                 _give_up(sys.stdout)
                 return _ended(BAD_INPUT, f"error: reading or writing failed: {reason}")
             return _ended(BAD_INPUT, f"error: {os.fsdecode(error.filename)}: {reason}")
+        except MemoryError:
+            return _ended(BAD_INPUT, "error: memory ran out; end other programs, or use a machine with more")
         except (click.Abort, KeyboardInterrupt):
             return _ended(INTERRUPTED, "interrupted")
         except Terminated as error:
