@@ -1,5 +1,6 @@
 """One verdict for the same thing, whichever command judges it: the word, the exit code, and what JUnit says."""
 
+import json
 import shutil
 from xml.etree import ElementTree
 
@@ -162,6 +163,26 @@ def test_a_stream_for_a_bare_processor_has_one_verdict(mirotwin, tmp_path, progr
     code, out, _ = mirotwin("test", path, "--firmware", file)
     assert (out.startswith(VERDICTS[verdict].line), code) == (True, VERDICTS[verdict].code)
     assert mirotwin("replay", path, "--firmware", file, "-q")[0] == VERDICTS[verdict].code
+
+
+def test_a_run_that_was_ended_before_a_check_is_not_held_against_it(mirotwin, tmp_path):
+    file, folder = tmp_path / "a.scenario.toml", tmp_path / "run"
+    file.write_text(
+        'scenario = "silent"\nduration_s = 0.3\n[expect]\ntracks_within_cm = { limit_cm = 9.0, from_s = 0.2 }\n'
+    )
+    said = "expectation not judged: tracks_within_cm: the run was ended before it"
+    code, _, err = mirotwin("run", file, "--to", "100ms", "--out", tmp_path / "part", "-q", "--no-figure")
+    assert (code, said in err) == (0, True)
+    mirotwin.succeeds("run", file, "--out", folder, "-q", "--no-figure")
+    code, _, err = mirotwin("replay", folder / "run.mcap", "-q", "--to", "100ms")
+    assert (code, said in err) == (0, True)
+
+
+def test_what_is_looked_into_ends_where_the_case_ends(mirotwin, tmp_path):
+    """`silent` goes on for a minute, the case for 250 ms: 500 000 machine cycles, and the rest of a control period."""
+    path = stream(tmp_path / "a.stream", "no_fault = true")
+    profile = json.loads(mirotwin.succeeds("fw", "profile", path, "--json"))
+    assert 500_000 <= profile["cycles"] < 500_000 + 66_734
 
 
 def test_the_worst_of_several_files_decides():
