@@ -244,6 +244,9 @@ def main():
         f"last writers: {given.writers} asked, {asked} of them with one in the window; {len(wrong)} wrong {wrong[:5]}"
     )
     bad = bool(wrong)
+    calls, wrong = arguments(robot_run(), SECOND)
+    print(f"arguments: {len(calls)} at {sum(calls.values())} entries, {len(wrong)} wrong {wrong[:5]}")
+    bad |= bool(wrong)
     with tempfile.TemporaryDirectory() as folder:
         runs = {
             "the robot's own": robot_run("sine"),
