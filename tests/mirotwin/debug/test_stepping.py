@@ -547,16 +547,6 @@ def test_a_watched_bit_stops_where_it_is_written_itself(bit):
     assert writer[0] // CYCLE_TICKS == expected[-1]
 
 
-def test_a_search_backwards_is_interrupted_within_a_stretch():
-    debugger = debugger_of(robot_run())
-    debugger.go_to(SECOND)
-    debugger.timeline._kept[1:] = []
-    with debugger.timeline.interrupted_by(lambda: debugger.timeline.tick < SECOND // 4):
-        for _ in debugger.timeline.hits_back({0: Trap({0x5E3}, lambda core: True)}):
-            pass
-    assert debugger.timeline.tick > SECOND // 4  # where nothing was searched yet
-
-
 def test_counting_hits_is_interrupted_and_counts_on():
     debugger = debugger_of(robot_run())
     debugger.add("lm629_command", count=">= 40")
