@@ -28,7 +28,7 @@ MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
 _IDLE_SLICE = 200_000  # cycles between two looks when nothing is left to send
 _POLLS = 32  # reads of P3 within a slice that count as listening on RXD
 _SCON, _SM0, _SM1, _REN, _RI = 0x98, 0x80, 0x40, 0x10, 0x01
-_CHARACTER_BITS = 10
+_CHARACTER_BITS = 10  # and one more in the modes of 9 bits, whose ninth is sent as 1
 _TICKS_PER_BIT = 32  # of the fastest receiver there is: mode 2 with SMOD
 _LONGEST = 1 << 30  # bytes of a saved piece
 
@@ -71,6 +71,7 @@ class SerialInput:
         "fed": TICK,
         "tail": Octets(_LONGEST),
         "begin_tick": TICK,
+        "char_start": TICK,
         "char_end": TICK,
         "polls": TICK,
         "bit_ticks": ("q", 0, 1 << 40),
@@ -101,7 +102,7 @@ class SerialInput:
         self.tail = b""  # of what the program sent, as long as the text waited for
         self.seen: Counter[bytes] = Counter()  # how often each text was sent while it was waited for
         self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was seen
-        self.char_end = 0  # tick at which the last character ends
+        self.char_start = self.char_end = 0  # of the last character, which may be to come
         self.polls = 0  # reads of P3 seen so far
         self.bit_ticks = 0  # as the receiver was last set, 0 while that is not known
         self._arm()
@@ -114,10 +115,7 @@ class SerialInput:
 
     def heard(self, value: int, tick: int) -> None:
         """The program has sent a character, whose stop bit began at `tick`."""
-        last_start = self.char_end - self._bit_offset(
-            _CHARACTER_BITS
-        )  # of the piece before, which may be to come
-        if self.waiting_for and tick >= last_start:
+        if self.waiting_for and tick >= self.char_start:
             self.tail = (self.tail + bytes([value]))[-len(self.waiting_for) :]
             if self.tail == self.waiting_for:
                 self.seen[self.tail] += 1
@@ -177,11 +175,12 @@ class SerialInput:
         return receiving or polling or (condition and self.baud is not None)
 
     def _send(self, start: int) -> None:
-        """Start bit, eight data bits, stop bit."""
+        """Start bit, eight data bits, stop bit; in the modes of 9 bits a ninth before it, which has its level."""
         bits = self.pieces[0].data[self.fed] << 1 | 1 << (_CHARACTER_BITS - 1)
         for number in range(_CHARACTER_BITS):
             self.cpu.rxd.append(start + self._bit_offset(number), bits >> number & 1)
-        self.char_end = start + self._bit_offset(_CHARACTER_BITS)
+        count = _CHARACTER_BITS + (self.cpu.sfr(_SCON) & _SM0 != 0)
+        self.char_start, self.char_end = start, start + self._bit_offset(count)
         self.fed += 1
         if self.fed == len(self.pieces[0].data):
             self.pieces.pop(0)

@@ -362,6 +362,17 @@ def test_without_a_baud_rate_it_begins_when_the_clock_of_the_receiver_runs():
     assert starts[1] - starts[0] == 10 * 32 * 12 * 13
 
 
+@pytest.mark.parametrize("control", ["50h", "90h", "0D0h", "0F0h"])
+@pytest.mark.parametrize("wait", [False, True])
+def test_every_mode_of_the_receiver_takes_all_characters(control, wait):
+    """Those of 9 bits have no time for the next start bit during their eleventh bit."""
+    text = "MOV R0,#40h\nMOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nSETB TR1\n"
+    text += f"MOV SCON,#{control}\nloop:\nJNB RI,$\nCLR RI\nMOV @R0,SBUF\nINC R0\nSJMP loop"
+    machine = BareMachine(image_of(text), stdin=b"ABCDEFGH", wait=wait)
+    machine.run(max_cycles=100_000)
+    assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(8)) == b"ABCDEFGH"
+
+
 def test_a_receiver_that_is_switched_off_does_not_stop_the_line():
     text = SERIAL + "JNB RI,$\nMOV SCON,#00h\nSJMP $"
     machine = BareMachine(image_of(text), stdin=b"ABCD")
