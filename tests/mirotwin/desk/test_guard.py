@@ -4,7 +4,6 @@ import re
 from contextlib import nullcontext
 from functools import cache
 from itertools import accumulate, pairwise
-from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
@@ -26,9 +25,7 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.rig_options import silent_scenario
 from tests.mirotwin.desk.rig import ROBOT
 from tests.naive import guard as naive
-
-FOUND = Path(__file__).parent / "found"
-"""Streams that a guard let through once."""
+from tests.vectors.paths import CASES
 
 
 @pytest.fixture
@@ -114,7 +111,7 @@ def test_a_frame_for_networks_of_five_is_read_too():
 def test_a_stream_with_a_frame_that_no_host_makes_is_refused_before_anything_is_sent(
     mirotwin, in_tmp, name, says
 ):
-    said = mirotwin.refuses("replay", FOUND / f"{name}.stream", "--port", ROBOT)
+    said = mirotwin.refuses("replay", CASES / f"{name}.stream", "--port", ROBOT)
     assert says in said
     assert "give --allow-motion" in said
     assert not (in_tmp / "runs").exists()
@@ -122,7 +119,7 @@ def test_a_stream_with_a_frame_that_no_host_makes_is_refused_before_anything_is_
 
 @pytest.mark.parametrize("name", ["guard-min", "guard-gap"])
 def test_a_wheel_that_a_frame_no_host_makes_drives_too_fast_is_refused(mirotwin, in_tmp, name):
-    said = mirotwin.refuses("replay", FOUND / f"{name}.stream", "--port", ROBOT, "--allow-motion")
+    said = mirotwin.refuses("replay", CASES / f"{name}.stream", "--port", ROBOT, "--allow-motion")
     assert "at most 0.5 m/s are allowed; raise --max-speed" in said
 
 
