@@ -150,6 +150,8 @@ class Moment:
             owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
             placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
             remedy = did_you_mean(name, self.symbols.known)
+            if self._function in owners - placed:
+                raise NoValue(f"{name} is not live: no debug file says where this function keeps it")
             if owners | placed:
                 remedy = f"it is a local variable of {', '.join(sorted(owners | placed))}"
                 remedy += f"; give {min(placed)}:{name}" if placed else ""
@@ -267,8 +269,8 @@ class Moment:
         where = places.of(one, self.pc)
         if self.frame and not isinstance(where, str):
             where = "its registers belong to the function that is called"
-        home = " ".join(one.registers[::-1]).upper()
-        remedy = f"its home is {home}: print what that holds" if home else ""
+        home = one.registers[::-1] if -1 not in places.home(one) else ()
+        remedy = f"its home is {' '.join(home).upper()}: print what that holds" if home else ""
         return self._in_registers(places, one.name, one.type, where, remedy)
 
     def _in_registers(

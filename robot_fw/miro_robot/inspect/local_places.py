@@ -1,8 +1,9 @@
 """Where the value of a local variable is before an instruction, or why that cannot be told.
 
 The debug file names a home for each variable and no times. Arguments arrive by the compiler's convention: the first
-one that is no bit in DPL, DPH, B, A, low byte first (SDCC manual, "Global Registers used for Parameter Passing"), the
-others in memory or on the stack. What the registers hold later is followed through the code (`data_flow`).
+one that is no bit in DPL, DPH, B, A, low byte first (SDCC manual, "Global Registers used for Parameter Passing"), and
+R4 to R7 where it has eight bytes; the others in memory or on the stack. What the registers hold later is followed
+through the code (`data_flow`).
 
     entry    MOV R7,DPL    ..    MOV DPL,R7    LCALL          `opcode` with the home R7
     DPL      DPL, R7       R7    R7            nowhere: R7 is not read any more, so it may hold something else
@@ -20,7 +21,6 @@ from miro_robot.image.variables import Variables
 from miro_robot.inspect.data_flow import DPH, DPL, ENTRY, SP, A, B, Callees, Effect, Flow, Held, Origin
 from miro_robot.mcs51.opcodes import SFRS
 
-_ARGUMENT = (DPL, DPH, B, A)
 _PLACES = {"dpl": DPL, "dph": DPH, "b": B, "a": A, **{f"r{number}": number for number in range(8)}}
 _FIRST_SFR, _PSW, _PUSH = 0x80, SFRS["PSW"], 0xC0
 
@@ -57,6 +57,7 @@ class LocalPlaces:
         self.bank = blocks.bank(self.name, self.module)
         self.own = blocks.of_function(self.name, self.module)
         self.parameters = blocks.parameters(self.own, function.first, function.end)
+        self.arrives_in = (DPL, DPH, B, A, *range(8 * self.bank + 4, 8 * self.bank + 8))
         self.flow = Flow(callees, function.first, 8 * self.bank)
         self.line_begins = [
             address for address, _ in debug.lines if address in self.flow.held and address != function.first
@@ -70,7 +71,9 @@ class LocalPlaces:
         found = []
         for one in self.parameters:
             memory = self._memory(one, variables)
-            if one.storage == STACK or one.type.kind in ("bit", "bits") or one.type.size > len(_ARGUMENT):
+            if one.storage == STACK or one.type.kind in ("bit", "bits"):
+                continue
+            if one.type.size > len(self.arrives_in):
                 continue
             if one.storage == "R" or (memory and not self._is_numbered(memory)):
                 found.append(self._arrives(one, memory))
@@ -123,7 +126,7 @@ class LocalPlaces:
         if does.constant in memory or (memory and does.writes in ({DPL, DPH}, set())):
             return does.mnemonic in ("MOV", "MOVX", "INC")
         known = (*self.flow.places, *memory)
-        arguments = [frozenset({(ENTRY, place)}) for place in _ARGUMENT]
+        arguments = [frozenset({(ENTRY, place)}) for place in self.arrives_in]
         moved = [to in known and held.get(source) in arguments for to, source in does.moves]
         return bool(moved) and all(moved) and does.mnemonic in ("MOV", "XCH")
 
@@ -140,7 +143,9 @@ class LocalPlaces:
 
     def _holds(self, held: Held, home: Collection[int]) -> bool:
         """Whether it is there still as it arrived."""
-        return all(held[place] == {(ENTRY, there)} for place, there in zip(home, _ARGUMENT, strict=False))
+        return all(
+            held[place] == {(ENTRY, there)} for place, there in zip(home, self.arrives_in, strict=False)
+        )
 
     def _names(self, address: int, memory: range) -> bool:
         """Whether an instruction reads or writes a memory, or takes its address."""
@@ -165,9 +170,11 @@ class LocalPlaces:
         argument = self.argument
         if argument is not None and one.name == argument.name and pc in argument.prologue:
             return self._arrived(one, held)
-        home = self._home(one)
-        if not home or -1 in home:
+        home = self.home(one)
+        if not home:
             return "it was optimised away"
+        if -1 in home:
+            return "it is in a register of the compiler's own"
         if self.flow.live[pc].isdisjoint(home):
             return "its value is not needed from here on"
         if argument is not None and one.name == argument.name and self._holds(held, home):
@@ -189,15 +196,16 @@ class LocalPlaces:
             if other.storage == "R" and other is not one:
                 if not other.registers and other.type.size == one.type.size:
                     return True
-                if self._shares(other, home) and self._may_be_of(other, self._home(other), pc):
+                if self._shares(other, home) and self._may_be_of(other, self.home(other), pc):
                     return True
         return False
 
-    def _home(self, one: LocalVariable) -> tuple[int, ...]:
+    def home(self, one: LocalVariable) -> tuple[int, ...]:
+        """Its registers as the debug file has them, low byte first; -1 for one of the compiler's own (B0 to B7)."""
         return tuple(self._place(register) for register in one.registers)
 
     def _shares(self, other: LocalVariable, home: tuple[int, ...]) -> bool:
-        return not set(home).isdisjoint(self._home(other))
+        return not set(home).isdisjoint(self.home(other))
 
     def _may_be_of(self, one: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
         """Whether all bytes that its home holds are needed later, and at the begin of a C line that may name it.
@@ -252,7 +260,7 @@ class LocalPlaces:
     def _arrived(self, one: LocalVariable, held: Held) -> tuple[int, ...] | str:
         """In any of the registers, while no C line of the body has begun."""
         found = []
-        for there in _ARGUMENT[: one.type.size]:
+        for there in self.arrives_in[: one.type.size]:
             places = [place for place in self.flow.places if held[place] == {(ENTRY, there)}]
             if not places:
                 return "its registers hold something else"

@@ -82,6 +82,42 @@ def test_arguments_have_their_values_where_a_function_begins(tmp_path, options):
     assert min(known.values()) > 0
 
 
+@needs_sdcc
+@pytest.mark.parametrize("options", [[], ["--model-large"], ["--opt-code-size"]])
+def test_an_argument_of_eight_bytes_has_its_value_before_its_memory_has(tmp_path, options):
+    source = (
+        "volatile unsigned long long sum;\nvoid touch(void) { sum ^= 1; }\n"
+        "void f(unsigned long long a, char b) { touch(); sum = a + b; }\n"
+        "void main(void) { f(0x123456789abcdef0ULL, 1); f(2, 3); for (;;); }\n"
+    )
+    debugger = compiled(tmp_path, source, *options)
+    debugger.add("f", "a == 2")
+    assert debugger.move("continue") == "breakpoint 1"
+    assert (value(debugger, "a"), value(debugger, "b")) == (2, 3)
+    debugger.go_to(0)
+    debugger.breakpoints.clear()
+    debugger.add("f")
+    debugger.move("continue")
+    assert value(debugger, "a") == 0x123456789ABCDEF0
+
+
+@needs_sdcc
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ([], "no debug file says where this function keeps it"),
+        (["--stack-auto"], "it is in a register of the compiler's own"),
+    ],
+)
+def test_a_bit_that_no_debug_file_places_is_said_to_be_of_the_function(tmp_path, options, why):
+    source = "void touch(void) { }\nvoid f(__bit a) { touch(); if (a) touch(); }\nvoid main(void) { f(1); for (;;); }\n"
+    debugger = compiled(tmp_path, source, *options)
+    debugger.add("f")
+    assert debugger.move("continue") == "breakpoint 1"
+    with pytest.raises(BadInput, match=f"a is not live: {why}"):
+        value(debugger, "a")
+
+
 def test_a_condition_on_an_argument_is_met_at_the_first_call_with_it():
     debugger = debugger_of(robot_run())
     debugger.add("lm629_command", "opcode == 1")
