@@ -97,7 +97,8 @@ def _is_own(client: socket.socket) -> bool:
         rows = [line.split() for line in _TCP.read_text().splitlines()[1:]]
     except OSError:  # it has gone already
         return False
-    return any(row[1:3] == ends and int(row[7]) == os.getuid() for row in rows)
+    own = [row for row in rows if row[1:3] == ends and int(row[7]) == os.getuid()]
+    return any(row[9] != "0" for row in own)  # inode 0: nobody's any more, and listed as root's
 
 
 def _written(host: str, port: int) -> str:

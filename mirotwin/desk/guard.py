@@ -143,7 +143,8 @@ class Guard:
         number a robot took last: who jumps in its numbers does not know which that is.
 
         `unsent`: so many of the characters sent last may have been taken back. Wherever they end, no window over what
-        is left of them and the frames' first characters is a frame: other characters stand between if need be.
+        is left of them and the frames' first characters is a frame: other characters stand between if need be, unless
+        that helps with none: then the next stop frame ends what the first one begins.
         """
         steps = [*range(1, STOP_FRAMES + 1), *range(STOP_FRAMES + FRESH_STEPS, SEQ_MODULUS, FRESH_STEPS)]
         frames = b"".join(
@@ -152,7 +153,9 @@ class Guard:
             for step in steps
         )
         betweens = (b"", *(bytes([character]) * LONGEST for character in range(256)))
-        return next(between + frames for between in betweens if self._is_apart(between + frames, unsent))
+        return next(
+            (between + frames for between in betweens if self._is_apart(between + frames, unsent)), frames
+        )
 
     def _is_apart(self, frames: bytes, unsent: int) -> bool:
         """Whether robots find nothing in these characters that moves them, behind any beginning of what was sent."""

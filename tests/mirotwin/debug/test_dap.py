@@ -543,6 +543,15 @@ def test_a_connection_within_this_machine_is_known_to_be_its_users_own():
             assert debug_command._is_own(client)
 
 
+def test_a_client_that_has_gone_is_nobodys_own():
+    """Linux says that the connection of a socket that was closed belongs to root."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        socket.create_connection(server.getsockname()).close()
+        client, _ = server.accept()
+        with client:
+            assert not debug_command._is_own(client)
+
+
 def test_where_the_system_does_not_tell_nothing_is_served_without_the_token(monkeypatch, tmp_path):
     thread, _, line = listening(monkeypatch, _TCP=tmp_path / "none")
     place, _, token = line.partition(", token ")

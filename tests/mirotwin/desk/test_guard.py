@@ -385,6 +385,14 @@ def test_stop_frames_complete_no_frame_that_was_begun(robots, taken_back):
     assert stop_frames(guard, robots, taken_back)
 
 
+def test_stop_frames_go_out_after_characters_that_were_made_so_that_any_between_would_complete_a_frame():
+    fast = body(0, 5, b"\x10\x10" * 6, 3)[:-2]
+    sent = b"".join(ending_in(bytes([character]) * 2, 3, fast)[6:-2] for character in range(256))
+    guard = Guard(STANDING)
+    guard.check(sent)
+    assert stop_frames(guard, 3, len(sent))
+
+
 @settings(max_examples=100)
 @given(transmissions(), st.integers(0, 200))
 def test_stop_frames_move_no_robot_wherever_what_was_sent_ends(pieces, unsent):
