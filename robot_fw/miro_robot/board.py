@@ -13,6 +13,7 @@
 Order on one tick: the plant moves first (its encoder edges reach the decoders), then the left LM629, the right
 LM629, the bridge inputs, the interrupt lines, and last what the CPU did to its port pins on that tick. Everything
 but the CPU is advanced at its own events only, never "up to now", so reading a part at any time changes no bit.
+The CPU never passes an event that may change HI: the chips are then up to 9 ticks ahead of it, or of the end of a run.
 """
 
 from __future__ import annotations
@@ -182,11 +183,17 @@ class Board(Bus):
         """A piece of a run, between `begin_run` and `end_run` of the CPU."""
         stopped = 0
         cpu = self.cpu
-        while not stopped and cpu.cycles * CYCLE_TICKS < until_tick:
-            horizon = min(until_tick, self._next_interrupt(self.left), self._next_interrupt(self.right))
+        until_cycle = (until_tick + CYCLE_TICKS - 1) // CYCLE_TICKS
+        while not stopped and cpu.cycles < until_cycle:
+            due = min(self._next_interrupt(self.left), self._next_interrupt(self.right))
+            horizon = min(until_tick, due)
             self.horizon = horizon
-            stopped = cpu.go_on((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
-            self.sync(min(horizon, cpu.cycles * CYCLE_TICKS) if stopped else horizon)
+            # An instruction waits for `due` if it begins in a cycle whose S5P2, tick 9, is not before it (P2).
+            stopped = cpu.go_on(min(until_cycle, (due + 2) // CYCLE_TICKS))
+            if stopped:
+                self.sync(min(horizon, cpu.cycles * CYCLE_TICKS))
+            else:
+                self.sync(due if cpu.cycles < until_cycle else horizon)
             if stopped == REPLAN:
                 stopped = 0
         self.horizon = -1
