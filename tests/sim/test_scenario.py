@@ -396,9 +396,9 @@ def chips_world(options):
 
 
 def test_both_chips_of_a_robot_follow_the_table():
-    board = chips_world('busy_clocks = 240\ninterrupt = "level"').networks[0].robots[0].board
+    board = chips_world('busy_clocks = 240\ninterrupt = "event"').networks[0].robots[0].board
     for chip in (board.left, board.right):
-        assert (chip.options.busy_clocks, chip.options.interrupt) == (240, "level")
+        assert (chip.options.busy_clocks, chip.options.interrupt) == (240, "event")
         assert chip.port.busy_ticks == 960
 
 

@@ -39,12 +39,12 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """W1: such a parameter keeps its low bits, or becomes the nearest that fits (relative ones: always masked)."""
 
     # Interrupts
-    interrupt: Literal["event", "level"] = "event"
-    """I1: HI is latched by flags that rise, or follows (flags AND mask)."""
+    interrupt: Literal["level", "event"] = "level"
+    """I1: HI follows (flags AND mask), or is latched by flags that rise."""
     error_flag_repeats: bool = True
     """I2: the excessive-error flag comes back each sample that the error persists; False: once per excess."""
     reset_interrupts: bool = True
-    """I3: the flag that a reset raises (trajectory complete) also raises HI."""
+    """I3: the flag that a reset raises (trajectory complete) also raises HI; False has a meaning with `event` alone."""
 
     # Reset
     reset_clocks: int = 6144

@@ -51,14 +51,14 @@ class Signals:
             self._follow()
 
     def raise_flags(self, flags: int) -> None:
-        """Set flags of bits 6..1. HI follows where one was 0 and is not masked."""
+        """Set flags of bits 6..1. As an event HI follows where one was 0 and is not masked."""
         if flags & ~self.word & self.mask:
             self.word |= 0x8000
         self.word |= flags
         self._follow()
 
     def reset_interrupts(self, keep: int) -> None:
-        """RSTI: flags whose bit in `keep` is 0 are reset, and so is HI, whatever flags remain."""
+        """RSTI: flags whose bit in `keep` is 0 are reset; as an event so is HI, whatever flags remain."""
         self.word &= keep & _INTERRUPTS | ~(_INTERRUPTS | 0x8000)
         self._follow()
 

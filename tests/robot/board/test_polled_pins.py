@@ -1,4 +1,4 @@
-"""Firmware that polls HI sees it at S5P2 of the first cycle that has it there, wherever in a cycle the LM629 raises it."""
+"""Firmware that polls HI sees it at the first S5P2 that has it, wherever in a cycle the LM629 raises it."""
 
 import pytest
 from hypothesis import given
