@@ -41,6 +41,8 @@ class NaiveLm629:
         self.filter = {"kp": 0, "ki": 0, "kd": 0, "il": 0, "ds": 0}
         self.start = None
         self.start_relative = False
+        self.ordered = 0
+        self.loop_open = True
         self.update = None
         kept = set() if self.options.reset_clears_lpes or reset == "hard" else {9}
         kept |= set() if self.options.reset_clears_index else {0}
@@ -118,8 +120,6 @@ class NaiveLm629:
         if self.real + counts != modular(self.real + counts, 31):
             events.add(4)
         self.real = modular(self.real + counts, 31)
-        if 7 in self.signals:
-            self.stand_at_real()
         if self.start is not None:
             self.begin_motion(events)
         if self.update is not None:
@@ -129,7 +129,7 @@ class NaiveLm629:
             self.update = None
             self.signals.discard(13)
         drive = 0
-        if 7 not in self.signals:
+        if not self.loop_open:
             self.profile(events)
             error = modular(math.floor(self.desired) - self.real, 31)
             judged = error if self.options.error_test == "full" else between(-32768, error, 32767)
@@ -138,11 +138,10 @@ class NaiveLm629:
                 if self.options.error_flag_repeats or not before:
                     events.add(5)
                 if 9 in self.signals:
-                    self.signals.add(7)
-                    events.add(2)
-            if 7 not in self.signals:
+                    self.turn_off(events)
+            if not self.loop_open:
                 drive = self.pid.step(error)
-        if 7 in self.signals:
+        if self.loop_open:
             self.stand_at_real()
             self.excess = False
             if self.options.open_loop_clears:
@@ -150,7 +149,7 @@ class NaiveLm629:
         rounded = math.floor if self.options.output_rounding == "down" else math.trunc
         top = rounded(Fraction(drive, 256))
         self.magnitude = min(127, abs(top))
-        if 7 not in self.signals:
+        if not self.loop_open:
             self.sign = self.options.sign_of_negative if top < 0 else int(not self.options.sign_of_negative)
         elif not self.options.off_keeps_sign:
             self.sign = 0
@@ -168,8 +167,15 @@ class NaiveLm629:
         self.speed = 0
         self.activity = "none"
 
+    def turn_off(self, events):
+        self.loop_open = True
+        self.signals.add(7)
+        events.add(2)
+
     def begin_motion(self, events):
         assert self.start is not None
+        if self.loop_open:
+            self.stand_at_real()
         if self.options.start_takes == "sample":
             self.take()
         bases = {
@@ -185,12 +191,11 @@ class NaiveLm629:
         self.a, self.limit = self.start["a"], self.start["v"]
         control = self.start["control"]
         self.mode_bits = control & 0x1800
-        self.signals -= {7, 10, 11, 12}
-        self.signals |= {bit for bit in (11, 12) if control >> bit & 1}
+        self.show(control)
         self.start = None
+        self.loop_open = False
         if control & 0x0100:
-            self.signals.add(7)
-            events.add(2)
+            self.turn_off(events)
         elif control & 0x0200:
             self.target = self.real if self.options.abrupt_stop_at == "real" else math.floor(self.desired)
             self.arrive(events)
@@ -413,13 +418,26 @@ class NaiveLm629:
             0x0D: self.pid.integral if self.options.sum_reading == "term" else limited_sum,
         }[opcode]
 
+    def show(self, control):
+        """What STT does to the signals: bits 10 and 7 go (7 not if it turns the motor off), 11 and 12 are as loaded."""
+        self.signals -= {10, 11, 12} if control & 0x0100 else {7, 10, 11, 12}
+        self.signals |= {bit for bit in (11, 12) if control >> bit & 1}
+
+    def stopped(self):
+        """By the last order, if it was to turn the motor off or to stop abruptly, or by what has come of it."""
+        if self.start is not None:
+            return self.ordered & 0x0300 != 0
+        return bool(self.signals & {7, 10})
+
     def start_motion(self):
-        in_motion = not self.signals & {7, 10}
         stopping = self.buffer["control"] & 0x0700 and self.options.stop_lifts_refusal
-        if 14 in self.signals and in_motion and not stopping:
+        if 14 in self.signals and not self.stopped() and not stopping:
             self.flag(1)
             return
         self.start = {}
+        self.ordered = self.buffer["control"]
+        if self.options.start_shows == "accepted":
+            self.show(self.ordered)
         if self.options.start_takes == "given":
             self.take()
         self.signals.discard(14)

@@ -13,6 +13,7 @@ cdef int _HELD, _RESETTING, _RUNNING, _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX, _ACCELERATION_LOADED, _OUTPUT_8_BIT
 cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE, _COMMAND_ERROR
 cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY, _STOPS, _COMPLETED, _OUT_OF_RANGE
+cdef int _TAKEN, _FROM_OFF, _STOPS_AT_ONCE
 cdef int COMMAND, _COMMAND_CAME, _WORD_CAME, _ANSWERED
 cdef int _RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12
 cdef int _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS
@@ -28,6 +29,7 @@ cdef class Lm629:
     cdef readonly object options
     cdef readonly long long reset_ticks
     cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats, clamps
+    cdef readonly int shows_late
     cdef readonly HostPort port
     cdef readonly Encoder encoder
     cdef readonly ProfileGenerator trajectory
@@ -54,6 +56,7 @@ cdef class Lm629:
     cdef inline int _sample(self, long long now) except -1
     cdef inline int _latch_position(self, long long now) noexcept
     cdef int _start(self) except -1
+    cdef inline void _show_start(self, int control) noexcept
     cdef _relative_base(self)
     cdef inline int _step_profile(self) noexcept
     cdef inline int _check_error(self, long long error) noexcept
@@ -69,6 +72,7 @@ cdef class Lm629:
     cdef int _execute(self, long long tick, int opcode) except -1
     cdef int _complain(self, flags) except -1
     cdef int _accept_start(self) except -1
+    cdef int _take_start(self, int control) except -1
     cdef _answer(self, long long tick, int opcode)
     cdef int _word(self, long long tick) except -1
     cdef _trajectory_word(self, int word)

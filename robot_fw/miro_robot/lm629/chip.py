@@ -56,6 +56,8 @@ _VELOCITY_MODE, _FORWARD = buffers.VELOCITY_MODE, buffers.FORWARD
 """They stand in the same place in the control word and in the signals register."""
 _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY = buffers.MOTOR_OFF, buffers.STOP_ABRUPTLY, buffers.STOP_SMOOTHLY
 _STOPS, _COMPLETED, _OUT_OF_RANGE = buffers.STOPS, buffers.COMPLETED, buffers.OUT_OF_RANGE
+_TAKEN, _FROM_OFF, _STOPS_AT_ONCE = 1, 2, 4
+"""`start_taken`: an STT waits for its sample; the motor was off when it came; it turns it off or stops abruptly."""
 _COMMAND_CAME, _WORD_CAME, _ANSWERED = host_port.COMMAND, host_port.WORD, host_port.ANSWERED
 _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET = host_port.OPEN, host_port.HARDWARE_RESET, host_port.SOFTWARE_RESET
 
@@ -107,7 +109,7 @@ class Lm629:
         "breakpoint": _PLACE,
         "breakpoint_armed": FLAG,
         "breakpoint_side": ("i", -1, 1),
-        "start_taken": FLAG,
+        "start_taken": ("i", 0, 7),
         "pwm": FLAG,
         "pwm_magnitude": ("i", 0, 127),
         "sign": FLAG,
@@ -115,7 +117,7 @@ class Lm629:
     }
     NOT_STATE = (
         *("options", "reset_ticks", "rounds_down", "negative", "pulse_late", "keeps_sign", "open_clears"),
-        *("error_full", "error_repeats", "clamps", "commands", "encoder_edges", "log", "side", "pulses"),
+        *("error_full", "error_repeats", "clamps", "shows_late", "commands", "encoder_edges", "log", "side", "pulses"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
     )
 
@@ -130,6 +132,7 @@ class Lm629:
         self.error_full = 1 if options.error_test == "full" else 0
         self.error_repeats = 1 if options.error_flag_repeats else 0
         self.clamps = 1 if options.out_of_range == "clamped" else 0
+        self.shows_late = 1 if options.start_shows == "sample" else 0
         self.port = HostPort(options.busy_clocks * LM629_CLOCK_TICKS, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
@@ -268,8 +271,6 @@ class Lm629:
     def _sample(self, now: int) -> None:
         """One sample; its order is chosen (README.md, "Inside a sample")."""
         flags = self._latch_position(now)
-        if self.signals.word & _MOTOR_OFF:
-            self.trajectory.follow(self.real_position)
         if self.start_taken:
             flags |= self._start()
         if self.signals.word & _UPDATE_PENDING:
@@ -313,6 +314,8 @@ class Lm629:
         """The accepted STT takes effect. Returns flags."""
         profile = self.trajectory
         buffer = self.trajectory_buffer
+        if self.start_taken & _FROM_OFF:
+            profile.follow(self.real_position)
         if self.options.start_takes == "sample":
             buffer.take(self.options.stop_bits_stay)
         control = buffer.taken_control
@@ -322,8 +325,7 @@ class Lm629:
         profile.velocity_mode = 1 if control & _VELOCITY_MODE else 0
         profile.forward = 1 if control & _FORWARD else 0
         self.start_taken = 0
-        self.signals.word &= ~(_MOTOR_OFF | _ON_TARGET | _VELOCITY_MODE | _FORWARD)
-        self.signals.word |= control & (_VELOCITY_MODE | _FORWARD)
+        self._show_start(control)
         if control & _TURN_OFF:
             self.signals.word |= _MOTOR_OFF
             return _TRAJECTORY_COMPLETE
@@ -334,6 +336,12 @@ class Lm629:
             return _TRAJECTORY_COMPLETE
         profile.start(1 if control & _STOP_SMOOTHLY else 0)
         return 0
+
+    def _show_start(self, control: int) -> None:
+        """What STT does to the signals: with an order to turn the motor off it leaves bit 7 to what comes of it."""
+        cleared = _ON_TARGET | _VELOCITY_MODE | _FORWARD
+        self.signals.word &= ~(cleared if control & _TURN_OFF else cleared | _MOTOR_OFF)
+        self.signals.word |= control & (_VELOCITY_MODE | _FORWARD)
 
     def _update_filter(self) -> None:
         """The accepted UDF takes effect."""
@@ -492,16 +500,34 @@ class Lm629:
             self.signals.raise_flags(_COMMAND_ERROR)
 
     def _accept_start(self) -> None:
-        """STT is refused when it would change the acceleration of a motion that goes on (T2)."""
-        resting = self.signals.word & (_ON_TARGET | _MOTOR_OFF)
-        stopping = self.trajectory_buffer.control & _STOPS and self.options.stop_lifts_refusal
+        """STT is refused when it would change the acceleration of a motion that goes on (T2).
+
+        An order that waits for its sample decides whether there is one, else the flags.
+        """
+        control = self.trajectory_buffer.control
+        if self.start_taken:
+            resting = self.start_taken & _STOPS_AT_ONCE
+        else:
+            resting = self.signals.word & (_ON_TARGET | _MOTOR_OFF)
+        stopping = control & _STOPS and self.options.stop_lifts_refusal
         if self.signals.word & _ACCELERATION_LOADED and not resting and not stopping:
             self.signals.raise_flags(_COMMAND_ERROR)
         else:
-            if self.options.start_takes != "sample":
-                self.trajectory_buffer.take(self.options.stop_bits_stay)
-            self.signals.word &= ~_ACCELERATION_LOADED
-            self.start_taken = 1
+            self._take_start(control)
+
+    def _take_start(self, control: int) -> None:
+        """STT is accepted: its sample will execute it."""
+        taken = _TAKEN | self.start_taken & _FROM_OFF
+        if self.signals.word & _MOTOR_OFF:
+            taken |= _FROM_OFF
+        if control & (_TURN_OFF | _STOP_ABRUPTLY):
+            taken |= _STOPS_AT_ONCE
+        self.start_taken = taken
+        if not self.shows_late:
+            self._show_start(control)
+        if self.options.start_takes != "sample":
+            self.trajectory_buffer.take(self.options.stop_bits_stay)
+        self.signals.word &= ~_ACCELERATION_LOADED
 
     def _answer(self, tick: int, opcode: int) -> int:
         """What a reading command says, as it is when the command arrives."""

@@ -65,6 +65,8 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     # Start and stop
     start_takes: Literal["given", "sample"] = "given"
     """T1: STT takes the buffers as they are when it is given, or as they are at the sample that executes it."""
+    start_shows: Literal["accepted", "sample"] = "accepted"
+    """T10: signals bits 7, 10, 11 and 12 change when STT is accepted (p. 23), or at the sample that executes it."""
     stop_lifts_refusal: bool = True
     """T2: a stop word in the buffer lets STT pass in spite of an acceleration loaded in motion."""
     stop_bits_stay: bool = False

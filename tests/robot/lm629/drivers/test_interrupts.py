@@ -1,5 +1,7 @@
 """Moves that a host learns of by HI: several flags pending, flags that rise while they are masked, the end of HI."""
 
+import pytest
+
 from tests.robot.lm629.drivers.driver import BREAKPOINT, COMPLETE, ERROR, EXCESS, everywhere, outcomes
 
 INTERRUPTS = COMPLETE | EXCESS | BREAKPOINT
@@ -93,6 +95,7 @@ def risen_while_masked(driver):
     return masked, driver.chip.hi
 
 
+@pytest.mark.slow
 def test_a_move_with_breakpoint_and_completion_notes_each_once_and_in_order():
     result = ((BREAKPOINT, COMPLETE), 60, (COMPLETE,), 0, 0)
     assert outcomes(move_and_return) == everywhere(result)
