@@ -9,13 +9,14 @@ The log is no state: it changes no bit of a run, and a board that is restored be
     FAULT       kind of fault              address of the instruction
     REACHED     instructions so far        address of the instruction that is next
     TRUE        -                          - (a predicate of the caller's)
+    START_LOST  side                       - (a warning: an STT replaced one that no sample had executed)
 
 Parts of a board run ahead of each other, so the log is in the order of noting, not of ticks: sort it by tick.
 """
 
 from __future__ import annotations
 
-RECEIVED, SENT, COMMAND, FAULT, REACHED, TRUE = 0, 1, 2, 3, 4, 5
+RECEIVED, SENT, COMMAND, FAULT, REACHED, TRUE, START_LOST = 0, 1, 2, 3, 4, 5, 6
 CAPACITY = 2048
 _MASK = 2047
 _COMMAND = COMMAND

@@ -24,7 +24,7 @@ class NaiveLm629:
         self.rst = 1
         self.rst_fell = 0
         self.threshold = 0x7FFF
-        self.lost = 0
+        self.lost = self.lost_starts = 0
         self.port_byte = 0
         self.driven = 0
         self.alive_at = None
@@ -178,14 +178,7 @@ class NaiveLm629:
             self.stand_at_real()
         if self.options.start_takes == "sample":
             self.take()
-        bases = {
-            "real": self.real,
-            "desired": math.floor(self.desired),
-            "target": math.floor(self.desired) if self.mode_bits & 0x0800 else self.target,
-        }
-        self.target = self.start["p"]
-        if self.start_relative:
-            self.target = modular(self.target + bases[self.options.relative_base], 31)
+        self.target = self.goal(self.start["p"], self.start_relative)
         if not self.newer_position:
             self.buffer["p"], self.relative = self.target, False
         self.a, self.limit = self.start["a"], self.start["v"]
@@ -201,6 +194,22 @@ class NaiveLm629:
             self.arrive(events)
         else:
             self.activity = "stop" if control & 0x0400 else "velocity" if control & 0x0800 else "position"
+
+    def goal(self, position, relative):
+        bases = {
+            "real": self.real,
+            "desired": math.floor(self.desired),
+            "target": math.floor(self.desired) if self.mode_bits & 0x0800 else self.target,
+        }
+        return modular(position + bases[self.options.relative_base], 31) if relative else position
+
+    def commanded_target(self):
+        """That of the last STT, executed or not."""
+        if self.start is None or self.options.breakpoint_base == "working":
+            return self.target
+        if not self.start:  # it will take what is in the buffers by then
+            return self.goal(self.buffer["p"], self.relative)
+        return self.goal(self.start["p"], self.start_relative)
 
     def arrive(self, events):
         self.desired = Fraction(self.target)
@@ -363,8 +372,8 @@ class NaiveLm629:
             0x1D: self.reset_interrupts,
             0x1E: self.load_filter,
             0x1F: self.load_trajectory,
-            0x20: lambda: self.set_breakpoint(0),
-            0x21: lambda: self.set_breakpoint(self.target),
+            0x20: lambda: self.set_breakpoint(relative=False),
+            0x21: lambda: self.set_breakpoint(relative=True),
         }
         if opcode in words:
             self.words = words[opcode]()
@@ -434,6 +443,13 @@ class NaiveLm629:
         if 14 in self.signals and not self.stopped() and not stopping:
             self.flag(1)
             return
+        if self.start is not None and self.options.second_start == "follows":
+            events = set()
+            self.begin_motion(events)
+            for bit in sorted(events):
+                self.flag(bit)
+        elif self.start is not None:
+            self.lost_starts += 1
         self.start = {}
         self.ordered = self.buffer["control"]
         if self.options.start_shows == "accepted":
@@ -506,8 +522,9 @@ class NaiveLm629:
             if name == "a":
                 self.signals.add(14)
 
-    def set_breakpoint(self, base):
+    def set_breakpoint(self, relative):
         high = yield
         low = yield
+        base = self.commanded_target() if relative else 0
         place = modular(base + (high << 16 | low), 31)
         self.breakpoint = (place, (self.real > place) - (self.real < place))

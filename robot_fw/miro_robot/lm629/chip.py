@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from miro_exact.clock import LM629_CLOCK_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
-from miro_robot.event_log import COMMAND, EventLog
+from miro_robot.event_log import COMMAND, START_LOST, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer, fit_15, signed_31
 from miro_robot.lm629.commands import BY_OPCODE, COMMANDS
@@ -358,6 +358,16 @@ class Lm629:
             return self.trajectory.target
         return self.trajectory.position >> 16
 
+    def _commanded_target(self) -> int:
+        """That of the last STT accepted; before its sample, with the positions of the sample before (P5)."""
+        buffer = self.trajectory_buffer
+        if not self.start_taken or self.options.breakpoint_base == "working":
+            return self.trajectory.target
+        position, relative = buffer.taken_position, buffer.taken_relative
+        if self.options.start_takes == "sample":
+            position, relative = buffer.position, buffer.relative
+        return signed_31(self._relative_base() + position) if relative else position
+
     def _step_profile(self) -> int:
         flags = 0
         if self.trajectory.moving:
@@ -473,7 +483,7 @@ class Lm629:
     def _execute(self, tick: int, opcode: int) -> None:
         """Commands without data."""
         if opcode == _STT:
-            self._accept_start()
+            self._accept_start(tick)
         elif opcode == _UDF:
             self.filter_buffer.take()
             self.signals.word |= _UPDATE_PENDING
@@ -499,7 +509,7 @@ class Lm629:
         if flags:
             self.signals.raise_flags(_COMMAND_ERROR)
 
-    def _accept_start(self) -> None:
+    def _accept_start(self, tick: int) -> None:
         """STT is refused when it would change the acceleration of a motion that goes on (T2).
 
         An order that waits for its sample decides whether there is one, else the flags.
@@ -513,10 +523,14 @@ class Lm629:
         if self.signals.word & _ACCELERATION_LOADED and not resting and not stopping:
             self.signals.raise_flags(_COMMAND_ERROR)
         else:
-            self._take_start(control)
+            self._take_start(tick, control)
 
-    def _take_start(self, control: int) -> None:
-        """STT is accepted: its sample will execute it."""
+    def _take_start(self, tick: int, control: int) -> None:
+        """STT is accepted: its sample will execute it. One that still waits for that is lost, or is done now (T11)."""
+        if self.start_taken and self.options.second_start == "follows":
+            self.signals.raise_flags(self._start())
+        elif self.start_taken and self.log is not None:
+            self.log.note(START_LOST, tick, self.side, 0)
         taken = _TAKEN | self.start_taken & _FROM_OFF
         if self.signals.word & _MOTOR_OFF:
             taken |= _FROM_OFF
@@ -596,7 +610,7 @@ class Lm629:
             if opcode == _LPES:
                 self.signals.word |= _STOP_ON_ERROR
         elif opcode in (_SBPA, _SBPR):
-            base = self.trajectory.target if opcode == _SBPR else 0
+            base = self._commanded_target() if opcode == _SBPR else 0
             self.set_breakpoint(base + int.from_bytes(self.port.data_bytes(), "big"))
 
     # ------------------------------------------------------------------------------------------ observers

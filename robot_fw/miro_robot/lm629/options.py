@@ -67,6 +67,8 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """T1: STT takes the buffers as they are when it is given, or as they are at the sample that executes it."""
     start_shows: Literal["accepted", "sample"] = "accepted"
     """T10: signals bits 7, 10, 11 and 12 change when STT is accepted (p. 23), or at the sample that executes it."""
+    second_start: Literal["replaces", "follows"] = "replaces"
+    """T11: an STT before the sample of another one takes its place, or makes it take effect at once."""
     stop_lifts_refusal: bool = True
     """T2: a stop word in the buffer lets STT pass in spite of an acceleration loaded in motion."""
     stop_bits_stay: bool = False
@@ -87,6 +89,8 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """P2: after a smooth stop the desired position keeps its fraction; False: it is rounded down."""
     breakpoint_exact: bool = False
     """P3: a breakpoint fires at equality only; False: also when it was passed between two samples."""
+    breakpoint_base: Literal["accepted", "working"] = "accepted"
+    """P5: SBPR adds to the target of the STT that was accepted last, or to that which a sample has executed."""
     read_position: Literal["sample", "live"] = "sample"
     """P4: RDRP answers the position of the last sample, or the counter as it is."""
 

@@ -8,6 +8,7 @@ received    a robot's serial port sets RI for a character                 value,
 transmitted a robot's serial port sets TI for a character                 value
 frame       ... for the last character of a valid frame                   frame
 command     an LM629 has taken the last byte of a command                 side, opcode, data
+start_lost  an LM629 has accepted an STT before the sample of another     side
 fault       the firmware did what it must not                             value (the kind), address
 reached     the instruction at an address is next                         address
 edge        a pin changes                                                 pin, value (the new level)
@@ -75,6 +76,8 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.value:02X}h{'' if self.good_stop else ' with a bad stop bit'}"
         if self.what == "command":
             return f" {self.side} {self.command} {self.data.hex(' ')}".rstrip()
+        if self.what == "start_lost":
+            return f" {self.side}"
         if self.what == "edge":
             return f" {self.pin} to {self.value}"
         if self.what in ("reached", "fault"):
@@ -199,6 +202,7 @@ _KINDS = {
     event_log.FAULT: "fault",
     event_log.REACHED: "reached",
     event_log.TRUE: "true",
+    event_log.START_LOST: "start_lost",
 }
 
 
@@ -228,6 +232,8 @@ def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: in
     if what == "command":
         side, opcode = SIDES[code >> 8], code & 0xFF
         return Event(tick=tick, what=what, network=network, slot=slot, side=side, opcode=opcode, data=data)
+    if what == "start_lost":
+        return Event(tick=tick, what=what, network=network, slot=slot, side=SIDES[code])
     if what in ("fault", "reached"):
         return Event(tick=tick, what=what, network=network, slot=slot, value=code, address=value)
     good = what != "received" or code == 1

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from miro_robot.event_log import EventLog
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.commands import COMMANDS
 from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, Lm629Options
@@ -122,6 +123,8 @@ class Pair:
 
     def __init__(self, options):
         self.chip = Lm629(options)
+        self.log = EventLog()
+        self.chip.tell(self.log, 0)
         self.naive = NaiveLm629(options)
 
     def __getattr__(self, name):
@@ -140,6 +143,8 @@ class Pair:
             ),
             "data": (chip.data_out(tick), naive.data_out(tick)),
             "lost": (chip.writes_while_busy, naive.lost),
+            "lost starts": (self.log.end, naive.lost_starts + len(chip.commands)),
+            "breakpoint": (chip.breakpoint, naive.breakpoint[0]) if naive.breakpoint else (0, 0),
             "position": (chip.real_position, naive.real),
             "velocity": (chip.real_velocity, naive.velocity_counts),
             "index": (chip.index_position, naive.index_position),

@@ -102,6 +102,7 @@ SOFTWARE_RESET = [("command", "RESET"), ("wait", 30_000)]
 LATE_STROBE = [DFH, ("drive", {"ps": 0, "cs": 0, "wr": 0}), ("wait", 1000), ("drive", {"wr": 1})]
 AGAIN = [MOVE, ("command", "LPEI", 1), ("sample",), ("command", "RSTI", 0), ("sample",)]
 LOADED_LATE = [("load", 0x2A, 0x8000, 0x20000, 1000), ("sample",), STT, ("load", 2, 77), ("sample",)]
+ONWARD = [("sample",), ("load", 0x0003, 300), STT]
 STOPPED = [("start", 0x002A, 0x3000, 0x21000, 1000, {"samples": 5}), SMOOTH_STOP]
 TURNED = [("sample",), ("turn", 8)]
 WOUND_UP = ("closed", 300, 5, {"ki": 10, "il": 1000})
@@ -137,6 +138,8 @@ READINGS = (  # option, its other reading, what is done, what is looked at, what
     ("start_shows", "sample", [MOVE, ("load", 0x1808, 1), STT], signals(0x1800), 0x1800, 0),
     ("start_shows", "sample", [ARRIVE, STT], signals(0x0400), 0, 0x0400),
     ("start_shows", "sample", [("load", 0x0002, 9), STT], signals(0x0080), 0, 0x0080),
+    ("second_start", "follows", [*ONWARD, *ONWARD[1:], ("sample",)], "trajectory.target", 300, 600),
+    ("breakpoint_base", "working", [*ONWARD, ("command", "SBPR", 0, 9), ("ready",)], "breakpoint", 309, 9),
     ("stop_lifts_refusal", False, [MOVE, ("load", 0x0420, 0x4000), STT], status(ERROR), 0, ERROR),
     ("stop_bits_stay", True, [MOVE, SMOOTH_STOP, STT, ("sample",)], "desired_velocity", 0x8000, 0),
     ("unsent", "working", [MOVE, FASTER, ("start", 2, 2000)], "trajectory.max_velocity", 0x30000, 0x20000),

@@ -6,7 +6,7 @@ from miro_protocol.decoder import TelemetryDecoder
 from miro_protocol.frames import TelemetryFrame, encode, seal
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import Transmission
-from miro_robot.event_log import EventLog
+from miro_robot.event_log import START_LOST, EventLog
 from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
 
 RECEIVED, SENT, REACHED = 0, 1, 4  # of a board's log, which keeps 2048 events
@@ -87,3 +87,11 @@ def test_a_cursor_counts_what_was_dropped_before_it_was_read():
     assert list(host.since(0, ("sent",))) == list(host.since(0))
     assert [on_robot.read()[0][0], on_host.read()[0][0]] == [3, 4]
     assert (on_robot.lost, on_host.lost) == (0, 0)
+
+
+def test_a_start_that_another_one_replaced_is_an_event_of_its_chip():
+    log = robot_log()
+    log.log.note(START_LOST, 7, 1, 0)
+    ((_, event),) = log.since(0)
+    assert event == Event(tick=7, what="start_lost", slot=2, side="right")
+    assert str(event) == "tick 7: net0/robot2: start_lost right"

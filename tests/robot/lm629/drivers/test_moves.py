@@ -2,7 +2,9 @@
 
 import pytest
 
+from miro_robot.event_log import START_LOST, EventLog
 from tests.robot.lm629.drivers.driver import (
+    BREAKPOINT,
     COMPLETE,
     ERROR,
     MOTOR_OFF,
@@ -96,6 +98,40 @@ def accelerated_in_motion(driver):
     return driver.chip.trajectory.acceleration, driver.status() & ERROR
 
 
+def chain(driver):
+    """Relative moves, each started by the breakpoint of the one before, 20 counts before its target. Returns where the
+    breakpoints were, the last target, and whether it stopped on the way.
+    """
+    driver.load(0x0028, 0x8000, 0x40000)
+    targets = []
+    for _ in range(4):
+        driver.load(0x0003, 60)
+        driver.command("STT")
+        driver.position("SBPR", -20)
+        driver.ready()
+        targets.append(driver.chip.breakpoint)
+        driver.command("RSTI", 0x7E & ~BREAKPOINT)
+        driver.until_flag(BREAKPOINT)
+    stopped = driver.status() & COMPLETE
+    driver.until_flag(COMPLETE)
+    return tuple(targets), driver.ask("RDDP"), stopped
+
+
+def two_relative_starts(driver):
+    """+1000, and before a sample may have come +500. Returns the target, and how many starts the log says were lost."""
+    driver.chip.tell(log := EventLog(), 1)
+    driver.load(0x0028, 0x8000, 0x10000)
+    driver.load(0x0003, 1000)
+    driver.command("STT")
+    driver.load(0x0003, 500)
+    driver.command("STT")
+    driver.ready()
+    driver.sample(2)
+    lost = [log.event(serial)[2] for serial in range(log.end) if log.event(serial)[1] == START_LOST]
+    assert lost in ([], [1])  # the side
+    return driver.chip.trajectory.target, len(lost)
+
+
 def test_parameters_that_were_loaded_one_by_one_take_effect_together():
     assert outcomes(split_load) == everywhere(((0x8000, 0x20000, 25), (11, 22, 33, 44, 3), 0))
 
@@ -126,3 +162,18 @@ def test_after_a_stop_the_next_start_may_have_another_acceleration(sequence, sho
 @pytest.mark.parametrize("shows", ["accepted", "sample"])
 def test_in_motion_another_acceleration_is_refused(shows):
     assert outcomes(accelerated_in_motion, start_shows=shows) == everywhere((0x8000, ERROR))
+
+
+@pytest.mark.slow
+def test_a_chain_of_relative_moves_has_its_breakpoints_before_its_own_targets():
+    assert outcomes(chain) == everywhere(((40, 100, 160, 220), 240, 0))
+    assert len(outcomes(chain, breakpoint_base="working")) > 1
+
+
+def test_of_two_starts_within_a_sample_the_first_is_lost_and_the_log_says_so():
+    seen = outcomes(two_relative_starts)
+    assert set(seen) == {(1500, 0), (500, 1)}
+
+
+def test_with_the_other_reading_no_start_is_lost():
+    assert outcomes(two_relative_starts, second_start="follows") == everywhere((1500, 0))
