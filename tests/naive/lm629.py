@@ -98,7 +98,7 @@ class NaiveLm629:
         self.flag(2)
         self.mask = {1, 2, 3, 4, 5}
         if not self.options.reset_disarms_breakpoint:
-            self.breakpoint = (0, 0)
+            self.breakpoint = (0, True)
 
     def flag(self, bit):
         if bit not in self.signals and bit in self.mask:
@@ -119,6 +119,7 @@ class NaiveLm629:
         self.velocity_counts = counts
         if self.real + counts != modular(self.real + counts, 31):
             events.add(4)
+        passed = self.places_passed(counts)
         self.real = modular(self.real + counts, 31)
         if self.start is not None:
             self.begin_motion(events)
@@ -154,13 +155,17 @@ class NaiveLm629:
         elif not self.options.off_keeps_sign:
             self.sign = 0
         if self.breakpoint is not None:
-            place, side = self.breakpoint
-            passed = (self.real > place) - (self.real < place) != side and not self.options.breakpoint_exact
-            if self.real == place or passed:
+            place, there = self.breakpoint
+            if there or place in (passed[-1:] if self.options.breakpoint_exact else passed):
                 events.add(6)
                 self.breakpoint = None
         for bit in sorted(events):
             self.flag(bit)
+
+    def places_passed(self, counts):
+        """Those that the axis comes to one after the other."""
+        step = 1 if counts > 0 else -1
+        return [modular(self.real + step * count, 31) for count in range(1, abs(counts) + 1)]
 
     def stand_at_real(self):
         self.desired = Fraction(self.real)
@@ -527,4 +532,4 @@ class NaiveLm629:
         low = yield
         base = self.commanded_target() if relative else 0
         place = modular(base + (high << 16 | low), 31)
-        self.breakpoint = (place, (self.real > place) - (self.real < place))
+        self.breakpoint = (place, place == self.real)

@@ -13,16 +13,13 @@ cdef int _HELD, _RESETTING, _RUNNING, _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX, _ACCELERATION_LOADED, _OUTPUT_8_BIT
 cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE, _COMMAND_ERROR
 cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY, _STOPS, _COMPLETED, _OUT_OF_RANGE
-cdef int _TAKEN, _FROM_OFF, _STOPS_AT_ONCE
+cdef int _TAKEN, _FROM_OFF, _STOPS_AT_ONCE, _ARMED, _ON_THE_PLACE
 cdef int COMMAND, START_LOST, _COMMAND_CAME, _WORD_CAME, _ANSWERED
 cdef int _RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12
 cdef int _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS
 cdef int _LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR
 cdef unsigned char _WORDS_IN[256]
 cdef unsigned char _WORDS_OUT[256]
-
-cdef int _side(long long value) noexcept
-
 
 @cython.final
 cdef class Lm629:
@@ -44,7 +41,7 @@ cdef class Lm629:
     cdef public long long next_tick, sample_tick, period_tick, reset_tick
     cdef public int mode, reset_level, start_taken
     cdef public long long threshold, real_position, real_velocity, index_position, breakpoint
-    cdef public int breakpoint_armed, breakpoint_side, excessive
+    cdef public int breakpoint_armed, excessive
     cdef public int pwm, pwm_magnitude, sign, hi, pulses
 
     cpdef set_reset(self, long long tick, int level)

@@ -58,6 +58,7 @@ _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY = buffers.MOTOR_OFF, buffers.STOP_ABRU
 _STOPS, _COMPLETED, _OUT_OF_RANGE = buffers.STOPS, buffers.COMPLETED, buffers.OUT_OF_RANGE
 _TAKEN, _FROM_OFF, _STOPS_AT_ONCE = 1, 2, 4
 """`start_taken`: an STT waits for its sample; the motor was off when it came; it turns it off or stops abruptly."""
+_ARMED, _ON_THE_PLACE = 1, 2
 _COMMAND_CAME, _WORD_CAME, _ANSWERED = host_port.COMMAND, host_port.WORD, host_port.ANSWERED
 _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET = host_port.OPEN, host_port.HARDWARE_RESET, host_port.SOFTWARE_RESET
 
@@ -67,10 +68,6 @@ _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET = host_port.OPEN, host_port.HARDWARE_RES
 ) = (command.opcode for command in COMMANDS)  # fmt: skip
 _WORDS_IN = [BY_OPCODE[opcode].words_in if opcode in BY_OPCODE else 0 for opcode in range(256)]
 _WORDS_OUT = [BY_OPCODE[opcode].words_out if opcode in BY_OPCODE else 0 for opcode in range(256)]
-
-
-def _side(value: int) -> int:
-    return 1 if value > 0 else -1 if value < 0 else 0
 
 
 class Lm629:
@@ -107,8 +104,7 @@ class Lm629:
         "real_velocity": ("q", -(1 << 40), 1 << 40),
         "index_position": _PLACE,
         "breakpoint": _PLACE,
-        "breakpoint_armed": FLAG,
-        "breakpoint_side": ("i", -1, 1),
+        "breakpoint_armed": ("i", 0, 2),
         "start_taken": ("i", 0, 7),
         "pwm": FLAG,
         "pwm_magnitude": ("i", 0, 127),
@@ -202,7 +198,6 @@ class Lm629:
             self.index_position = 0
         self.breakpoint = 0
         self.breakpoint_armed = 0
-        self.breakpoint_side = 0
         self.start_taken = 0
         self.pwm = 0
         self.pwm_magnitude = 0
@@ -219,7 +214,7 @@ class Lm629:
         self.port.reset(_OPEN)
         self.signals.after_reset()
         self.hi = self.signals.word >> 15
-        self.breakpoint_armed = 0 if self.options.reset_disarms_breakpoint else 1
+        self.breakpoint_armed = 0 if self.options.reset_disarms_breakpoint else _ON_THE_PLACE
         self.sample_tick = now + _SAMPLE_TICKS
         if not self.options.reset_restarts_samples:
             self.sample_tick -= now % _SAMPLE_TICKS
@@ -402,19 +397,23 @@ class Lm629:
             self.sign = 0
 
     def _check_breakpoint(self) -> int:
+        """It is reached by the counts of this sample alone: the border of the position space and DFH move nothing."""
         if not self.breakpoint_armed:
             return 0
-        side = _side(self.real_position - self.breakpoint)
-        if side != 0 and (side == self.breakpoint_side or self.options.breakpoint_exact):
+        counts = self.real_velocity
+        way = signed_31(self.breakpoint - self.real_position + counts)  # from the sample before
+        passed = 0 < way <= counts or counts <= way < 0
+        if self.options.breakpoint_exact:
+            passed = passed and way == counts
+        if not passed and self.breakpoint_armed != _ON_THE_PLACE:
             return 0
         self.breakpoint_armed = 0
         return _BREAKPOINT
 
     def set_breakpoint(self, place: int) -> None:
-        """Arms it; which side of it the axis is on now decides when it is passed."""
+        """Arms it; on the place itself it fires at the next sample."""
         self.breakpoint = signed_31(place)
-        self.breakpoint_side = _side(self.real_position - self.breakpoint)
-        self.breakpoint_armed = 1
+        self.breakpoint_armed = _ON_THE_PLACE if self.breakpoint == self.real_position else _ARMED
 
     # ------------------------------------------------------------------------------------------ encoder
 

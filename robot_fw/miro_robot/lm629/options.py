@@ -88,7 +88,7 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     stop_keeps_fraction: bool = False
     """P2: after a smooth stop the desired position keeps its fraction; False: it is rounded down."""
     breakpoint_exact: bool = False
-    """P3: a breakpoint fires at equality only; False: also when it was passed between two samples."""
+    """P3: a breakpoint fires in a sample that ends on it; False: also when it was passed between two samples."""
     breakpoint_base: Literal["accepted", "working"] = "accepted"
     """P5: SBPR adds to the target of the STT that was accepted last, or to that which a sample has executed."""
     read_position: Literal["sample", "live"] = "sample"
