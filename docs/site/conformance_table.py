@@ -53,7 +53,7 @@ def _source(source: str) -> str:
 def _chips(lm629: Lm629Options) -> str:
     changed = [
         f"{name} {str(getattr(lm629, name)).lower()}"
-        for name in ("busy_clocks", "reset_clocks", "reset_disarms_breakpoint")
+        for name in ("busy_clocks", "reset_clocks", "reset_breakpoint")
         if getattr(lm629, name) != getattr(DEFAULT_OPTIONS, name)
     ]
     return "".join(f", {one}" for one in changed)

@@ -58,6 +58,7 @@ class NaiveLm629:
         self.breakpoint = None
         self.magnitude = self.sign = 0
         self.busy_until = 0
+        self.outlives = set()
         self.words = None
         self.answer = b""
         self.phase, self.high = 0, 0
@@ -97,8 +98,11 @@ class NaiveLm629:
         self.signals |= {8, 7}
         self.flag(2)
         self.mask = {1, 2, 3, 4, 5}
-        if not self.options.reset_disarms_breakpoint:
+        if self.options.reset_breakpoint == "fires":
             self.breakpoint = (0, True)
+        if self.options.reset_breakpoint == "stays":
+            self.signals.add(6)
+            self.outlives = {6}
 
     def flag(self, bit):
         if bit not in self.signals and bit in self.mask:
@@ -488,7 +492,8 @@ class NaiveLm629:
 
     def reset_interrupts(self):
         word = yield
-        self.signals -= {15} | {bit for bit in INTERRUPTS if not word >> bit & 1}
+        self.signals -= {15} | {bit for bit in INTERRUPTS if not word >> bit & 1} - self.outlives
+        self.outlives = set()
 
     def load_filter(self):
         control = yield

@@ -189,8 +189,7 @@ class Lm629:
             kept = self.signals.word & _STOP_ON_ERROR
         if self.encoder.armed:
             kept |= _ACQUIRE_INDEX
-        self.signals.word = kept
-        self.signals.mask = 0
+        self.signals.clear(kept)
         self.excessive = 0
         self.real_position = 0
         self.real_velocity = 0
@@ -214,7 +213,7 @@ class Lm629:
         self.port.reset(_OPEN)
         self.signals.after_reset()
         self.hi = self.signals.word >> 15
-        self.breakpoint_armed = 0 if self.options.reset_disarms_breakpoint else _ON_THE_PLACE
+        self.breakpoint_armed = _ON_THE_PLACE if self.options.reset_breakpoint == "fires" else 0
         self.sample_tick = now + _SAMPLE_TICKS
         if not self.options.reset_restarts_samples:
             self.sample_tick -= now % _SAMPLE_TICKS

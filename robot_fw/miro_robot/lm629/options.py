@@ -51,8 +51,9 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """R1: from the end of the reset pulse (or the RESET command) to status 84h."""
     software_reset_busy: bool = True
     """R2: the status byte is 01h while a RESET command runs; False: 00h."""
-    reset_disarms_breakpoint: bool = True
-    """R3: no breakpoint after a reset (84h); False: one at 0, which is reached in the first sample (C4h)."""
+    reset_breakpoint: Literal["none", "fires", "stays"] = "none"
+    """R3: no breakpoint after a reset (84h); one at 0, which fires in the first sample (C4h); or its flag is set (C4h) and
+    the first RSTI leaves it (C0h)."""
     reset_restarts_samples: bool = True
     """R4: samples count from the end of the reset; False: they go on in the grid of tick 0."""
     reset_clears_lpes: bool = True

@@ -29,21 +29,30 @@ _INTERRUPTS = 0x7E
 
 
 class Signals:
-    """`word`: the 16 bits as RDSIGS answers them. `mask`: 1 = the flag of that bit may raise HI."""
+    """`word`: the 16 bits as RDSIGS answers them. `mask`: 1 = the flag of that bit may raise HI. `outlives`: flags that
+    the next RSTI leaves.
+    """
 
-    STATE = {"word": ("i", 0, 0xFFFF), "mask": ("i", 0, 0xFF)}
-    NOT_STATE = ("level", "reset_raises")
+    STATE = {"word": ("i", 0, 0xFFFF), "mask": ("i", 0, 0xFF), "outlives": ("i", 0, 0x7E)}
+    NOT_STATE = ("level", "reset_raises", "reset_leaves")
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
         self.level = 1 if options.interrupt == "level" else 0
         self.reset_raises = 1 if options.reset_interrupts else 0
-        self.word = 0
+        self.reset_leaves = BREAKPOINT if options.reset_breakpoint == "stays" else 0
+        self.clear(0)
+
+    def clear(self, kept: int) -> None:
+        """A reset begins; these bits stay."""
+        self.word = kept
         self.mask = 0
+        self.outlives = 0
 
     def after_reset(self) -> None:
         """All but the breakpoint may interrupt. Motor off counts as a trajectory that is complete."""
         self.mask = 0x3E
-        self.word |= 0x0180
+        self.word |= 0x0180 | self.reset_leaves
+        self.outlives = self.reset_leaves
         if self.reset_raises:
             self.raise_flags(0x04)
         else:
@@ -59,7 +68,8 @@ class Signals:
 
     def reset_interrupts(self, keep: int) -> None:
         """RSTI: flags whose bit in `keep` is 0 are reset; as an event so is HI, whatever flags remain."""
-        self.word &= keep & _INTERRUPTS | ~(_INTERRUPTS | 0x8000)
+        self.word &= (keep | self.outlives) & _INTERRUPTS | ~(_INTERRUPTS | 0x8000)
+        self.outlives = 0
         self._follow()
 
     def mask_interrupts(self, mask: int) -> None:

@@ -81,8 +81,9 @@ def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks, works):
     assert (rig.told(rig.board.left)[-1:] != []) == works
 
 
-def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try():
-    rig = Rig(options=Lm629Options(reset_disarms_breakpoint=False), boot=False)
+@pytest.mark.parametrize("bit_6", ["fires", "stays"])
+def test_chips_that_show_c4h_after_a_reset_and_c0h_after_rsti_are_taken_at_the_first_try(bit_6):
+    rig = Rig(options=Lm629Options(reset_breakpoint=bit_6), boot=False)
     rig.run_to(100 * MS)
     assert resets(rig) == 1
     rig.team(0, 5000, 5000)

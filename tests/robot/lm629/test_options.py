@@ -97,6 +97,7 @@ ARRIVE = ("start", 0x002A, 0x8000, 0x20000, 2, {"samples": 15})
 SMOOTH_STOP = ("start", 0x0400, {"samples": 20})
 FASTER = ("load", 0x0008, 0x30000)
 DFH, SIP, STT, UDF = (("command", name) for name in ("DFH", "SIP", "STT", "UDF"))
+RSTI = [("command", "RSTI", 0), ("ready",)]
 RESET_PIN = [("wait", 1000), ("reset",)]
 SOFTWARE_RESET = [("command", "RESET"), ("wait", 30_000)]
 LATE_STROBE = [DFH, ("drive", {"ps": 0, "cs": 0, "wr": 0}), ("wait", 1000), ("drive", {"wr": 1})]
@@ -129,7 +130,9 @@ READINGS = (  # option, its other reading, what is done, what is looked at, what
     ("reset_interrupts", False, RESET_PIN, signals(0xFFFF), 0x8184, 0x0184),
     ("reset_clocks", 50, [("reset", False)], ticks_to_84h, 24576, 200),
     ("software_reset_busy", False, [("command", "RESET")], Bench.status, 0x01, 0x00),
-    ("reset_disarms_breakpoint", False, [*RESET_PIN, ("sample",)], "status", 0x84, 0xC4),
+    ("reset_breakpoint", "fires", [*RESET_PIN, ("sample",)], "status", 0x84, 0xC4),
+    ("reset_breakpoint", "stays", RESET_PIN, "status", 0x84, 0xC4),
+    ("reset_breakpoint", "stays", [*RESET_PIN, *RSTI], "status", 0x80, 0xC0),
     ("reset_restarts_samples", False, RESET_PIN, lambda bench: bench.chip.sample_tick % 8192 == 0, False, True),
     ("reset_clears_lpes", False, [("command", "LPES", 100), *SOFTWARE_RESET], signals(0x0200), 0, 0x0200),
     ("reset_clears_index", False, [SIP, *SOFTWARE_RESET], signals(ACQUIRE_INDEX), 0, ACQUIRE_INDEX),

@@ -13,7 +13,7 @@ from mirotwin.verify.conform.trial_script import Found, TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01
-_SLOW = Lm629Options(busy_clocks=600, reset_clocks=9000, reset_disarms_breakpoint=False)
+_SLOW = Lm629Options(busy_clocks=600, reset_clocks=9000, reset_breakpoint="stays")
 _NEVER_FREE = Lm629Options(busy_clocks=1 << 20)  # 175 ms after each command
 _NEVER_UP = Lm629Options(reset_clocks=1 << 24)  # 2.8 s: the trial is over before
 
@@ -21,7 +21,7 @@ _NEVER_UP = Lm629Options(reset_clocks=1 << 24)  # 2.8 s: the trial is over befor
 @CHAPTER.rule("P57", POWER_ON, presupposes="P47", lm629=_SLOW)
 def slow(script: TrialScript) -> None:
     """LM629s that take the data sheet's longest times, 1.5 ms for a reset and 100 us for a command or a word, and that
-    show C4h after a reset, MUST be waited for: the robot does as with others.
+    show C4h after a reset and C0h after RSTI, MUST be waited for: the robot does as with others.
     """
     for _ in range(3):
         script.obeyed(script.team())

@@ -195,6 +195,9 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
     "waits 65 us for a busy chip": Mistake("lm629.c", "BUSY_POLLS      25", "BUSY_POLLS      4", "P57"),
     "waits 0.85 ms for a chip to come up": Mistake(
         "lm629.c", "BOOT_POLLS      200", "BOOT_POLLS      50", "P57"),
+    "takes 80h alone after RSTI": Mistake(
+        "lm629.c", "(lm629_status(LEFT) & ~STATUS_BIT6) == STATUS_READY", "lm629_status(LEFT) == STATUS_READY",
+        "P57"),
     "says nothing of a chip that does not come up": Mistake(
         "telemetry.c", " | (lm629_ready ? 0 : FLAG_INIT_FAILED)", "", "P58"),
     "waits for ever for a chip to come up": Mistake(
