@@ -59,6 +59,8 @@ cdef class Board(Bus):
     cdef inline long long _next_interrupt(self, Lm629 chip) noexcept
     cpdef int sync(self, long long tick) except -1
     @cython.final
+    cdef int _let_hi_fall(self) except -1
+    @cython.final
     cdef inline int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.final
     cdef inline bint _only_levels(self, long long tick) except -1

@@ -216,10 +216,10 @@ class Board(Bus):
                 return stopped
 
     def _next_interrupt(self, chip: Lm629) -> int:
-        """The next tick at which the chip may raise HI by itself: an unmasked sample, or the end of reset."""
+        """The next tick at which HI may change by itself: an unmasked sample, the end of reset, or its own end."""
         if chip.sample_tick == NEVER_TICK:
             return chip.next_tick
-        return chip.sample_tick if chip.signals.mask else NEVER_TICK
+        return min(chip.hi_falls_tick, chip.sample_tick if chip.signals.mask else NEVER_TICK)
 
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
@@ -228,6 +228,9 @@ class Board(Bus):
                 self.bridge_enable[0] = self.left.pwm
                 self.bridge_enable[1] = self.right.pwm
             now = min(self.left.next_tick, self.right.next_tick, self.plant.next_tick)
+            if min(self.left.hi_falls_tick, self.right.hi_falls_tick) <= min(now, tick):
+                self._let_hi_fall()
+                continue
             if now > tick:
                 break
             self.plant.advance(now)
@@ -240,6 +243,17 @@ class Board(Bus):
                 self._drive_interrupts(now)
             if self.probe is not None:
                 self.probe.passed(now)
+
+    def _let_hi_fall(self) -> None:
+        """HI of a chip, or of both, falls before anything else happens. It is no step of the plant."""
+        now = min(self.left.hi_falls_tick, self.right.hi_falls_tick)
+        if self.left.hi_falls_tick == now:
+            self.left.advance(now)
+        if self.right.hi_falls_tick == now:
+            self.right.advance(now)
+        self._drive_interrupts(now)
+        if self.probe is not None:
+            self.probe.hi_fell(now)
 
     # ---- RST and supply ------------------------------------------------------------------------------------
 

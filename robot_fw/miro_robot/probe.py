@@ -12,6 +12,9 @@ class Probe:
     def moved(self, tick: int) -> None:
         """The CPU has changed pins of an LM629 at `tick`; all levels of the board are those of `tick`."""
 
+    def hi_fell(self, tick: int) -> None:
+        """HI of a chip fell by itself at `tick`. The plant may be behind, and the CPU's pins ahead of that."""
+
     def passed(self, tick: int) -> None:
         """Plant and chips have done all that happens up to `tick`; levels are those of `tick`.
 

@@ -59,6 +59,7 @@ class NaiveLm629:
         self.magnitude = self.sign = 0
         self.busy_until = 0
         self.outlives = set()
+        self.lingers_until = 0
         self.words = None
         self.answer = b""
         self.phase, self.high = 0, 0
@@ -342,10 +343,13 @@ class NaiveLm629:
 
     def give(self, word):
         assert self.words is not None
+        was_high = self.interrupts()
         try:
             self.words.send(word)
         except StopIteration:
             self.words = None
+        if was_high and not self.interrupts() and self.options.hi_falls == "busy":
+            self.lingers_until = self.busy_until
 
     def data_out(self, tick):
         reading = not self.pins["cs"] and not self.pins["rd"] and self.pins["wr"]
@@ -356,11 +360,15 @@ class NaiveLm629:
             return int(self.reset == "soft" and self.options.software_reset_busy)
         return sum(1 << bit for bit in self.signals if 0 < bit < 8) | (tick < self.busy_until)
 
+    def interrupts(self):
+        return bool(self.signals & ({15} if self.options.interrupt == "event" else self.mask))
+
+    def hi_at(self, tick):
+        """Pin 17, which may stay while the command that resets it is carried out."""
+        return int(self.interrupts() or tick < self.lingers_until)
+
     def signals_word(self):
-        word = sum(1 << bit for bit in self.signals - {15})
-        if self.options.interrupt == "level":
-            return word | (0x8000 if self.signals & self.mask else 0)
-        return word | (0x8000 if 15 in self.signals else 0)
+        return sum(1 << bit for bit in self.signals - {15}) | self.interrupts() << 15
 
     def pwm_at(self, tick):
         if self.reset or self.alive_at is None:

@@ -84,13 +84,17 @@ class BoardTap(Probe):
     def known(self) -> int:
         """The tick below which the board's changes are all noted, whatever the CPU does from there on."""
         board = self.board
-        tick = min(board.left.next_tick, board.right.next_tick)
+        left, right = board.left, board.right
+        tick = min(left.next_tick, right.next_tick, left.hi_falls_tick, right.hi_falls_tick)
         if board.plant.next_tick == NEVER_TICK:  # the plant has no next step, so no encoder edge comes
             return tick
         return min(tick, self.passed_tick)
 
     def moved(self, tick: int) -> None:
         self._look_at_pins(tick)
+        self._look(tick)
+
+    def hi_fell(self, tick: int) -> None:
         self._look(tick)
 
     def passed(self, tick: int) -> None:

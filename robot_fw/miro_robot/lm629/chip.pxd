@@ -11,7 +11,7 @@ from miro_robot.lm629.trajectory cimport ProfileGenerator
 cdef long long NEVER_TICK, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING, _OPEN, _HARDWARE_RESET, _SOFTWARE_RESET
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX, _ACCELERATION_LOADED, _OUTPUT_8_BIT
-cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE, _COMMAND_ERROR
+cdef int _INTERRUPT, _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE, _COMMAND_ERROR
 cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY, _STOPS, _COMPLETED, _OUT_OF_RANGE
 cdef int _TAKEN, _FROM_OFF, _STOPS_AT_ONCE, _ARMED, _ON_THE_PLACE
 cdef int COMMAND, START_LOST, _COMMAND_CAME, _WORD_CAME, _ANSWERED
@@ -26,7 +26,7 @@ cdef class Lm629:
     cdef readonly object options
     cdef readonly long long reset_ticks
     cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats, clamps
-    cdef readonly int shows_late
+    cdef readonly int shows_late, falls_late
     cdef readonly HostPort port
     cdef readonly Encoder encoder
     cdef readonly ProfileGenerator trajectory
@@ -38,7 +38,7 @@ cdef class Lm629:
     cdef readonly int side
     cdef public list commands, encoder_edges
     cdef public long long writes_while_busy
-    cdef public long long next_tick, sample_tick, period_tick, reset_tick
+    cdef public long long next_tick, sample_tick, period_tick, reset_tick, hi_falls_tick
     cdef public int mode, reset_level, start_taken
     cdef public long long threshold, real_position, real_velocity, index_position, breakpoint
     cdef public int breakpoint_armed, excessive
@@ -49,6 +49,7 @@ cdef class Lm629:
     cdef _end_reset(self, long long now)
     cpdef int advance(self, long long tick) except -1
     cpdef rest(self, long long tick)
+    cdef inline void _put_hi(self, long long tick) noexcept
     cdef inline int _period(self, long long now) except -1
     cdef inline int _sample(self, long long now) except -1
     cdef inline int _latch_position(self, long long now) noexcept

@@ -48,6 +48,7 @@ _PLACE = ("q", -(1 << 30), (1 << 30) - 1)  # the chip's position space
 _HELD, _RESETTING, _RUNNING = 0, 1, 2
 _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR = signals.MOTOR_OFF, signals.ON_TARGET, signals.STOP_ON_ERROR
 _UPDATE_PENDING, _ACQUIRE_INDEX = signals.UPDATE_PENDING, signals.ACQUIRE_INDEX
+_INTERRUPT = signals.INTERRUPT
 _BREAKPOINT, _EXCESSIVE_ERROR = signals.BREAKPOINT, signals.EXCESSIVE_ERROR
 _WRAP_AROUND, _INDEX_ACQUIRED = signals.WRAP_AROUND, signals.INDEX_ACQUIRED
 _TRAJECTORY_COMPLETE, _COMMAND_ERROR = signals.TRAJECTORY_COMPLETE, signals.COMMAND_ERROR
@@ -74,7 +75,7 @@ class Lm629:
     """One motion controller at 6 MHz.
 
     Inputs are told when they change (`set_bus`, `set_reset`, `set_encoder`, `set_index`), in tick order and
-    never beyond `next_tick` without an `advance` first. Outputs are the public fields `pwm` (magnitude
+    never beyond `next_tick` and `hi_falls_tick` without an `advance` first. Outputs are the public fields `pwm` (PWM
     pin), `sign` (1 = negative torque) and `hi` (host interrupt), and `data_out`. A new chip stands still
     until its first reset.
 
@@ -98,6 +99,7 @@ class Lm629:
         "reset_tick": TICK,
         "threshold": ("q", 0, 0x7FFF),
         "next_tick": TICK,
+        "hi_falls_tick": TICK,
         "sample_tick": TICK,
         "period_tick": TICK,
         "real_position": _PLACE,
@@ -113,7 +115,8 @@ class Lm629:
     }
     NOT_STATE = (
         *("options", "reset_ticks", "rounds_down", "negative", "pulse_late", "keeps_sign", "open_clears"),
-        *("error_full", "error_repeats", "clamps", "shows_late", "commands", "encoder_edges", "log", "side", "pulses"),
+        *("error_full", "error_repeats", "clamps", "shows_late", "falls_late", "commands"),
+        *("encoder_edges", "log", "side", "pulses"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
     )
 
@@ -129,6 +132,7 @@ class Lm629:
         self.error_repeats = 1 if options.error_flag_repeats else 0
         self.clamps = 1 if options.out_of_range == "clamped" else 0
         self.shows_late = 1 if options.start_shows == "sample" else 0
+        self.falls_late = 1 if options.hi_falls == "busy" else 0
         self.port = HostPort(options.busy_clocks * LM629_CLOCK_TICKS, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = ProfileGenerator(options.stop_keeps_fraction)
@@ -202,6 +206,7 @@ class Lm629:
         self.pwm_magnitude = 0
         self.sign = 0
         self.hi = 0
+        self.hi_falls_tick = NEVER_TICK
 
     def _end_reset(self, now: int) -> None:
         """Status 84h; sample counter and PWM period start here (R4)."""
@@ -232,6 +237,20 @@ class Lm629:
                 self.next_tick = self.period_tick + _PWM_TICKS
             else:
                 self._period(now)
+        if self.hi_falls_tick <= tick:
+            self.hi = 0
+            self.hi_falls_tick = NEVER_TICK
+
+    def _put_hi(self, tick: int) -> None:
+        """HI after a command, which may be what lets it fall (I4)."""
+        if self.signals.word & _INTERRUPT:
+            self.hi = 1
+            self.hi_falls_tick = NEVER_TICK
+        elif self.falls_late and tick < self.port.busy_until:
+            if self.hi:
+                self.hi_falls_tick = self.port.busy_until
+        else:
+            self.hi = 0
 
     def rest(self, tick: int) -> None:
         """Makes a sample of an unplugged motor that is off, and passes those up to `tick` that find what it left.
@@ -239,7 +258,7 @@ class Lm629:
         The last of them is left, and all where there are fewer than three.
         """
         now = self.next_tick
-        if self.pulses or now + 2 * _SAMPLE_TICKS > tick:
+        if self.pulses or self.hi_falls_tick != NEVER_TICK or now + 2 * _SAMPLE_TICKS > tick:
             return
         self.advance(now)
         if self.signals.word & _MOTOR_OFF and self.encoder.quadrature.due == NEVER_TICK:
@@ -285,7 +304,9 @@ class Lm629:
         flags |= self._check_breakpoint()
         self.signals.raise_flags(flags)
         self.signals.word &= ~_UPDATE_PENDING
-        self.hi = self.signals.word >> 15
+        if self.signals.word & _INTERRUPT:
+            self.hi = 1
+            self.hi_falls_tick = NEVER_TICK
 
     def _latch_position(self, now: int) -> int:
         """Take the counts since the last sample, and an index that was caught among them."""
@@ -430,13 +451,13 @@ class Lm629:
 
     def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
         """Levels of /CS, /RD, /WR, PS and D7..D0 from `tick` on."""
-        if self.next_tick <= tick:
+        if self.next_tick <= tick or self.hi_falls_tick <= tick:
             self.advance(tick)
         outcome = self.port.pins(tick, cs, rd, wr, ps, data, self.signals.word & 0xFE)
         self.writes_while_busy = self.port.writes_while_busy
         if outcome:
             self._host(tick, outcome)
-            self.hi = self.signals.word >> 15
+            self._put_hi(tick)
 
     def data_out(self, tick: int) -> int:
         """The byte the chip drives onto D7..D0, or -1 while it leaves the bus alone."""
@@ -643,7 +664,10 @@ class Lm629:
 
     def after_load(self) -> None:
         """Raises ValueError where a mode, a command or a word does not go with the rest."""
-        self.hi = self.signals.word >> 15
+        falls = self.hi_falls_tick != NEVER_TICK
+        self.hi = 1 if falls else self.signals.word >> 15
+        if falls and (self.mode != _RUNNING or self.signals.word & _INTERRUPT):
+            raise ValueError("HI is about to fall, but it is low or a flag holds it")
         self.writes_while_busy = self.port.writes_while_busy
         if self.reset_level == 0 and self.mode != _HELD:
             raise ValueError("the reset pin is low, but the chip is not in reset")
@@ -669,6 +693,8 @@ class Lm629:
         latest_tick = earliest_tick + 2 * _SAMPLE_TICKS
         if self.next_tick < earliest_tick or (self.mode == _RUNNING and self.next_tick > latest_tick):
             raise ValueError(f"next_tick is {self.next_tick}, not from {earliest_tick} to {latest_tick}")
+        if self.hi_falls_tick < earliest_tick:
+            raise ValueError(f"hi_falls_tick is {self.hi_falls_tick}, before {earliest_tick}")
         if self.mode == _RUNNING and not earliest_tick <= self.sample_tick <= latest_tick:
             raise ValueError(f"sample_tick is {self.sample_tick}, not from {earliest_tick} to {latest_tick}")
         if self.mode == _RUNNING and self.next_tick != self._due_tick():

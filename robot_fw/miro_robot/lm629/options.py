@@ -46,14 +46,17 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     reset_interrupts: bool = True
     """I3: the flag that a reset raises (trajectory complete) also raises HI; False has a meaning with `event` alone."""
 
+    hi_falls: Literal["busy", "latch"] = "busy"
+    """I4: HI falls when the RSTI or MSKI that ends it is no longer busy, or when its last byte is latched."""
+
     # Reset
     reset_clocks: int = 6144
     """R1: from the end of the reset pulse (or the RESET command) to status 84h."""
     software_reset_busy: bool = True
     """R2: the status byte is 01h while a RESET command runs; False: 00h."""
     reset_breakpoint: Literal["none", "fires", "stays"] = "none"
-    """R3: no breakpoint after a reset (84h); one at 0, which fires in the first sample (C4h); or its flag is set (C4h) and
-    the first RSTI leaves it (C0h)."""
+    """R3: no breakpoint after a reset (84h); one at 0, which fires in the first sample (C4h); or its flag is set (C4h),
+    and the first RSTI leaves it (C0h)."""
     reset_restarts_samples: bool = True
     """R4: samples count from the end of the reset; False: they go on in the grid of tick 0."""
     reset_clears_lpes: bool = True

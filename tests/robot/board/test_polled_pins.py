@@ -8,7 +8,9 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_robot.lm629.options import Lm629Options
 from tests.example_count import examples
 from tests.naive import polled_pins
+from tests.robot.board.rig import START as VECTORS
 from tests.robot.board.rig import board_with
+from tests.robot.board.test_step_by_step import tell_left
 from tests.robot.mcs51 import asm
 from tests.states import snapshot
 
@@ -19,6 +21,8 @@ START = f"LJMP main\nDB 0\nINC R5\nRETI\nORG 30h\nmain:\nMOV TMOD,#1\nSETB TR0\n
 """Timer 0 counts cycles; /INT0 counts in R5. The pulse falls at the end of cycle 5."""
 END = "CLR TR0\nSJMP $"
 CYCLES = 1000
+RSTI = 0x1D
+BOOTED = f"{VECTORS}{PULSE}\nMOV R7,#0\nDJNZ R7,$\nDJNZ R7,$"
 
 
 def program(loop, delay=0, setup=()):
@@ -72,6 +76,26 @@ def test_a_loop_of_two_cycles_is_left_by_its_first_pass_whose_s5p2_is_not_before
     assert (
         counted == cycle + 2 - 5 + 1
     )  # TR0 counts from cycle 5 on; CLR TR0 ends with the cycle after the loop
+
+
+@pytest.mark.parametrize("delay", range(3))
+@pytest.mark.parametrize("clocks", range(120, 132))
+def test_a_loop_that_waits_for_hi_to_fall_is_left_at_the_first_s5p2_after_busy(delay, clocks):
+    rsti = [*tell_left(RSTI, 0)][:-2]  # without the pause after the last byte
+    lines = [*["NOP"] * delay, "MOV TMOD,#1", "SETB TR0", "JNB P3.2,$", "CLR TR0", "SJMP $"]
+    text = "\n".join([BOOTED, *rsti, *lines])
+    options = Lm629Options(busy_clocks=clocks, reset_clocks=RESET_CLOCKS)
+    whole, pieces = (board_with(text, options=options) for _ in range(2))
+    whole.run(30_000)
+    latched_tick, opcode, _ = whole.left.commands[-1]
+    assert (opcode, whole.left.hi) == (RSTI, 0)
+    cycle = begin = latched_tick // CYCLE_TICKS + delay + 3
+    while CYCLE_TICKS * cycle + 9 < latched_tick + 4 * clocks:
+        cycle += 2
+    assert whole.cpu.sfr(0x8C) << 8 | whole.cpu.sfr(0x8A) == cycle + 2 - begin + 1
+    for tick in range(latched_tick, 30_001):
+        pieces.run(tick)
+    assert snapshot(pieces) == snapshot(whole)
 
 
 STEPS = st.sampled_from(

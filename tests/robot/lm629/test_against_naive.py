@@ -136,7 +136,7 @@ class Pair:
         pairs = {
             "status": (chip.status_at(tick), naive.status_at(tick)),
             "signals": (chip.signals.word, naive.signals_word()),
-            "hi": (chip.hi, naive.signals_word() >> 15),
+            "hi": (chip.hi, naive.hi_at(tick)),
             "output": (
                 (chip.pwm, chip.sign, chip.pwm_magnitude),
                 (naive.pwm_at(tick), naive.sign, naive.magnitude),

@@ -126,6 +126,8 @@ READINGS = (  # option, its other reading, what is done, what is looked at, what
     ("out_of_range", "clamped", [("load", 8, 0x80000002)], "trajectory_buffer.velocity", 2, 0x3FFFFFFF),
     ("interrupt", "event", [("command", "MSKI", 0), ARRIVE, ("command", "MSKI", COMPLETE)], "hi", 1, 0),
     ("interrupt", "event", [ARRIVE, ("command", "RSTI", 0x7E), ("ready",)], "hi", 1, 0),
+    ("hi_falls", "latch", [ARRIVE, ("command", "RSTI", 0)], "hi", 1, 0),
+    ("hi_falls", "latch", [ARRIVE, ("command", "MSKI", 0)], "hi", 1, 0),
     ("error_flag_repeats", False, AGAIN, status(EXCESS), EXCESS, 0),
     ("reset_interrupts", False, RESET_PIN, signals(0xFFFF), 0x8184, 0x0184),
     ("reset_clocks", 50, [("reset", False)], ticks_to_84h, 24576, 200),

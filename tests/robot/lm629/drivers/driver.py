@@ -33,8 +33,7 @@ class Driver(Bench):
 
     def wait(self, ticks):
         end = self.tick + ticks
-        while self.chip.next_tick <= end:
-            now = self.chip.next_tick
+        while (now := min(self.chip.next_tick, self.chip.hi_falls_tick)) <= end:
             sampled = now == self.chip.sample_tick
             self.chip.advance(now)
             self.note(now)

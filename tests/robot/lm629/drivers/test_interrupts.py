@@ -95,6 +95,15 @@ def risen_while_masked(driver):
     return masked, driver.chip.hi
 
 
+def right_after_rsti(driver):
+    """RSTI by a routine that returns when it has written the last byte. Returns HI then, and when the chip is free."""
+    driver.start(0x002A, 0x8000, 0x20000, 5, samples=15)
+    driver.command("RSTI", 0)
+    while_busy = driver.chip.hi
+    driver.ready()
+    return while_busy, driver.chip.hi
+
+
 @pytest.mark.slow
 def test_a_move_with_breakpoint_and_completion_notes_each_once_and_in_order():
     result = ((BREAKPOINT, COMPLETE), 60, (COMPLETE,), 0, 0)
@@ -108,3 +117,8 @@ def test_of_two_pending_flags_the_second_still_interrupts_when_the_first_is_rese
 def test_a_flag_that_rose_while_it_was_masked_interrupts_when_it_is_unmasked():
     assert outcomes(risen_while_masked) == everywhere((0, 1))
     assert outcomes(risen_while_masked, interrupt="event") == everywhere((0, 0))
+
+
+@pytest.mark.parametrize(("falls", "while_busy"), [("busy", 1), ("latch", 0)])
+def test_hi_falls_at_the_end_of_rstis_busy_time(falls, while_busy):
+    assert outcomes(right_after_rsti, hi_falls=falls) == everywhere((while_busy, 0))
