@@ -125,7 +125,7 @@ def test_who_may_be_told_later_hears_all_of_a_board_that_fills_its_log():
         world.step()
     log = world.networks[0].robots[0].log
     assert log.first > 0
-    assert [len(monitor.heard) for monitor in checks.monitors] == [log.end]  # STT, and most of them come before the sample of another
+    assert [len(monitor.heard) for monitor in checks.monitors] == [log.end]  # STT; most come too soon
 
 
 @pytest.mark.parametrize("seed", range(3))
