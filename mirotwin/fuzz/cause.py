@@ -20,7 +20,7 @@ from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import is_call
 
-_RET, _RETI, _JMP = 0x22, 0x32, 0x73
+_RET = 0x22
 
 
 class Cause(msgspec.Struct, frozen=True):
@@ -58,7 +58,7 @@ class CauseWatcher(Watcher):
         opcode = cpu.code_at(pc)
         if is_call(opcode):
             self._called(cpu, _word(cpu, cpu.sp))
-        if opcode in (_RET, _RETI, _JMP) and self._nowhere(cpu, opcode):
+        if not cpu.is_loaded(cpu.pc) or (opcode == _RET and self._came_from_no_call(cpu)):
             self.cause = Cause(pc, "goes where no program is")
         while self._frames and self._frames[-1][0] > cpu.sp:
             self._frames.pop()
@@ -70,13 +70,9 @@ class CauseWatcher(Watcher):
             self._frames.pop()
         self._frames.append((cpu.sp, back))
 
-    def _nowhere(self, cpu: Cpu, opcode: int) -> bool:
-        """Whether a return or a computed jump went to what no way through the code leads to."""
-        if not cpu.is_loaded(cpu.pc):
-            return True
-        return (
-            opcode == _RET and cpu.pc not in self._unwinder.heights and self._unwinder.call_before(cpu.pc) < 0
-        )
+    def _came_from_no_call(self, cpu: Cpu) -> bool:
+        """Whether a return went to what no way through the code leads to."""
+        return cpu.pc not in self._unwinder.heights and self._unwinder.call_before(cpu.pc) < 0
 
 
 def _word(cpu: Cpu, place: int) -> int:

@@ -96,6 +96,17 @@ def test_another_mistake_is_another_crash(tmp_path):
     assert [triage.more[crash.name] for crash in triage.found] == [1, 1]
 
 
+@pytest.mark.parametrize("jump", ["LJMP 1800h", "LCALL 1800h", "MOV A,48h"])
+def test_whatever_leads_out_of_the_image_is_the_cause_and_not_the_place_outside(tmp_path, jump):
+    """A jump, a call, or the last instruction that nothing follows."""
+    text = OVERFLOWS.replace("MOV DPTR,#4000h", "LJMP out").replace("CJNE A,#21h", "MOV A,48h\nCJNE A,#21h")
+    text += f"ORG 0300h\nout:\n{jump}\n"
+    triage = triage_of(text, tmp_path)
+    assert triage.target.run(b"!.")
+    assert triage.target.failure.pc != 0x300
+    assert triage.reached.cause(b"!.", triage.target.failure.pc) == Cause(0x300, "goes where no program is")
+
+
 def test_a_fault_that_nothing_went_before_is_its_own_cause(tmp_path):
     text = OVERFLOWS.replace("MOV DPTR,#4000h", "DB 0A5h\nMOV DPTR,#4000h").replace(
         "CJNE A,#21h", "MOV A,48h\nCJNE A,#21h"
