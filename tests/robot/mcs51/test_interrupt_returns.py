@@ -86,6 +86,13 @@ def test_other_returns_within_a_routine_are_none(what, cycle):
     assert (cpu.peek_iram(0x34), cpu.peek_iram(0x35)) == (3, 1)
 
 
+@pytest.mark.parametrize("cycle", range(24, 60))
+def test_after_a_routine_that_jumped_to_0_no_function_that_returns_to_the_interrupted_place_is_one(cycle):
+    cpu = ran(program("LJMP 0"), [(INT0_LOW, cycle)], cycles=2_000)
+    assert cpu.bus.faults == []
+    assert cpu.peek_iram(0x31) > 0
+
+
 def test_functions_that_main_calls_afterwards_are_no_further_faults():
     pushes = [(INT0_LOW, 30)]
     cpu = ran(program("RET"), pushes, cycles=5_000)
