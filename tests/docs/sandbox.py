@@ -59,7 +59,8 @@ def copy_image(image, target):
 
 def copy_examples(folder):
     for name in starter.EXAMPLES:
-        starter.write(folder, starter.example_files(name), "", force=True)
+        files = {file: path.read_bytes() for file, path in starter.example_files(name)}
+        starter.write(folder, files, "", force=True)
 
 
 def put_parts(hidden):
