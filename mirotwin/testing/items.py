@@ -95,7 +95,7 @@ def tell(
     folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
     text = ""
     if report.failed:
-        text = story(rig, failures, [again], _failed_at(item, report, failures))
+        text = story(rig, failures, [again], _failed_at(item, report, caught, failures))
     if folder is not None:
         try:
             clear(folder, SUMMARY)
@@ -130,7 +130,7 @@ def _leave(
     case = case_of(rig, failures, None if caught is None else caught.value)
     where = f"{_relative(item.config, folder)}"
     more = [] if case is None else case_lines(where, foreign_path(rig.options.image) is None)
-    text = story(rig, failures, [*lines, *more], _failed_at(item, report, failures))
+    text = story(rig, failures, [*lines, *more], _failed_at(item, report, caught, failures))
     if not rig.written:
         text += f"\n{report_line(where)}"
     sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
@@ -176,11 +176,20 @@ def test_line(nodeid: str, seed: int, firmware: str | None) -> str:
 test_line.__test__ = False  # type: ignore[attr-defined]
 
 
-def _failed_at(item: pytest.Item, report: pytest.TestReport, failures: Sequence[Failure]) -> list[str]:
-    """The assertion that failed and its place; where checks made the test fail, they stand in its story."""
+def _failed_at(
+    item: pytest.Item,
+    report: pytest.TestReport,
+    caught: pytest.ExceptionInfo[BaseException] | None,
+    failures: Sequence[Failure],
+) -> list[str]:
+    """The assertion that failed and its place; of what `judge` says, which has none, all but the failed checks."""
+    error = None if caught is None else caught.value
+    if isinstance(error, pytest.fail.Exception) and not error.pytrace:
+        told = {f"check failed: {one}" for one in failures}  # they stand in the story
+        return [line for line in f"{error}".splitlines() if line not in told]
     crash = getattr(report.longrepr, "reprcrash", None)
     if crash is None:
-        return [] if failures else [f"failed: {report.longreprtext}"]
+        return [f"failed: {report.longreprtext}"]
     place = os.path.relpath(crash.path, item.config.invocation_params.dir)
     return [f"failed: {place}:{crash.lineno}: {crash.message}"]
 
@@ -205,7 +214,7 @@ def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str], failed_at
 def folder_of(artifacts: Path, nodeid: str) -> Path:
     """The test's own folder: no other test has it, whatever characters the names have."""
     name = re.sub(r"[^\w.=+-]+", "-", nodeid).strip("-")[-_NAME_CHARACTERS:]
-    return artifacts / f"{name}-{hashlib.sha256(nodeid.encode()).hexdigest()[:8]}"
+    return artifacts / f"{name}-{hashlib.sha256(os.fsencode(nodeid)).hexdigest()[:8]}"
 
 
 def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None) -> str | None:

@@ -1,8 +1,10 @@
 """Where nothing can be left: the verdict is told first, and why there are no files is one line."""
 
 import json
+import os
 import shutil
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
@@ -56,6 +58,31 @@ def test_the_story_of_a_failed_assertion_has_it_and_its_place(tmp_path):
     assert json.loads((folder / "summary.json").read_text())["checks_failed"] == []
 
 
+def test_the_story_of_a_test_that_checks_fail_has_no_place_in_our_own_files(tmp_path):
+    tests = """
+        @pytest.mark.mirotwin(expect={"frames_accepted_min": 9, "moves_only_when_fresh": True})
+        def test_waits(world):
+            world.run_for(ms(5))
+    """
+    session(tmp_path, "--mirotwin-artifacts=left", tests=dedent(tests))
+    story = next((tmp_path / "left").rglob("report.txt")).read_text()
+    assert story.count("check failed: frames_accepted_min") == 1
+    assert "\ncheck not judged: moves_only_when_fresh: the run had no occasion for it\n" in story
+    assert "items.py" not in story
+
+
+def test_a_test_below_a_folder_that_is_not_utf8_leaves_its_files(tmp_path):
+    folder = tmp_path / os.fsdecode(b"n\xff")
+    folder.mkdir()
+    done = session(folder, "--mirotwin-artifacts=left", tests=FAILS)
+    assert (done.returncode, "INTERNALERROR" in done.stdout + done.stderr) == (1, False)
+    assert [path.name for path in folder.rglob("report.txt")] == ["report.txt"]
+    (tmp_path / "pytest.ini").touch()
+    done = session(tmp_path, "--mirotwin-artifacts=left", f"{folder}/test_mine.py")
+    assert (done.returncode, "INTERNALERROR" in done.stdout + done.stderr) == (1, False)
+    assert [path.name for path in (tmp_path / "left").rglob("report.txt")] == ["report.txt"]
+
+
 @pytest.mark.slow
 def test_the_page_of_a_failed_assertion_says_that_no_check_failed(tmp_path):
     session(tmp_path, "--mirotwin-artifacts=left", "--mirotwin-pages", tests=FAILS)
@@ -73,7 +100,7 @@ def test_a_scenario_keeps_its_verdict(mirotwin, tmp_path, monkeypatch, text, cod
     Path("a.scenario.toml").write_text(text)
     found, out, err = mirotwin("test", "a.scenario.toml", "--artifacts", "/proc/nope")
     assert (found, err, out.startswith(f"{word}  a.scenario.toml")) == (code, "", True)
-    said = "    nothing could be left in /proc/nope/a: No such file or directory"
+    said = "    nothing could be left in /proc/nope/a: No such file or directory; choose another folder"
     assert out.splitlines().count(said) == bool(code)
     assert "left in /proc/nope/a\n" not in out.replace(said, "")
     done = session(tmp_path, "a.scenario.toml", "--mirotwin-artifacts=/proc/nope")
