@@ -13,12 +13,11 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, encodable
 from miro_robot.image import Image
 from miro_robot.image.debug_info import debug_files
 from mirotwin.shell.command import command_line, operand
-from mirotwin.shell.outputs import reason_of
-from mirotwin.verify.cases.case import write_case
+from mirotwin.shell.outputs import reason_of, write_files
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
@@ -26,6 +25,7 @@ CASES = (CASE, SENT)
 PAGE = "report.html"
 FIRMWARE = "firmware.ihx"
 FILES = (REPORT, CASE, SENT, PAGE)
+_REMEDY = "choose another folder"
 
 
 def clear(folder: Path, *others: str) -> None:
@@ -39,19 +39,24 @@ def clear(folder: Path, *others: str) -> None:
 def leave(
     folder: Path, report: str, case: str | None, sent: str | None, image: Image, others: Mapping[str, str]
 ) -> None:
-    """Writes the folder. `case`, `sent`: streams; the second where there is no first. `others`: more files, by name."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Writes all of it into the folder, or nothing. `case`, `sent`: streams; the second where there is no first.
+
+    `others`: more files, by name. Raises OSError, OutputError.
+    """
     name, stream = (SENT, sent) if case is None else (CASE, case)
     streams = {} if stream is None else {name: stream}
-    for name, text in {REPORT: report, **others, **streams}.items():
-        write_case(folder / name, text)
-    if streams:
-        leave_image(folder, image)
+    texts = {REPORT: report, **others, **streams}
+    files = {name: encodable(text).encode() for name, text in texts.items()}
+    write_files(folder, files | (_image_content(image) if streams else {}), _REMEDY)
 
 
 def nothing_left(folder: Path, error: OSError | BadInput) -> str:
     """The line that says why nothing is in the folder: the verdict stands all the same."""
-    return f"nothing could be left in {folder}: {reason_of(error) if isinstance(error, OSError) else error}"
+    if isinstance(error, OSError):
+        reason = reason_of(error)
+    else:
+        reason = f"{error.what}; {error.remedy}" if Path(error.path) == folder else f"{error}"
+    return f"nothing could be left in {folder}: {reason}"
 
 
 def image_files(folder: Path) -> list[str]:
@@ -60,15 +65,19 @@ def image_files(folder: Path) -> list[str]:
 
 
 def leave_image(folder: Path, image: Image) -> None:
-    """The image's own file, as long as that is what ran."""
+    """The image's own file, as long as that is what ran. Raises OSError, OutputError."""
+    if files := _image_content(image):
+        write_files(folder, files, _REMEDY)
+
+
+def _image_content(image: Image) -> dict[str, bytes]:
     if foreign_path(image) is None or not image.path.is_file():
-        return
+        return {}
     content = image.path.read_bytes()
     if hashlib.sha256(content).hexdigest() != image.sha256:
-        return
-    (folder / FIRMWARE).write_bytes(content)
-    for name, path in debug_files(image.path, Path(FIRMWARE).stem).items():
-        (folder / name).write_bytes(path.read_bytes())
+        return {}
+    beside = debug_files(image.path, Path(FIRMWARE).stem)
+    return {FIRMWARE: content, **{name: path.read_bytes() for name, path in beside.items()}}
 
 
 def image_beside(stream: str | Path, sha256: str | None) -> Path | None:

@@ -6,7 +6,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.image.debug_info import DebugInfo
 from miro_robot.image.variables import variables_of
-from mirotwin.verify.cases.artifacts import FIRMWARE, clear, leave_image
+from mirotwin.shell.outputs import OutputError
+from mirotwin.verify.cases.artifacts import FIRMWARE, clear, leave, leave_image, nothing_left
 
 
 def copied(folder, listing):
@@ -39,3 +40,16 @@ def test_a_listing_of_an_earlier_image_does_not_stay_beside_another_one(tmp_path
     (tmp_path / "left" / "other.rst").write_text("of another tool")
     clear(tmp_path / "left")
     assert [path.name for path in (tmp_path / "left").iterdir()] == ["other.rst"]
+
+
+def test_where_the_image_cannot_be_left_its_case_is_not_either(tmp_path):
+    folder = tmp_path / "left"
+    (folder / FIRMWARE).mkdir(parents=True)
+    image = copied(tmp_path / "own", "mine.rst")
+    with pytest.raises(OutputError) as caught:
+        leave(folder, "report", "case", None, image, {"scenario.toml": "a scenario"})
+    assert [path.name for path in folder.iterdir()] == [FIRMWARE]
+    assert nothing_left(folder, caught.value) == (
+        f"nothing could be left in {folder}: {folder / FIRMWARE}: is a folder where a file is to be written;"
+        " remove it, or choose another folder"
+    )
