@@ -15,6 +15,7 @@ from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
+from miro_robot.mcs51.opcodes import SFRS
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.firmware.code_place import address_of
@@ -42,6 +43,7 @@ from mirotwin.verify.expectations import CHECK, EXPECT, as_settings
 from mirotwin.verify.rig_options import silent_scenario
 
 LONGEST_S = 1e7
+_NINE_BITS = 0x80  # of SCON: SM0
 BARE = "Any 8051 firmware with a serial port"
 
 
@@ -308,6 +310,9 @@ def _check_at_rest(target: Target, image: Image, crystal_hz: int) -> None:
             f"{1000 * AWAKE_TICKS / crystal_hz:.3g} ms after its last character (--after gives another time)"
         )
         complain(f"{image.path}: never sleeps (IDL); each run goes on for {after}")
+    if target.cpu.sfr(SFRS["SCON"]) & _NINE_BITS:
+        why = "inputs are characters of 8 without a pause, which it reads as others"
+        complain(f"{image.path}: takes characters of 9 bits; {why}")
     if failure is not None:
         what = f"fails before it has heard anything: {failure.check}: {failure.what}"
         raise BadInput(image.path, "", what, "mend that first: each input would find it")

@@ -65,6 +65,15 @@ def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwi
     assert (code, out.splitlines()[-1]) == (0, f"{len(cases)} passed")
 
 
+def test_a_port_of_9_bits_is_reported_as_the_inputs_are_none_of_its_characters(mirotwin, engines, tmp_path):
+    for name, control, reported in (("eight", "50h", False), ("nine", "0D0h", True)):
+        text = POLLS.replace("MOV SCON,#50h", f"MOV SCON,#{control}")
+        assert control in text
+        image = hex_file(tmp_path / f"{name}.ihx", assemble(text))
+        _, _, err = campaign(mirotwin, tmp_path, image, "--input", "bytes", "--out", str(tmp_path / name))
+        assert (f"{image}: takes characters of 9 bits; inputs are characters of 8" in err) == reported
+
+
 @pytest.mark.slow
 def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes, check, tmp_path):
     inputs = corpus(tmp_path, b"quiet")
