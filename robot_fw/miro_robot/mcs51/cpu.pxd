@@ -23,7 +23,6 @@ cdef class Cpu(Chip):
     cdef int _watch_main_loop(self, long long now) except -1
     cdef int _enter(self, int source) except -1
     cdef int end_of_interrupt(self, int pc) except -1
-    cdef int forget_return(self, int pc) except -1
     cdef int return_in_service(self, int pc) except -1
     @cython.locals(now='long long', pc='long long', line='unsigned long long', row=int, value=int)
     cdef int execute(self, long long until_cycle) except -1

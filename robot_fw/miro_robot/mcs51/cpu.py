@@ -179,23 +179,18 @@ class Cpu(Chip):
         self.start = self.cycles
         self.at = self.pc
         self.cycles += 2
-        place = self.sp << 16 | self.pc
+        self.interrupt_returns[self.peripherals.interrupts.in_service >> 1] = self.sp << 16 | self.pc
         self.pc = self.call(self.pc, 8 * source + 3)
-        self.interrupt_returns[self.peripherals.interrupts.in_service >> 1] = place
         self._expect(self.cycles)
 
     def end_of_interrupt(self, pc: int) -> None:
         """RETI went to `pc`."""
-        self.forget_return(pc)
+        for level in range(2):
+            if self.interrupt_returns[level] == self.sp << 16 | pc:
+                self.interrupt_returns[level] = -1  # taken: from now on any RET may go there
         self.leave_edges()
         self.peripherals.interrupts.leave()
         self._block()
-
-    def forget_return(self, pc: int) -> None:
-        """What an interrupt pushed here, to go back to `pc`, is taken or overwritten: any RET may go there now."""
-        for level in range(2):
-            if self.interrupt_returns[level] == self.sp << 16 | pc:
-                self.interrupt_returns[level] = -1
 
     def return_in_service(self, pc: int) -> None:
         """RET went to `pc` while an interrupt is in service.
@@ -629,8 +624,6 @@ class Cpu(Chip):
 
     def call(self, pc: int, target: int) -> int:
         """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
-        if self.peripherals.interrupts.in_service:  # as after a routine that jumped to 0
-            self.forget_return(pc)
         self.claim()
         self.iram[self.sp] = pc & 0xFF
         self.claim()
@@ -658,6 +651,9 @@ class Cpu(Chip):
         a step up by less than half of RAM that ends lower. A number in the instruction (MOV SP,#data) is no sum.
         """
         before, self.sp = self.sp, value
+        for level in range(2):
+            if value < (self.interrupt_returns[level] >> 16) + 2:  # given up, as where a routine jumps to 0
+                self.interrupt_returns[level] = -1
         end = self.stack_end or 0x100
         if value > self.highest_sp:
             self.highest_sp = value

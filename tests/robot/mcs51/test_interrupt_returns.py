@@ -86,6 +86,12 @@ def test_other_returns_within_a_routine_are_none(what, cycle):
     assert (cpu.peek_iram(0x34), cpu.peek_iram(0x35)) == (3, 1)
 
 
+def test_a_routine_with_variables_on_the_stack_that_ends_in_ret_is_a_fault_too():
+    """As a function that SDCC compiled with --stack-auto."""
+    frame = "MOV A,SP\nADD A,#4\nMOV SP,A\nACALL work\nMOV A,SP\nADD A,#0FCh\nMOV SP,A\nRET"
+    assert kinds(ran(program(frame), [(INT0_LOW, 30)])) == [NOT_LEFT]
+
+
 @pytest.mark.parametrize("cycle", range(24, 60))
 def test_after_a_routine_that_jumped_to_0_no_function_that_returns_to_the_interrupted_place_is_one(cycle):
     cpu = ran(program("LJMP 0"), [(INT0_LOW, cycle)], cycles=2_000)
