@@ -39,7 +39,12 @@ def operand(path: str | PathLike[str]) -> str:
 
 def command_line(*words: str) -> str:
     """`mirotwin` with these words, quoted for a shell."""
-    return " ".join(map(_quoted, ("mirotwin", *words)))
+    return shell_line("mirotwin", *words)
+
+
+def shell_line(*words: str) -> str:
+    """A command, quoted for a shell."""
+    return " ".join(map(_quoted, words))
 
 
 def _quoted(word: str) -> str:

@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 import re
-import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +17,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
+from mirotwin.shell.command import shell_line
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import case_lines, clear, leave, nothing_left, report_line
@@ -170,7 +170,7 @@ def test_line(nodeid: str, seed: int, firmware: str | None) -> str:
     words = ["pytest", nodeid, "--mirotwin-seed", str(seed)]
     if firmware is not None:
         words += ["--mirotwin-firmware", firmware]
-    return shlex.join(words)
+    return shell_line(*words)
 
 
 test_line.__test__ = False  # type: ignore[attr-defined]

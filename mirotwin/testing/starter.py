@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ import click
 
 from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.firmware import image_path, source_folder
-from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.command import Argument, Option, Options, command_of, operand, shell_line
 from mirotwin.shell.options import FORCE, PATH
 from mirotwin.shell.outputs import reason_of, some, write_files
 from mirotwin.testing import origin
@@ -201,7 +200,7 @@ def init(options: InitOptions) -> None:
         click.echo(
             "That is a path of this machine. For CI on another one begin with --from git+https://HOST/PATH@COMMIT"
         )
-    enter = shlex.join(["cd", str(folder)])
+    enter = shell_line("cd", operand(folder))
     if options.without_firmware:
         click.echo(f"next: {enter} && make test   (needs make and pytest)")
         return

@@ -1,6 +1,7 @@
 """`mirotwin examples` and `mirotwin init`: an example or a project with all its files, or nothing."""
 
 import os
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -167,6 +168,16 @@ def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_p
     assert found == {name for name, _ in starter.project_files()}
     assert {"Makefile", "firmware/main.c", "tests/test_robot.py", ".github/workflows/firmware.yml"} <= found
     assert f"next: cd {tmp_path}/mine && make test" in out
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+@pytest.mark.parametrize("name", [b"-x", b"n\xff", b"it's"])
+def test_the_printed_command_enters_the_folder_whatever_its_name(mirotwin, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    out = mirotwin.succeeds("init", "--without-firmware", "--", os.fsdecode(name))
+    (enter,) = re.findall(r"^next: (cd .*) && make test", out, re.M)
+    children.run(["bash", "-c", f"{enter} && touch entered"], check=True)
+    assert Path(os.fsdecode(name), "entered").exists()
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
