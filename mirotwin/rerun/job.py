@@ -267,10 +267,11 @@ class Job(msgspec.Struct, frozen=True):
         return expected
 
     def verdict_of_case(self, checks: Checks) -> CaseVerdict:
-        """What the checks that it names say this time; `checks` were there."""
-        named = worst(one.verdict for one in checks.verdicts() if one.name in checks.named)
+        """What the checks that it names say this time, or all where it has no verdict; `checks` were there."""
+        named = [one.verdict for one in checks.verdicts() if one.name in checks.named]
+        verdict = worst(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
-        return verdict_of(self.case.verdict, checks.failures, self.case.changed, named, why)
+        return verdict_of(self.case.verdict, checks.failures, self.case.changed, verdict, why)
 
     def world_of(self, image: Image | None = None) -> World:
         """A world that is to do it again, on `image` if one is given; a resumed run begins where that one did."""
