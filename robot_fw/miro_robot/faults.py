@@ -35,7 +35,7 @@ DESCRIPTIONS = {
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
     FaultKind.LM629_TIMING: "violated an LM629 bus timing limit",
     FaultKind.MAIN_LOOP_STARVED: "starved its main loop: interrupts took all of 10 ms",
-    FaultKind.INTERRUPT_NOT_LEFT: "left an interrupt with RET, not RETI: its level stays blocked",
+    FaultKind.INTERRUPT_NOT_LEFT: "ended an interrupt routine with RET, not RETI (its level stays blocked)",
 }
 
 

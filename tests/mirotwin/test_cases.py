@@ -37,7 +37,7 @@ def test_an_interrupt_routine_that_ends_in_ret_is_a_fault_that_the_profile_shows
     code, out, err = mirotwin("fw", command, image, "--pins", pins, "--max-cycles", 300_000)
     assert code == VERDICTS["fault"].code
     assert (
-        "firmware left an interrupt with RET, not RETI: its level stays blocked at 0x0042, tick 2400108"
+        "firmware ended an interrupt routine with RET, not RETI (its level stays blocked) at 0x0042, tick 2400108"
         in err
     )
     assert ("never left  2400024" in out) == (command == "profile")

@@ -122,7 +122,7 @@ SJMP loop
 def test_a_routine_that_ends_in_ret_is_a_fault_and_never_left_in_the_profile(mirotwin, tmp_path):
     image = hex_file(tmp_path / "ret.ihx", assemble(RET_IN_INTERRUPT))
     limit = ("--max-cycles", 300_000)
-    said = "firmware left an interrupt with RET, not RETI: its level stays blocked at 0x001b, tick "
+    said = "firmware ended an interrupt routine with RET, not RETI (its level stays blocked) at 0x001b, tick "
     assert said in mirotwin.ends(3, "fw", "run", image, *limit)
     for more in ((), ("--go-on",)):
         code, out, err = mirotwin("fw", "profile", image, *limit, *more)
