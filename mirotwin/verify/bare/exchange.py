@@ -162,12 +162,17 @@ def check_named(text: str) -> NamedCheck:
     return installed_check(text)
 
 
-def installed_check(name: str) -> NamedCheck:
-    """The check that an installed distribution has under this name. Raises BadInput."""
+def installed_entry(name: str) -> Any:
+    """What an installed distribution registers under this name. Raises BadInput where two, or we and one, have it."""
     try:
-        entry = installed_part(GROUP, "check", name, OWN.get(name, ""))
+        return installed_part(GROUP, "check", name, OWN.get(name, ""))
     except PluginError as error:
         raise BadInput("", OPTION, error.what, error.remedy) from None
+
+
+def installed_check(name: str) -> NamedCheck:
+    """The check that an installed distribution has under this name. Raises BadInput."""
+    entry = installed_entry(name)
     if entry is None:
         names = sorted(one.name for one in entries_of(GROUP))
         remedy = did_you_mean(name, names, f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}")

@@ -244,8 +244,11 @@ def test_two_checks_of_one_name_are_an_error_that_names_both(tmp_path, monkeypat
         check_named("always_wrong")
     for place in ("theirs-1 1.0 (check_1:wrong)", "theirs-2 1.0 (check_2:wrong)"):
         assert place in str(caught.value)
-    with pytest.raises(BadInput, match=r"check 'no_fault' is in mirotwin \(always on\) and in theirs-"):
+    both = r"check 'no_fault' is in mirotwin \(always on\) and in theirs-"
+    with pytest.raises(BadInput, match=both):
         check_named("no_fault")
+    with pytest.raises(BadInput, match=both):
+        rerun_bare_case(case(tmp_path, b"ab!"), image(SLEEPS))
 
 
 @pytest.mark.parametrize("name", ["no_fault", "never_sleeps"])
