@@ -20,7 +20,7 @@ PICTURE_BYTES = 4 << 20
 WORLD_BYTES = 64 << 20
 RECORDING_BYTES = 1 << 30
 RECORDING_NEEDS = 7
-"""Memory that reading a whole recording takes at most, in sizes of the file (docs/measured.md)."""
+"""Memory that reading a whole large recording takes, in sizes of the file; more for a small one (docs/measured.md)."""
 CHUNK_BYTES = 1 << 20
 _OF_PROCESSES = ("/dev/", "/proc/self/fd/")
 """Where a shell puts the pipe of `<(command)`."""
