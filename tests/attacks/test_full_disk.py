@@ -52,20 +52,24 @@ def test_a_full_disk_is_named_and_nothing_half_written_stays(command, most_bytes
     assert [path.name for path in tmp_path.rglob("*") if path.is_file() and path.stat().st_size] == left
 
 
+def test_a_disk_that_becomes_full_is_named_with_the_option_that_leads_elsewhere(tmp_path):
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    done = with_files_of(NOTHING_FITS, ["campaign", "c.toml", "--jobs", "1", "--out", "c.parquet"], tmp_path)
+    assert done.returncode == 2
+    error = "mirotwin: error: c.part.jsonl: File too large; make room, or choose another file with --out"
+    assert done.stderr.splitlines()[-1] == error
+
+
 @pytest.mark.parametrize(
-    ("command", "most_bytes", "named"),
+    ("command", "most_bytes", "said"),
     [
-        (["campaign", "c.toml", "--jobs", "1", "--out", "c.parquet"], NOTHING_FITS, "c.part.jsonl"),
-        (["test", STEPS, "--firmware", LATE, "--artifacts", "left", "--pages"], CASE_FITS, "left"),
-        (["conform", LATE, "--rule", "P29", "--artifacts", "left"], NOTHING_FITS, "left"),
+        (["test", STEPS, "--firmware", LATE, "--pages"], CASE_FITS, "no page: "),
+        (["test", STEPS, "--firmware", LATE], NOTHING_FITS, "nothing could be left in left"),
+        (["conform", LATE, "--rule", "P29"], NOTHING_FITS, "nothing could be left in left"),
     ],
 )
-def test_a_disk_that_becomes_full_is_named_with_the_option_that_leads_elsewhere(
-    command, most_bytes, named, tmp_path
-):
-    (tmp_path / "c.toml").write_text(CAMPAIGN)
-    done = with_files_of(most_bytes, command, tmp_path)
-    assert done.returncode == 2
-    other = "folder with --artifacts" if "--artifacts" in command else "file with --out"
-    error = f"mirotwin: error: {named}: File too large; make room, or choose another {other}"
-    assert done.stderr.splitlines()[-1] == error
+def test_a_verdict_is_told_on_a_disk_that_becomes_full(command, most_bytes, said, tmp_path):
+    done = with_files_of(most_bytes, [*command, "--artifacts", "left"], tmp_path)
+    assert done.returncode == 1
+    assert "both wheels told to stop" in done.stdout
+    assert said in done.stdout + done.stderr

@@ -167,7 +167,9 @@ def test_axes_do_not_show_rounding_noise():
 
     numbers = np.array([1.0, 1.0 + 2e-16, 1.0 - 1e-16, 1.0])
     for metric, least in LEAST.items():
-        ends = spread(metric, [(Arm({}, 4, {}, {metric: figures(numbers, np.arange(4))}), numbers)]).x_range
+        ends = spread(
+            metric, [(Arm({}, 4, {}, 0, {metric: figures(numbers, np.arange(4))}), numbers)]
+        ).x_range
         assert ends.end - ends.start == pytest.approx(least)
         assert ends.start < 1.0 < ends.end
 
