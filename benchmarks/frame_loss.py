@@ -32,7 +32,7 @@ from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.mcs51.line import Line
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.params import Radio, SlicerParams
@@ -120,7 +120,7 @@ def received(robots: int, params: Radio, frames: int, seed: int, eb_n0_db: float
 def firmware(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
     """The robot, motors off their feet; a valid frame is one that it counts as fresh or as stale."""
     image = load_hex(image_path())
-    board = Board(load_wiring(), Plant(), 0, robots, None, True)
+    board = Board(load_wiring(), IdealWheels(), 0, robots, None, True)
     board.cpu.load(image.code, image.used)
     addresses = [symbol.address for name in COUNTERS if (symbol := image.symbols.find(name))]
     draws = Stream(seed, "velocities")

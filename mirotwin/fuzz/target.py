@@ -18,7 +18,7 @@ from miro_robot.harness.harness import AHEAD_TICKS, AWAKE, LEAD_TICKS, Harness
 from miro_robot.harness.program import INPUTS, RESET_TICKS, Program
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.inputs import seeds
 from mirotwin.fuzz.spec import MAP_SIZE, TargetSpec
@@ -201,7 +201,7 @@ def robot_target(spec: TargetSpec) -> RobotTarget:
 
 
 def _booted(image: Image, slot: int, robots: int) -> Board:
-    board = Board(load_wiring(), Plant(), slot, robots)
+    board = Board(load_wiring(), IdealWheels(), slot, robots)
     board.load(image)
     board.cpu.rxd.settled_tick = (BOOT_PERIODS + 1) * CONTROL_PERIOD_TICKS
     board.cpu.txd.unread = True

@@ -72,6 +72,9 @@ def _lines() -> Iterator[str]:
     yield _define("VELOCITY_SATURATION", table.VELOCITY_SATURATION, "+-, 1/256 count per sample: 1.46 m/s")
     acceleration = f"{table.DEFAULT_ACCELERATION}UL"
     yield _define("DEFAULT_ACCELERATION", acceleration, "16.16 count/sample^2: 6 m/s2 at 6 MHz")
+    yield _define(
+        "POSITION_ERROR_MAX", table.POSITION_ERROR_MAX, "counts: beyond this a wheel is lost, motors off"
+    )
     yield _title("Tables")
     yield "#ifdef PROTOCOL_TABLES"
     yield from _array("whitening", whitening.STRING)

@@ -34,6 +34,9 @@ ROBOT_COUNTS = (3, 5)
 SEQ_MODULUS = 64
 VELOCITY_SATURATION = 16633  # 1.46 m/s in 1/256 count per LM629 sample: where the firmware cuts off
 DEFAULT_ACCELERATION = 5973  # 6 m/s2 as 16.16 count/sample^2 at 6 MHz
+POSITION_ERROR_MAX = (
+    512  # counts (3.9 mm) that a wheel may be away from where it should be; beyond, motors off
+)
 
 
 class FrameType(IntEnum):

@@ -18,7 +18,7 @@
 #define LM629_RST       P2_5    /* both chips: they leave reset together, so their samples coincide */
 #define LM629_SELECTS   0x18    /* P2.3 /CS left, P2.4 /CS right */
 
-/* Straps on P1, read once at the start. */
+/* Straps on P1. */
 #define STRAP_SLOT      (P1 & 0x07)
 #define STRAP_THREE     P1_3    /* high: network of 3 robots, low: of 5 */
 

@@ -21,7 +21,8 @@ u8 rx_taken;                            /* characters looked at so far, wraps */
 static u8 run;
 static u8 frame_size;                   /* F */
 
-void decode_start(void)
+/* Reads the strap that says how many robots the network has. */
+void decode_strap(void)
 {
     robots = STRAP_THREE ? 3 : 5;
     frame_size = robots == 3 ? RX3_FRAME : RX5_FRAME;

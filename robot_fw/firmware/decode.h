@@ -16,7 +16,7 @@ extern u8 rx_taken;
 #define HDR             body[0]
 #define PAYLOAD         (body + 1)
 
-void decode_start(void);
+void decode_strap(void);
 bool decode_character(void);
 bool decode_valid(void);
 

@@ -13,6 +13,7 @@
 #include "motion.h"
 #include "protocol.h"
 #include "uart.h"
+#include "watch.h"
 
 /* Cycles for which the interrupt holds Timer 1; counted in failsafe.asm, checked by test_failsafe.py. */
 #define HELD_CYCLES     6
@@ -20,7 +21,7 @@
 #define AGE_MAX         1000
 
 /* Cycles from a tick to the STT of the stop that it brings, and from look_back() to the restart of Timer 1. */
-#define STOPPING        680
+#define STOPPING        720
 
 u16 frames_accepted, frames_stale;
 u8 last_hdr;
@@ -150,6 +151,7 @@ void failsafe_tick(void)
         motion_off();
         failsafe_flags |= FLAG_MOTORS_OFF;
     }
+    watch_tick();
     motion_tick();
 }
 

@@ -17,6 +17,7 @@
 #define UDF             0x04    /* filter buffers take effect at the next sample */
 #define RDRP            0x0A    /* read real position */
 #define RDSIGS          0x0C    /* read signals register */
+#define LPES            0x1A    /* beyond this position error the motor goes off */
 #define MSKI            0x1C    /* interrupt mask */
 #define RSTI            0x1D    /* reset interrupt flags */
 #define LFIL            0x1E    /* load filter */
@@ -33,6 +34,7 @@
 
 #define FIL_ALL         0x0F    /* filter control word, low byte: kp, ki, kd, il follow */
 #define SIG_ON_TARGET   0x04    /* signals register, high byte: the profile generator has finished */
+#define STATUS_POSITION_ERROR 0x20 /* the position error was larger than LPES allows; RSTI clears it */
 
 extern __bit lm629_ready;       /* both chips answer; while it is clear nothing here touches them */
 

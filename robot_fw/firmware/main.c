@@ -10,6 +10,7 @@
 #include "protocol.h"
 #include "telemetry.h"
 #include "uart.h"
+#include "watch.h"
 
 #define IDL         0x01    /* PCON: idle until the next interrupt */
 #define TIMERS_16   0x11    /* TMOD: Timer 0 and 1 count machine cycles, 16 bits */
@@ -38,7 +39,7 @@ static void act(void)
 void main(void)
 {
     TMOD = TIMERS_16;
-    decode_start();
+    decode_strap();
     motion_start();
     uart_start();
     failsafe_start();
@@ -47,6 +48,8 @@ void main(void)
         sleep = IDL;
         if (ticks_taken != ticks)
             failsafe_tick();
+        else if (watch_due)
+            motion_watch();
         else if (rx_taken != rx_count) {
             if (decode_character()) {
                 failsafe_look();

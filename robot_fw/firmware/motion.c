@@ -16,9 +16,11 @@
 #include "lm629.h"
 #include "protocol.h"
 #include "uart.h"
+#include "watch.h"
 
 #define BOOT_TRIES      8
 #define RETRY_TRIES     1   /* while frames come in there is no time for more */
+#define RECOVERIES      8   /* resets of the chips in motion, with fewer than 256 team frames between two of them */
 
 #define LOW(word)       ((word) & 0xFF)
 #define HIGH(word)      ((word) >> 8)
@@ -31,7 +33,9 @@ u8 slot;
 int last_left, last_right;
 
 static u8 state;
+static u8 recoveries, frames_between;
 static __bit acceleration_waits;
+static __bit lost;          /* a wheel does not follow: off until the host tells both wheels to stand */
 
 /* Settings as they came over the air, low byte first; they survive a reset of the chips. */
 static __idata u8 acceleration[4] = {LOW(DEFAULT_ACCELERATION), HIGH(DEFAULT_ACCELERATION), 0, 0};
@@ -69,8 +73,7 @@ static void reset_chips(u8 tries)
     failsafe_flags |= FLAG_MOTORS_OFF;
     if (!lm629_reset(tries))
         return;
-    lm629_command(MSKI);                /* no host interrupts: HI stays low */
-    lm629_word(0, 0);
+    watch_start();
     load_filter();
     load_acceleration();
 }
@@ -127,6 +130,7 @@ void motion_stop(void)
 {
     if (state != STATE_DRIVING)
         return;
+    watch_stopping();
     halt_both(TRJ_SMOOTH_STOP);
     state = STATE_STOPPED;
 }
@@ -140,6 +144,29 @@ void motion_off(void)
     state = STATE_OFF;
 }
 
+/* Resets chips that stopped answering, unless that has failed to help: one that stays busy again and again would move
+ * the other wheel a little after each reset. */
+static void recover(void)
+{
+    if (recoveries == RECOVERIES)
+        return;
+    ++recoveries;
+    frames_between = 0;
+    reset_chips(RETRY_TRIES);
+}
+
+/* Whether the wheels may turn: not while the last velocities ask for motion that a lost wheel would not follow. */
+static bool may_drive(void)
+{
+    if (!lost)
+        return true;
+    if (last_left || last_right)
+        return false;
+    lost = 0;
+    watch_clear();
+    return true;
+}
+
 /* A fresh team frame: own velocities to both wheels. A robot whose slot strap is not below N never moves. */
 void motion_team(void)
 {
@@ -148,9 +175,13 @@ void motion_team(void)
     if (slot >= robots)
         return;
     if (!lm629_ready)
-        reset_chips(RETRY_TRIES);
+        recover();
+    else if (!++frames_between)
+        recoveries = 0;
     last_left = saturated(at + PAIR_LEFT);
     last_right = saturated(at + PAIR_RIGHT);
+    if (!may_drive())
+        return;
     if (acceleration_waits && !last_left && !last_right) {
         motion_stop();
         return;
@@ -183,11 +214,18 @@ void motion_service(void)
     }
 }
 
-static bool on_target(u8 chip)
+/* A wheel that does not follow (an encoder's wire is broken, or something holds it) has been switched off by its chip;
+ * the other one goes off with it, or the robot would turn on the spot. The straps are read again, so that damaged copies
+ * do not last. */
+void motion_watch(void)
 {
-    lm629_select(chip);
-    lm629_command(RDSIGS);
-    return HIGH(lm629_read_word()) & SIG_ON_TARGET;
+    watch_due = 0;
+    slot = STRAP_SLOT;
+    decode_strap();
+    if (state == STATE_OFF || !watch_lost())
+        return;
+    motion_off();
+    lost = lm629_ready;     /* a chip that does not answer reads as FFh: that is for recover() */
 }
 
 /* Loads a waiting acceleration at standstill. The LM629 refuses an STT with a new acceleration while its profile
@@ -197,7 +235,7 @@ void motion_tick(void)
 {
     if (!acceleration_waits || state == STATE_DRIVING || rx_taken != rx_count)
         return;
-    if (state == STATE_STOPPED && !(on_target(LEFT) && on_target(RIGHT)))
+    if (state == STATE_STOPPED && !watch_stopped())
         return;
     load_acceleration();
 }

@@ -12,6 +12,7 @@ void motion_start(void);
 void motion_team(void);
 void motion_service(void);
 void motion_tick(void);
+void motion_watch(void);
 void motion_stop(void);
 void motion_off(void);
 

@@ -116,6 +116,7 @@
 /* Values */
 #define VELOCITY_SATURATION          16633   /* +-, 1/256 count per sample: 1.46 m/s */
 #define DEFAULT_ACCELERATION         5973UL  /* 16.16 count/sample^2: 6 m/s2 at 6 MHz */
+#define POSITION_ERROR_MAX           512     /* counts: beyond this a wheel is lost, motors off */
 
 /* Tables */
 #ifdef PROTOCOL_TABLES

@@ -1,4 +1,7 @@
 # C layout of miro_robot.plant.
+cimport cython
+
+from miro_robot.lm629.buffers cimport signed_31
 from miro_robot.lm629.chip cimport Lm629
 
 cdef long long SAMPLE_TICKS
@@ -12,3 +15,7 @@ cdef class Plant:
     cpdef advance(self, long long tick)
     cpdef int run_pulses(self, long long tick) except -1
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
+
+cdef class IdealWheels(Plant):
+    @cython.locals(chip=Lm629)
+    cpdef advance(self, long long tick)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
+from miro_robot.lm629.buffers import signed_31
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 
 
@@ -51,3 +52,19 @@ class Plant:
 
     def __repr__(self) -> str:
         return "Plant(motors unplugged)"
+
+
+class IdealWheels(Plant):
+    """Wheels without mass: at each sample they are where the sample before wanted them.
+
+    For firmware on its own (fuzzing, tests): with motors unplugged no wheel follows, and firmware that watches the
+    position error never drives.
+    """
+
+    def advance(self, tick: int) -> None:
+        for chip in (self.left, self.right):
+            if chip is not None and chip.sample_tick == tick:
+                chip.encoder.counts = signed_31((chip.trajectory.position >> 16) - chip.real_position)
+
+    def __repr__(self) -> str:
+        return "IdealWheels()"

@@ -141,7 +141,7 @@ def _at_once(host):
 
 def _in_the_window(host):
     host.team(1, 500, 500)
-    host.tick += 133 * _UART_SAMPLE_TICKS
+    host.tick += 136 * _UART_SAMPLE_TICKS
     host.bytes(b"\0")
     host.pause(20)
     host.team(4, 1000, 1000)
@@ -171,7 +171,7 @@ def _full_speed_back(host):
 
 
 def _gains(host):
-    host.service(1, 1, bytes(8) + bytes([10]))
+    host.service(1, 1, bytes(8) + bytes([60]))
     host.team(2, 2000, 2000)
 
 
@@ -200,7 +200,7 @@ def _stop_while_answering(host):
 
 def _in_phase_with_the_answer(host):
     host.team(3, 2000, 2000, ask=True)
-    host.tick += 130 * _UART_SAMPLE_TICKS
+    host.tick += 137 * _UART_SAMPLE_TICKS
     host.team(4, 2000, 2000)
 
 

@@ -108,7 +108,7 @@ void main(void)
     ("takes bad stop bits", "A character whose stop bit was 0 is like any other.",
      "uart.c", "            if (!RB8)\n", "            if (0)\n"),
     ("loses sync for good after a bad CRC", "After one damaged frame nothing is valid any more.",
-     "decode.c", "++frames_rejected;", "++frames_rejected; frame_size = 99;"),
+     "decode.c", "if (!take_body(", "if (frames_rejected || !take_body("),
     ("does not count damaged frames", "The counter of rejected frames stays at 0.",
      "decode.c", "        ++frames_rejected;\n", ""),
     ("counts stale frames as accepted", "The counter of accepted frames runs ahead.",

@@ -64,10 +64,11 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
 class SilenceMonitor(OrdersMonitor[SilenceCheck]):
     """`in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
 
-    `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
+    `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet. A wheel that is
+    lost switches both motors off, at any time: of that silence nothing is judged.
     """
 
-    EVENTS = ("received", "frame", "command")
+    EVENTS = ("received", "frame", "command", "wheel_lost")
 
     def __init__(self, check: SilenceCheck, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -87,6 +88,8 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
                 self._fail_late(event.tick)
                 self.rule.last_tick = event.frame.last_tick
                 self.in_time = False
+        elif event.what == "wheel_lost":
+            self.rule.last_tick = -1
         else:
             self._command(event)
 

@@ -39,7 +39,7 @@ from mirotwin.shell.verdicts import Verdict
 Kind = Literal["safety", "liveness"]
 EVENT_KINDS = (
     *("sent", "heard", "answer", "received", "transmitted", "frame", "damaged", "command", "fault"),
-    *("reset", "power", "radio", "touch", "start_lost"),
+    *("reset", "power", "radio", "touch", "start_lost", "wheel_lost"),
 )
 """The kinds that `EVENTS` of a monitor may name."""
 KEPT = 100

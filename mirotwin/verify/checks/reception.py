@@ -139,13 +139,15 @@ class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_
 
 
 class ActsMonitor(OrdersMonitor[ActsCheck]):
-    """`damaged`: characters that are no frame came since the last frame."""
+    """`damaged`: characters that are no frame came since the last frame. `lost`: a wheel does not follow, so the robot
+    has to stand until both are told to.
+    """
 
-    EVENTS = ("frame", "damaged", "command")
+    EVENTS = ("frame", "damaged", "command", "wheel_lost")
 
     def __init__(self, check: ActsCheck, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.damaged = False
+        self.damaged = self.lost = False
         self.rule = DrivingRule(ms_ticks(check.within_ms))
 
     def event(self, event: Event) -> None:
@@ -154,13 +156,16 @@ class ActsMonitor(OrdersMonitor[ActsCheck]):
             self.damaged = True
         elif event.what == "frame":
             self._frame(event)
+        elif event.what == "wheel_lost":
+            self.lost = True
+            self.rule.begin()
         elif self.orders.take(event) is not None:
             self.rule.told(*self.orders.words())
 
     def restarted(self, tick: int) -> None:
         super().restarted(tick)
         self.rule.begin()
-        self.damaged = False
+        self.damaged = self.lost = False
 
     def _frame(self, event: Event) -> None:
         damaged, self.damaged = self.damaged, False
@@ -168,7 +173,9 @@ class ActsMonitor(OrdersMonitor[ActsCheck]):
         if frame is None or not event.value or (self.check.AFTER_DAMAGE and not damaged):
             return
         words = words_of(frame, self.subject)
-        if words is not None:
+        if words == (0, 0):
+            self.lost = False
+        if words is not None and not self.lost:
             self.judged += 1
             if words != (0, 0) or not self._stopping():
                 self.rule.team(frame.last_tick, *words)

@@ -34,6 +34,7 @@ _REASONS = {
     "no serial port sends a bad stop bit": "P09",
     "a PC cannot time what decides": "P10 P11 P18 P42",
     "its trial tells wheels to go at full speed": "P12",
+    "its trial takes the gains away": "P63 P64",
     "it is the radio's noise": "P15",
     "answers do not tell what wheels are told": (
         "P22 P23 P24 P25 P26 P27 P28 P29 P30 P31 P32 P33 P34 P35 P36 P37 P38 P39 P40 P62"

@@ -14,7 +14,7 @@ cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
 cdef int _INTERRUPT, _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE, _COMMAND_ERROR
 cdef int _VELOCITY_MODE, _FORWARD, _TURN_OFF, _STOP_ABRUPTLY, _STOP_SMOOTHLY, _STOPS, _COMPLETED, _OUT_OF_RANGE
 cdef int _TAKEN, _FROM_OFF, _STOPS_AT_ONCE, _ARMED, _ON_THE_PLACE
-cdef int COMMAND, START_LOST, _COMMAND_CAME, _WORD_CAME, _ANSWERED
+cdef int COMMAND, START_LOST, WHEEL_LOST, _COMMAND_CAME, _WORD_CAME, _ANSWERED
 cdef int _RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12
 cdef int _RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS
 cdef int _LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR
@@ -58,7 +58,7 @@ cdef class Lm629:
     cdef _relative_base(self)
     cdef _commanded_target(self)
     cdef inline int _step_profile(self) noexcept
-    cdef inline int _check_error(self, long long error) noexcept
+    cdef inline int _check_error(self, long long error, long long now) noexcept
     cdef inline void _put_out(self, int drive) noexcept
     cdef inline int _check_breakpoint(self) noexcept
     cpdef int set_breakpoint(self, long long place) except -1

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from miro_exact.clock import LM629_CLOCK_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
-from miro_robot.event_log import COMMAND, START_LOST, EventLog
+from miro_robot.event_log import COMMAND, START_LOST, WHEEL_LOST, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer, fit_15, signed_31
 from miro_robot.lm629.commands import BY_OPCODE, COMMANDS
@@ -292,7 +292,7 @@ class Lm629:
         if not self.signals.word & _MOTOR_OFF:
             flags |= self._step_profile()
             error = signed_31((self.trajectory.position >> 16) - self.real_position)
-            flags |= self._check_error(error)
+            flags |= self._check_error(error, now)
             if not self.signals.word & _MOTOR_OFF:
                 drive = self.pid.step(error)
         if self.signals.word & _MOTOR_OFF:
@@ -393,7 +393,7 @@ class Lm629:
                 flags |= _WRAP_AROUND
         return flags
 
-    def _check_error(self, error: int) -> int:
+    def _check_error(self, error: int, now: int) -> int:
         """Excessive position error; with LPES it turns the motor off."""
         if not self.error_full:
             error = max(-32768, min(error, 32767))
@@ -405,6 +405,8 @@ class Lm629:
         if self.signals.word & _STOP_ON_ERROR:
             self.signals.word |= _MOTOR_OFF
             flags |= _TRAJECTORY_COMPLETE
+            if self.log is not None:
+                self.log.note(WHEEL_LOST, now, self.side, 0)
         return flags
 
     def _put_out(self, drive: int) -> None:

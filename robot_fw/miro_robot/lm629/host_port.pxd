@@ -1,5 +1,6 @@
 cimport cython
 
+cdef int _STUCK, _DEAD
 cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE, _OPEN, _SOFTWARE_RESET
 cdef int _IGNORED, _ACCEPTED, _REFUSED, _RECORD
 
@@ -14,6 +15,7 @@ cdef class HostPort:
     cdef public long long answer
     cdef unsigned char record[16]
     cdef readonly int recorded
+    cdef public int broken
 
     cpdef reset(self, int lock)
     cpdef bint is_busy(self, long long tick) noexcept
@@ -26,5 +28,6 @@ cdef class HostPort:
     cdef void _record(self, int byte) noexcept
     cpdef bytes data_bytes(self)
     cdef void _word_is_over(self, long long tick) noexcept
+    cdef inline void _be_busy(self, long long tick) noexcept
     cpdef void expect(self, int words) noexcept
     cpdef void reply(self, int words, long long value) noexcept

@@ -8,6 +8,7 @@ wins.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK, Queue
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
@@ -16,10 +17,15 @@ NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
 command byte; a data word from the host (`word`); the host has read the last word of an answer; the host
 read or wrote when that was not due (command error)."""
 
+WHOLE, STUCK, DEAD = 0, 1, 2
+"""`broken`, a fault: the port works; stays busy from the next command on, reset after reset; or takes nothing and
+answers FFh."""
+
 OPEN, HARDWARE_RESET, SOFTWARE_RESET = 0, 1, 2
 """`lock`: whether the port works, or answers 00h / 01h to everything until a reset is over."""
 
 _OPEN, _SOFTWARE_RESET = 0, 2
+_STUCK, _DEAD = 1, 2
 _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE = 0, 1, 2, 3, 4
 _RECORD = 16  # data bytes of the longest command, LTRJ with three parameters, and two more
 _BYTE = ("i", 0, 0xFF)
@@ -54,7 +60,9 @@ class HostPort:
         "word": ("i", 0, 0xFFFF),
         "answer": ("q", 0, 0xFFFFFFFF),
         "record": Queue("B", _RECORD, "recorded"),
+        "broken": ("i", 0, 2),
     }
+    NOT_HASHED = ("broken",)  # what it does to the rest is hashed
     NOT_STATE = ("busy_ticks", "judged_at_end", "reset_status", "keeps_phase", "undue_flags", "status_flags")
 
     def __init__(self, busy_ticks: int, options: Lm629Options = DEFAULT_OPTIONS) -> None:
@@ -72,6 +80,7 @@ class HostPort:
         self.drive = 0
         self.writes_while_busy = 0
         self.buffer = 0
+        self.broken = WHOLE
         self.reset(OPEN)
 
     def reset(self, lock: int) -> None:
@@ -90,10 +99,12 @@ class HostPort:
         self.recorded = 0
 
     def is_busy(self, tick: int) -> bool:
-        return self.lock != _OPEN or tick < self.busy_until
+        return self.lock != _OPEN or tick < self.busy_until or self.broken == _DEAD
 
     def status(self, tick: int, flags: int) -> int:
         """The status byte, given the flags of bits 7..1."""
+        if self.broken == _DEAD:
+            return 0xFF
         if self.lock != _OPEN:
             return self.reset_status if self.lock == _SOFTWARE_RESET else 0
         return flags | 1 if tick < self.busy_until else flags
@@ -130,6 +141,8 @@ class HostPort:
             self.drive = self.status(tick, flags)
             if self.status_flags and self.words_left > 0 and self.incoming and not self.is_busy(tick):
                 self.fate = _REFUSED
+        elif self.broken == _DEAD:
+            self.drive = 0xFF
         elif self.is_busy(tick):
             self.drive = self.buffer
         elif self.words_left > 0 and not self.incoming:
@@ -154,7 +167,7 @@ class HostPort:
             self.recorded = 0
             if self.low_next:
                 self._record(self.word >> 8)
-            self.busy_until = tick + self.busy_ticks
+            self._be_busy(tick)
             return _COMMAND
         if self.words_left == 0 or not self.incoming:
             return _MISUSE if self.undue_flags or self.words_left > 0 else _NOTHING
@@ -194,7 +207,10 @@ class HostPort:
     def _word_is_over(self, tick: int) -> None:
         self.low_next = 0
         self.words_left -= 1
-        self.busy_until = tick + self.busy_ticks
+        self._be_busy(tick)
+
+    def _be_busy(self, tick: int) -> None:
+        self.busy_until = tick + self.busy_ticks if self.broken != _STUCK else NEVER_TICK
 
     def expect(self, words: int) -> None:
         """The command in progress wants `words` more words from the host."""

@@ -38,6 +38,7 @@ cdef class Quadrature:
     cdef readonly long long counts_per_turn
     cdef readonly double position
     cdef readonly long long count
+    cdef readonly int held_a, held_b
 
     cdef public Lm629 chip
     cdef double positions[17]
@@ -53,6 +54,7 @@ cdef class Quadrature:
     cdef void _tell_each(self, Lm629 chip, double *radians, long long *ticks, int steps) noexcept
     @cython.locals(forward=cython.bint, after=cython.longlong)
     cdef long long _edge_tick(self, double *radians, long long *ticks, int step, long long count) noexcept
+    cpdef void hold(self, int a, int b) noexcept
     cdef void _show(self, long long tick, Lm629 chip) noexcept
     cpdef inline int a(self) noexcept
     cpdef inline int b(self) noexcept

@@ -205,14 +205,22 @@ class Quadrature:
     Inside a step the shaft turns evenly; an edge falls on the first integer tick at which p has the new count.
     """
 
-    STATE = {"position": ("d", -_MOST_COUNTS, _MOST_COUNTS), "count": ("q", -_MOST_COUNTS, _MOST_COUNTS)}
+    STATE = {
+        "position": ("d", -_MOST_COUNTS, _MOST_COUNTS),
+        "count": ("q", -_MOST_COUNTS, _MOST_COUNTS),
+        "held_a": ("i", -1, 1),
+        "held_b": ("i", -1, 1),
+    }
     NOT_STATE = ("counts_per_radian", "counts_per_turn", "chip", "positions", "counts")
+    NOT_HASHED = ("held_a", "held_b")  # a fault: what it does to the LM629 is hashed
 
     def __init__(self, counts_per_radian: float, counts_per_turn: int = 0) -> None:
         self.counts_per_radian = counts_per_radian
         self.counts_per_turn = counts_per_turn  # 0: there is no index channel
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
+        self.held_a = -1
+        self.held_b = -1
         self.chip: Lm629 | None = None
         # At the start of the last turn and at the ends of its steps.
         self.positions = [0.0] * 17
@@ -257,7 +265,7 @@ class Quadrature:
 
     def _tell_run(self, chip: Lm629, radians: list[float], ticks: list[int], steps: int, edges: int) -> int:
         """Tells of edges one way all at once. Returns whether the decoder takes it."""
-        if chip.encoder_edges is not None or self.counts_per_turn:
+        if chip.encoder_edges is not None or self.counts_per_turn or self.held_a >= 0 or self.held_b >= 0:
             return 0
         first = 0
         while self.counts[first + 1] == self.counts[0]:
@@ -303,6 +311,11 @@ class Quadrature:
         self.chip = chip
         self._show(tick, chip)
 
+    def hold(self, a: int, b: int) -> None:
+        """Fault: from the shaft's next edge on the wire of A or B shows this level; -1: it is whole."""
+        self.held_a = a
+        self.held_b = b
+
     def _show(self, tick: int, chip: Lm629) -> None:
         """Shows the LM629 the levels of A and B, and of the index channel if there is one: it changes with them."""
         chip.set_encoder(tick, self.a(), self.b())
@@ -311,11 +324,11 @@ class Quadrature:
 
     def a(self) -> int:
         """Level of channel A."""
-        return ((self.count + 1) >> 1) & 1
+        return ((self.count + 1) >> 1) & 1 if self.held_a < 0 else self.held_a
 
     def b(self) -> int:
         """Level of channel B."""
-        return (self.count >> 1) & 1
+        return (self.count >> 1) & 1 if self.held_b < 0 else self.held_b
 
     def index(self) -> int:
         """Level of the index channel: low for one count a turn; high for good without one."""

@@ -13,6 +13,7 @@ fault       the firmware did what it must not                             value 
 reached     the instruction at an address is next                         address
 edge        a pin changes                                                 pin, value (the new level)
 true        a predicate is true                                           -
+wheel_lost  a position error makes an LM629 switch its motor off          side
 reset       the level at a robot's reset pin is set                       value, slot
 power       a robot's supply is switched                                  value (1: on), slot
 radio       a network's radio works, is off, or gives noise               value (of `radio.link_state`)
@@ -76,7 +77,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.value:02X}h{'' if self.good_stop else ' with a bad stop bit'}"
         if self.what == "command":
             return f" {self.side} {self.command} {self.data.hex(' ')}".rstrip()
-        if self.what == "start_lost":
+        if self.what in ("start_lost", "wheel_lost"):
             return f" {self.side}"
         if self.what == "edge":
             return f" {self.pin} to {self.value}"
@@ -203,6 +204,7 @@ _KINDS = {
     event_log.REACHED: "reached",
     event_log.TRUE: "true",
     event_log.START_LOST: "start_lost",
+    event_log.WHEEL_LOST: "wheel_lost",
 }
 
 
@@ -232,7 +234,7 @@ def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: in
     if what == "command":
         side, opcode = SIDES[code >> 8], code & 0xFF
         return Event(tick=tick, what=what, network=network, slot=slot, side=side, opcode=opcode, data=data)
-    if what == "start_lost":
+    if what in ("start_lost", "wheel_lost"):
         return Event(tick=tick, what=what, network=network, slot=slot, side=SIDES[code])
     if what in ("fault", "reached"):
         return Event(tick=tick, what=what, network=network, slot=slot, value=code, address=value)

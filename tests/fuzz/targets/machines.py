@@ -6,7 +6,7 @@ from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.board import Board
 from miro_robot.image import load_hex
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.wiring import WiringError, load_wiring
 from tests.fuzz.target import Draws, Target, always, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
@@ -84,7 +84,7 @@ def _board():
             wiring = load_wiring(path)
         except WiringError as error:
             return refused(error)
-        board = Board(wiring, Plant(), 1, 5)
+        board = Board(wiring, IdealWheels(), 1, 5)
         board.load(image)
         board.cpu.rxd.settled_tick = 1 << 40
         board.run(12 * 3000)

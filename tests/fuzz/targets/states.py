@@ -16,7 +16,7 @@ from miro_robot.bare.pins import PinEvent
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
 from miro_sim.world.saved import opened, sealed
 from tests.fuzz.target import Draws, Target, folder, refused
@@ -140,7 +140,7 @@ def _board():
     image = load_hex(image_path())
 
     def make():
-        board = Board(load_wiring(), Plant(), 1, 3)
+        board = Board(load_wiring(), IdealWheels(), 1, 3)
         board.load(image)
         board.cpu.rxd.settled_tick = 1 << 40
         return _Flat(board)

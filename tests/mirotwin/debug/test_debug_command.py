@@ -38,12 +38,12 @@ def console(mirotwin):
 
 
 def test_a_scenario_is_stepped_through_forwards_and_backwards(console):
-    moves = ("break failsafe.c:146 if age >= 20", "continue", "where", "next", "rn", "who age")
+    moves = ("break failsafe.c:147 if age >= 20", "continue", "where", "next", "rn", "who age")
     lines = console("fig6", lines=moves).splitlines()
-    assert "breakpoint 1: failsafe.c:146 in failsafe_tick   if (age == FAILSAFE_STOP_MS) {" in lines[4]
-    assert lines[6:8] == ["*#0  failsafe.c:146 in failsafe_tick", " #1  main.c:49 in main"]
+    assert "breakpoint 1: failsafe.c:147 in failsafe_tick   if (age == FAILSAFE_STOP_MS) {" in lines[4]
+    assert lines[6:8] == ["*#0  failsafe.c:147 in failsafe_tick", " #1  main.c:50 in main"]
     assert lines[11].partition("  ")[0] == lines[4].partition("  ")[0]
-    assert lines[14] == " #0  failsafe.c:145 in failsafe_tick"
+    assert lines[14] == " #0  failsafe.c:146 in failsafe_tick"
 
 
 def test_a_list_is_around_the_line_asked_for_and_marks_the_one_it_stands_at(console):
@@ -191,8 +191,8 @@ def test_goto_goes_back_from_the_end_of_the_run(console):
 
 
 def test_a_line_without_code_moves_to_the_next_and_says_so(console):
-    out = console("fig6", lines=["break failsafe.c:100"])
-    assert "(failsafe.c:100 has no code: the next line that has some)" in out
+    out = console("fig6", lines=["break failsafe.c:101"])
+    assert "(failsafe.c:101 has no code: the next line that has some)" in out
 
 
 def test_debug_files_of_another_image_are_refused(mirotwin, bare, tmp_path):

@@ -33,7 +33,7 @@ def test_the_robots_own_firmware_is_listed_with_symbols_and_c_lines(mirotwin):
     code, out, _ = mirotwin("fw", "disasm")
     assert code == 0
     assert "\n_decode_character:\n" in out
-    assert "; main.c:57: PCON = sleep;\n" in out
+    assert "; main.c:60: PCON = sleep;\n" in out
     assert "  MOV PCON,_sleep\n" in out
 
 

@@ -7,7 +7,7 @@ from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
 
 MS = 24_000
@@ -55,7 +55,7 @@ class Rig:
 
     def __init__(self, slot=0, n=3, wiring=None, options=None, plant=None, boot=True):
         self.n = n
-        self.board = Probe(wiring or load_wiring(), plant or Plant(), slot, n, options)
+        self.board = Probe(wiring or load_wiring(), plant or IdealWheels(), slot, n, options)
         self.cpu = self.board.cpu
         self.board.load(IMAGE)
         self.now = 0

@@ -38,7 +38,13 @@ def told(rig):
 def test_the_set_up_on_the_page_is_the_firmwares():
     rig = Rig(boot=False)
     rig.run_ms(4)
-    parts = ("after power-on", "no interrupts", "gains", "acceleration at the start")
+    parts = (
+        "after power-on",
+        "no interrupts",
+        "largest position error",
+        "gains",
+        "acceleration at the start",
+    )
     wanted = [code for part in parts for code in said(part)]
     assert told(rig) == [wanted, wanted]
 

@@ -97,9 +97,10 @@ def test_chips_that_stop_answering_are_reset_and_set_up_again():
     rig.team(2, 5000, 5000)
     rig.board.deaf = True
     rig.team(3, 5000, 5000)
+    rig.run_ms(5)  # the one try that a frame gives them
     assert rig.cpu.sfr(0xA0) & RESET_PINS == 0  # held in reset: both motors are off
     rig.team(4, 5000, 5000)
-    rig.run_ms(5)  # the one try that a frame gives them
+    rig.run_ms(5)
     assert rig.cpu.sfr(0xA0) & RESET_PINS == 0
     rig.board.deaf = False
     rig.told(rig.board.left)

@@ -10,7 +10,7 @@ from miro_robot.harness.fast_oracle import FastOracle
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness, LiveOracle
 from miro_robot.harness.program import BYTES, FRAMES, SESSION, Program
 from miro_robot.image import load_hex
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels
 from miro_robot.probe import Probe
 from miro_robot.wiring import load_wiring
 from tests.robot.mcs51.asm import image_of
@@ -23,7 +23,7 @@ MS = 24_000
 
 
 def board_with(image, ticks=40 * MS):
-    board = Board(load_wiring(), Plant())
+    board = Board(load_wiring(), IdealWheels())
     board.load(image)
     board.cpu.rxd.settled_tick = 2 * ticks
     board.run(ticks)

@@ -15,6 +15,7 @@ from mirotwin.verify.conform.rules import (
     driving,
     failsafe,
     fresh,
+    lost,
     reception,
     service,
     sound,
@@ -22,7 +23,7 @@ from mirotwin.verify.conform.rules import (
 
 CHAPTERS: tuple[Chapter, ...] = (
     boot.CHAPTER, reception.CHAPTER, fresh.CHAPTER, driving.CHAPTER, failsafe.CHAPTER, service.CHAPTER,
-    answers.CHAPTER, sound.CHAPTER, chips.CHAPTER, boot.STRAPS, sound.LONG,
+    answers.CHAPTER, sound.CHAPTER, chips.CHAPTER, boot.STRAPS, sound.LONG, lost.CHAPTER,
 )  # fmt: skip
 ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
 LONG: tuple[Rule, ...] = tuple(sound.LONG.rules)

@@ -26,6 +26,8 @@ def slow(script: TrialScript) -> None:
     for _ in range(3):
         script.obeyed(script.team())
         script.answered(script.ask(gap_ms=36.0), "no flag 20h, and status of LM629s that are free", _free)
+    for count in range(24):  # a frame at any time between two looks at the chips
+        script.obeyed(script.team(gap_ms=1.0 + 0.17 * count))
     nothing_refused(script)
 
 

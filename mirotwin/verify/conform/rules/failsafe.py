@@ -29,7 +29,7 @@ def stop(script: TrialScript) -> None:
     """110 ms after the last fresh frame both wheels MUST be told to stop. A robot may count from the start or from the
     end of that frame's last character (1.04 ms apart), and may be 0.5 ms off.
     """
-    for make in (script.team, script.team, script.ask_nobody):
+    for make in (script.team, script.team, script.ask_nobody, script.ask):
         script.obeyed(script.team())
         script.wait(3.3)
         stops_behind(script, make())

@@ -26,7 +26,7 @@ _PLANTED = {
         "P17 P18 P20 P21 P30", ("begin with P17", "0 steps on, seq 21 not acted on")),
     "takes the velocities of the robot before it": (
         "P22 P23", (_PLAIN, "these are the velocities of robot 0")),
-    "stops 15 ms late": ("P29", ("begin with P29", "found left at 124.94 ms, right at 124.94 ms")),
+    "stops 15 ms late": ("P29", ("begin with P29", "found left at 124.92 ms, right at 124.92 ms")),
     "stops 1 ms late": ("P29", ()),
     "stops 2 ms early": ("P29", ()),
     "changes the acceleration in motion": (
@@ -53,8 +53,8 @@ _PLANTED = {
 """Of mistakes that others look for too: `fails` and `says` by name."""
 MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED.items()} | {
     "a stop is sent while the motors are off": Mistake(
-        "motion.c", "    if (state != STATE_DRIVING)\n        return;\n    halt_both(TRJ_SMOOTH_STOP);",
-        "    halt_both(TRJ_SMOOTH_STOP);", "P01"),
+        "motion.c", "    if (state != STATE_DRIVING)\n        return;\n    watch_stopping();",
+        "    watch_stopping();", "P01"),
     "one chip is reset once more, by command": Mistake(
         "lm629.c", "        if (handshake())\n            return true;",
         "        if (handshake()) {\n            selected = LEFT; lm629_command(0x00);\n"
@@ -64,8 +64,8 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         "    lm629_command(RSTI);\n    lm629_word(0, 0);\n    if (!free_to_go())\n        return false;\n",
         "    return true;\n", "P02"),
     "takes long to boot": Mistake(
-        "main.c", "    decode_start();",
-        "    decode_start();\n    { unsigned int i; for (i = 0; i != 30000; ++i) { P1_7 = 1; } }",
+        "main.c", "    decode_strap();",
+        "    decode_strap();\n    { unsigned int i; for (i = 0; i != 30000; ++i) { P1_7 = 1; } }",
         "P03 P55 P56"),
     "wants FFh before the sync": Mistake(
         "decode.c", "    from = rx_taken - frame_size;",
@@ -153,7 +153,7 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         "motion.c", "acceleration_waits && !last_left && !last_right", "acceleration_waits && !last_left",
         "P37"),
     "loads an acceleration when one wheel stands": Mistake(
-        "motion.c", "!(on_target(LEFT) && on_target(RIGHT))", "!on_target(LEFT)", "P37"),
+        "watch.c", "on_target(LEFT) && on_target(RIGHT)", "on_target(LEFT)", "P37"),
     "forgets an acceleration that waits": Mistake(
         "motion.c", "        acceleration_waits = 1;", "        acceleration_waits = state != STATE_DRIVING;",
         "P37"),
@@ -214,6 +214,18 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         "lm629.c", "        if (!--polls) {\n", "        if (0) {\n            --polls;\n", "P59"),
     "moves in a slot that is not there": Mistake(
         "motion.c", "    if (slot >= robots)\n        return;\n", "", "P60"),
+    "does not watch the position error": Mistake(
+        "watch.c",
+        "    lm629_command(LPES);\n    lm629_word(POSITION_ERROR_MAX >> 8, POSITION_ERROR_MAX & 0xFF);\n", "", "P63"),
+    "leaves the other wheel on": Mistake("motion.c", "    motion_off();\n    lost =", "    lost =", "P63"),
+    "drives on after a lost wheel": Mistake(
+        "motion.c", "    if (last_left || last_right)\n        return false;\n", "", "P63"),
+    "never drives again after a lost wheel": Mistake(
+        "motion.c", "    if (last_left || last_right)\n", "    if (1)\n", "P64"),
+    "clears the error that it should tell of": Mistake(
+        "motion.c", "    motion_off();\n    lost =",
+        "    motion_off();\n    lm629_select(BOTH);\n    lm629_command(RSTI);\n    lm629_word(0, 0);\n    lost =",
+        "P64"),
     "hangs after 1000 frames": Mistake(
         "failsafe.c", "    ++frames_accepted;",
         "    if (++frames_accepted == 1000)\n        for (;;)\n            ;", "P61"),

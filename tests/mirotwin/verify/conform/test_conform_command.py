@@ -38,7 +38,7 @@ def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_pa
     assert (code, err) == (1, "")
     line = next(line for line in out.splitlines() if line.startswith("P29"))
     said = line.split(maxsplit=3)[3]
-    assert "found left at 124.94 ms, right at" in said
+    assert "found left at 124.92 ms, right at" in said
     assert "wanted both wheels told to stop 108.46 ms to 110.50 ms after the end of" in said
     assert out.splitlines()[-3:] == [
         f"mirotwin replay {folder / 'P29.stream'} --firmware {folder / 'firmware.ihx'}",

@@ -1,0 +1,59 @@
+"""Rules about wheels that do not follow: a broken wire of an encoder, or something that holds the wheel.
+
+A trial has neither. It sets the filter gains to 0, so that a wheel stands while its LM629 wants it elsewhere.
+"""
+
+from __future__ import annotations
+
+from miro_protocol.frames import TelemetryFrame
+from mirotwin.verify.conform.observed import Answer, Observed
+from mirotwin.verify.conform.rule import FRESHNESS, Chapter
+from mirotwin.verify.conform.rules.boot import keeps_off
+from mirotwin.verify.conform.trial_script import Frame, TrialScript, ms
+
+CHAPTER = Chapter("Wheels that do not follow")
+_POSITION_ERROR = 0x20
+_SPEED = 2000  # 1024 counts away 60 ms after it is told
+_OFF_MS = 80.0
+_GAINS = (400, 40, 3000, 2000)
+
+
+@CHAPTER.rule("P63", FRESHNESS, presupposes="P35", broken="a wheel that does not follow is not switched off")
+def lost(script: TrialScript) -> None:
+    """When a wheel is 1024 counts away from where it should be, both motors MUST be off within 20 ms and stay off,
+    whatever velocities come, until a fresh frame tells both wheels to stand.
+    """
+    for left, right in ((_SPEED, 0), (0, _SPEED), (_SPEED, _SPEED)):
+        first = _told_in_vain(script, left, right)
+        script.filter(_GAINS, "filter frame with gains")
+        for _ in range(3):
+            script.team()
+        keeps_off(script, first.acted_tick + ms(_OFF_MS), script.now)
+        script.team(((0, 0),) * script.n, gap_ms=40.0)
+
+
+@CHAPTER.rule("P64", FRESHNESS, presupposes="P41 P63")
+def lost_is_told(script: TrialScript) -> None:
+    """While a wheel is lost, the status of its LM629 in answers MUST show it (20h). After both wheels were told to
+    stand, velocities MUST be obeyed again.
+    """
+    _told_in_vain(script, _SPEED, 0)
+    script.filter(_GAINS, "filter frame with gains")
+    script.answered(script.ask(gap_ms=36.0), "status 20h of the left LM629", _shows_error)
+    script.team(((0, 0),) * script.n, gap_ms=40.0)
+    script.obeyed(script.team())
+
+
+def _told_in_vain(script: TrialScript, left: int, right: int) -> Frame:
+    """The first of some frames, questions too, that tell wheels without gains to turn."""
+    script.filter((0, 0, 0, 0), "filter frame without gains")
+    words = script.same(left, right)
+    first = script.obeyed(script.team(words, what="team frame to wheels without gains"))
+    for _ in range(3):
+        script.team(words)
+        script.ask(words=words)
+    return first
+
+
+def _shows_error(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+    return "" if said.status_left & _POSITION_ERROR else f"{said.status_left:02X}h"
