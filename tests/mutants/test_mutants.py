@@ -245,7 +245,7 @@ def test_a_text_is_built_once(tmp_path):
 @needs_sdcc
 def test_what_does_not_compile_says_why_and_leaves_no_image(tmp_path):
     built = build(changed("main.c", "    EA = 1;", "    EB = 1;"), tmp_path)
-    assert built.error == "main.c:45: error 20: Undefined identifier 'EB'"
+    assert built.error == "main.c:46: error 20: Undefined identifier 'EB'"
     assert not built.image.exists()
     assert not built.is_shipped
     assert not list(tmp_path.glob("making-*"))
@@ -357,14 +357,14 @@ def test_rules_that_are_tried_again_replace_their_old_verdict_alone():
 def test_mutants_of_the_draw_meet_their_fate():
     wanted = {
         "decode.h:17:31:arithmetic:/": "does not compile",
-        "lm629.c:51:18:constant:-1": "same bytes",
-        "motion.c:86:47:shift:>>": "killed",
+        "lm629.c:49:16:constant:2": "same bytes",
+        "motion.c:89:47:shift:>>": "killed",
         "uart.h:14:25:constant:-1": "alive",
     }
     jobs = [job for job in jobs_of(COUNT, SEED, tried=("P24",)) if job.id in wanted]
     found = list(fates(jobs, 1))
     assert {one.id: one.what for one in found} == wanted
-    assert {one.id: one.rules for one in found if one.rules} == {"motion.c:86:47:shift:>>": ("P24",)}
+    assert {one.id: one.rules for one in found if one.rules} == {"motion.c:89:47:shift:>>": ("P24",)}
     assert [one.error for one in found if one.error] == [
-        "motion.c:86: error 106: invalid operand for 'divide' operation"
+        "motion.c:89: error 106: invalid operand for 'divide' operation"
     ]
