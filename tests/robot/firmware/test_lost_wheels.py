@@ -6,7 +6,7 @@ import pytest
 
 from miro_protocol.table import POSITION_ERROR_MAX
 from miro_robot.lm629.host_port import DEAD, STUCK, WHOLE
-from miro_robot.plant import Plant
+from miro_robot.plant import IdealWheels, Plant
 from tests.robot.firmware.rig import MS, SAMPLE, Rig, iram
 
 LPES, LTRJ, RSTI = 0x1A, 0x1F, 0x1D
@@ -46,6 +46,28 @@ def test_a_wheel_that_follows_is_never_lost():
         rig.team(seq, 16633 if seq % 8 < 4 else -16633, SPEED)
     assert not both_off(rig)
     assert rig.u8("_failsafe_flags") == 0x10  # from power-on
+
+
+class HeldWheels(IdealWheels):
+    """Something holds both wheels while `held`."""
+
+    held = False
+
+    def advance(self, tick):
+        if not self.held:
+            super().advance(tick)
+
+
+@pytest.mark.parametrize(("held_ms", "lost"), [(19, False), (21, True)])
+def test_a_wheel_at_a_fifth_of_a_metre_a_second_may_be_held_for_19_ms(held_ms, lost):
+    rig = Rig(plant=HeldWheels())
+    for seq in range(3):
+        rig.team(seq, SPEED, SPEED)
+    rig.board.plant.held = True
+    rig.run_ms(held_ms)
+    rig.board.plant.held = False
+    rig.team(3, SPEED, SPEED)
+    assert both_off(rig) == lost
 
 
 def test_it_stays_off_until_both_wheels_are_told_to_stand():
