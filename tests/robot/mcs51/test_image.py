@@ -233,7 +233,7 @@ def test_the_map_of_the_robot_beside_a_small_program_is_refused(tmp_path):
     assert error.path.name == "blink.map"
     assert "C:   00000026  __sdcc_program_startup" in MAP.splitlines()[error.place - 1]
     assert error.what == (
-        "the image has no bytes for 37 of 37 code symbols, the first is __sdcc_program_startup (0x0026)"
+        "the image has no bytes for 44 of 44 code symbols, the first is __sdcc_program_startup (0x0026)"
     )
 
 
