@@ -43,7 +43,7 @@ _PLANTED = {
     "begins the CRC without the layout byte": (
         "", (_PLAIN, "it obeys frames with another CRC (no layout byte)")),
     "does not whiten its answers": ("", ("begin with P42", "its HDR 96h is not whitened")),
-    "never stops": ("", ("begin with P29", "found left not within 5")),
+    "never stops": ("", ("begin with P29", "found left not within 7")),
     "stops by opening the loops": (
         "", ("begin with P31", "wanted a smooth stop, found the left wheel told off")),
     "never answers": ("", ("begin with P42", "wanted an answer to some of 9 questions in a row, found none")),
@@ -267,11 +267,11 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         says=(_PLAIN, "its serial port takes 7 of 23 characters")),
     "stops after 100 ms": Mistake(
         "failsafe.c", "age == FAILSAFE_STOP_MS)", "age == 100)",
-        says=("begin with P29", "found the left one 99.94 ms after it")),
+        says=("begin with P29", "found the left one 99.92 ms after it")),
     "answers that come late": Mistake(
         "telemetry.c", "    begin();\n    put(TYPE",
         "    { u16 i; for (i = 0; i != 6000; ++i) { P1_7 = 1; } }\n    begin();\n    put(TYPE",
-        says=("begin with P41", "found one that is over 40.93 ms after the question's end")),
+        says=("begin with P41", "found one that is over 40.98 ms after the question's end")),
     "positions of the other wheel": Mistake(
         "telemetry.c", "    put_word(position(LEFT));\n    put_word(position(RIGHT));",
         "    put_word(position(RIGHT));\n    put_word(position(LEFT));",

@@ -149,7 +149,7 @@ def test_a_timeline_shows_where_the_rule_failed_with_the_words_of_the_table(miro
     code, out, _ = mirotwin("conform", image, "--explain", "p29")
     assert code == 1
     failed = [line for line in out.splitlines() if " FAILED " in line]
-    assert "net0/robot1 (N = 3): 6 expectations, 3 failed" in out
+    assert "net0/robot1 (N = 3): 8 expectations, 4 failed" in out
     first = failed[0].split(" FAILED ")[1].strip()
     _, table, _ = mirotwin("conform", image, "--rule", "P29")
     assert first in re.sub(r"\s+", " ", table)
