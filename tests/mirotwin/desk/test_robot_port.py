@@ -269,6 +269,7 @@ def test_a_signal_stops_the_robot_and_leaves_what_was_recorded(tmp_path, number,
         process = children.start(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
         for line in process.stderr:
             if "all times are" in line:
+                known.set()
                 break
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(timeout=1.0)
@@ -408,36 +409,39 @@ def test_each_transmission_is_recorded_in_its_control_period(ticks, stops):
 @pytest.mark.slow
 def test_ctrl_c_ends_a_talk_with_a_peer_that_floods_answers(tmp_path, pty):
     (tmp_path / "drive.stream").write_text(stream_text(2000))
-    over = threading.Event()
+    over, known = threading.Event(), threading.Event()
 
     def flood():
-        answers, seq = b"", 0
+        """Answers each question, and once the robots are known without a pause."""
         os.set_blocking(pty.master, False)
-        decoder = Decoder(3)
+        decoder, seq = Decoder(3), 0
         while not over.is_set():
+            asked = []
             with suppress(OSError):
-                for event in decoder.feed(os.read(pty.master, 4096)):
-                    if isinstance(event, Received):
-                        seq = event.seq
-            answers = b"".join(
-                encode(TelemetryFrame((seq + k) % 64, (seq + k) % 64 % 3), 3) for k in range(3)
-            )
+                events = decoder.feed(os.read(pty.master, 4096))
+                asked = [event.seq for event in events if isinstance(event, Received)]
+            seq = asked[-1] if asked else seq
+            answers = [seq + k for k in range(3)] * 20 if known.is_set() else asked
             with suppress(OSError):
-                os.write(pty.master, answers * 20)
+                os.write(pty.master, b"".join(encode(TelemetryFrame(n % 64, n % 64 % 3), 3) for n in answers))
 
     thread = threading.Thread(target=flood, daemon=True)
     thread.start()
     command = [*COMMAND, "replay", "drive.stream", "--port", pty.path, "--allow-motion", "-q"]
     process = children.start(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    for line in process.stderr:
-        if "all times are" in line:
-            break
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(timeout=5.0)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
-    over.set()
-    thread.join()
+    try:
+        for line in process.stderr:
+            if "all times are" in line:
+                known.set()
+                break
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=5.0)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    finally:
+        over.set()  # the number of a closed terminal soon is that of another file
+        thread.join()
+        process.kill()
     assert process.returncode == 130, err
     assert "characters are left out, which came faster" in err
     assert (tmp_path / "runs/drive-port/run.part.mcap").exists()
