@@ -134,7 +134,7 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
 
 def _obeyed(observed: Observed, said: Sequence[tuple[str, Frame]]) -> str:
     for what, frame in said[1:]:
-        if frame.words and all(
+        if observed.slot < len(frame.words) and all(
             map(obeys, observed.both_told(frame.acted_tick), frame.for_robot(observed.slot))
         ):
             return f"it obeys {what}"
