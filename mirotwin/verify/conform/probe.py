@@ -149,4 +149,6 @@ def _chips(listener: Listener) -> str:
         return "it tells its LM629s nothing at all"
     if opcodes.isdisjoint(BY_OPCODE):
         return "it gives its LM629s unknown commands alone: data gone before /WR rises, or wrong pins"
+    if not any(listener.observed.filters.values()):
+        return "no filter was loaded into its LM629 (LFIL, UDF), so no wheel follows"
     return ""

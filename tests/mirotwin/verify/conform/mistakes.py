@@ -297,7 +297,7 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         says=("begin with P24: it obeys frames for 5 robots: its strap for N is read the other way",)),
     "a filter that is not loaded": Mistake(
         "motion.c", "    load_filter();\n    load_acceleration();", "    load_acceleration();",
-        says=("P33", "no filter was loaded into its LM629 (LFIL, UDF)")),
+        says=("begin with P24", "no filter was loaded into its LM629 (LFIL, UDF)")),
     "service frames that are not fresh": Mistake(
         "main.c", "if (decode_valid() && failsafe_fresh())",
         "if (decode_valid() && (HDR & TYPE_MASK) != TYPE_SERVICE && failsafe_fresh())",
