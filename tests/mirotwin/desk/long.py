@@ -22,7 +22,7 @@ from tests.mirotwin.ports.rig import sent_bytes, served
 from tests.mirotwin.ports.sessions import load
 
 FRAMES_A_MINUTE = 1798
-STOP_BYTES = 3 * 23
+STOP_BYTES = 10 * 23  # three frames with the numbers that follow, seven in steps of 8
 LATE_TICKS = 10 * 24_000
 QUICK = ("P05", "P07", "P17", "P41", "P50")
 
