@@ -12,15 +12,15 @@ from typing import Any
 import msgspec
 
 from miro_exact.domain import DomainError
+from miro_exact.plugins import PluginError
+from miro_exact.raised import at_place, defined_at, described, raised_at
 from miro_exact.state import Items
 from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, EstimatorInput
 from miro_host.estimators.predict import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import Accelerations, Answer, Law, LawInput, Velocities
 from miro_host.memory import NOTHING
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
-from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Reference, Trajectory
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels, wheel_command

@@ -6,7 +6,7 @@ in its table. They are plain classes, because msgspec reads a struct as itself a
 
 from typing import Any
 
-from miro_host.plugins import Registry
+from miro_exact.plugins import Registry
 
 
 class Parameters:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from miro_host.installed import described_once
+from miro_exact.installed import described_once
 
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
 NOT_OF_RUNS = (
@@ -22,7 +22,7 @@ NOT_OF_RUNS = (
 
 class Versions(msgspec.Struct, frozen=True):
     """`mirotwin`: the version; `code`: hash of its sources; `parts`: plug-ins of other distributions that runs use,
-    each with version and hash of its sources (`miro_host.installed.described`).
+    each with version and hash of its sources (`miro_exact.installed.described`).
     """
 
     mirotwin: str

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
-from miro_host.plugins import use_one_of
+from miro_exact.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import builtin_names, load

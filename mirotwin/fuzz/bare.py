@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_host.plugins import PluginError, Registry
-from miro_host.raised import at_place, defined_at, raised, raised_at
-from miro_host.raised import described as described_error
+from miro_exact.plugins import PluginError, Registry
+from miro_exact.raised import at_place, defined_at, raised, raised_at
+from miro_exact.raised import described as described_error
 from miro_protocol.actions import ScriptItem
 from miro_protocol.protocol import Damage, Frame, Protocol
 from miro_protocol.toml_text import TomlError, struct_of

@@ -12,7 +12,7 @@ import click
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
-from miro_host.plugins import PluginError
+from miro_exact.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_robot.mcs51.opcodes import SFRS

@@ -9,7 +9,7 @@ from selectors import BaseSelector
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput, shortened
-from miro_host.plugins import use_one_of
+from miro_exact.plugins import use_one_of
 from miro_sim.world.world import World
 from mirotwin.ports import endpoint
 from mirotwin.ports.endpoint import Endpoint, Tell

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.installed import described_once
+from miro_exact.installed import described_once
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.plugins import plugins_used
@@ -51,7 +51,7 @@ class RunSource(msgspec.Struct, frozen=True):
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
     were real and what is in it is their twin's, else empty. `plugins`: those of other distributions that the scenario
-    names, with version and hash of their sources (`miro_host.installed.described`).
+    names, with version and hash of their sources (`miro_exact.installed.described`).
     """
 
     scenario_name: str

@@ -13,7 +13,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
-from miro_host.installed import differences as plugin_differences
+from miro_exact.installed import differences as plugin_differences
 from miro_protocol import stream
 from miro_protocol.actions import Power, Reset, ScriptItem
 from miro_protocol.stream_header import Header

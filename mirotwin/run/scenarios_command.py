@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import click
 
 from miro_exact.bad_input import shortened
-from miro_host.plugins import PluginError
+from miro_exact.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as scenario_profiles
 from mirotwin.shell.command import Argument, Options, command_of

@@ -14,7 +14,7 @@ import click
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, amount, shortened
 from miro_exact.domain import MAX_SEED, DomainError
-from miro_host.plugins import PluginError
+from miro_exact.plugins import PluginError
 from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.command import Argument, Option, Word

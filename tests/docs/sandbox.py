@@ -9,7 +9,7 @@ from pathlib import Path
 from miro_robot.firmware import image_path, source_folder
 from mirotwin.testing import starter
 from tests import children
-from tests.host.distribution import install
+from tests.exact.distribution import install
 from tests.mutants import build
 from tests.mutants.planted import PLANTED
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.plugins import PluginError
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
 from miro_host.estimators.predict import NoEstimator, PredictParameters, moved
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from miro_host.wheels import Wheels

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.plugins import PluginError
 from miro_host.integrator import Integrator, Limits
 from miro_host.laws.epsilon_tracking import RETUNED
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
 from miro_host.telemetry_receiver import LastTelemetry

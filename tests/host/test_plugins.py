@@ -8,9 +8,9 @@ import sys
 import msgspec
 import pytest
 
+from miro_exact.plugins import PluginError
+from miro_exact.raised import raised, raised_at
 from miro_host.laws.yang_kim import Gains
-from miro_host.plugins import PluginError
-from miro_host.raised import raised, raised_at
 from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
 from miro_host.references.interface import CheckedReference
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES
@@ -18,7 +18,7 @@ from miro_sim.scenario.file import parse
 from mirotwin.fuzz.bare import PROTOCOLS
 from mirotwin.verify.checks.expect import CHECKS
 from tests import children
-from tests.host.distribution import install
+from tests.exact.distribution import install
 
 OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback", "epsilon_tracking"]
 GOOD = """

@@ -7,11 +7,11 @@ import msgspec
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.plugins import PluginError
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
-from miro_host.plugins import PluginError
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from tests.host.own_laws import LeakyParameters, WrongParameters

@@ -13,7 +13,7 @@ from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.build import reference_for
 from miro_sim.scenario.file import ScenarioError, parse
-from tests.host.distribution import install
+from tests.exact.distribution import install
 
 DRIVE = """
 name = "drive"

@@ -11,9 +11,9 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.dmath import atan2, sincos
-from miro_host.plugins import PluginError
+from miro_exact.plugins import PluginError
+from miro_exact.raised import at_place, defined_at, described, raised_at
 from miro_host.posture import Posture
-from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.registries import AnyReference
 
 DEGREE = 0.017453292519943295

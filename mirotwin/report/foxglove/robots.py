@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 
+from miro_exact.plugins import PluginError
 from miro_host.eye.patterns import (
     IDENTITIES,
     PATCH_MM,
@@ -17,7 +18,6 @@ from miro_host.eye.patterns import (
     TEAMS,
     PatternName,
 )
-from miro_host.plugins import PluginError
 from miro_host.references.interface import Paced, Trajectory
 from miro_sim.periods import RobotPeriod
 from miro_sim.scenario.build import reference_for

@@ -25,7 +25,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.installed import entries_of
+from miro_exact.installed import entries_of
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
 from miro_protocol.toml_text import TomlError, struct_of

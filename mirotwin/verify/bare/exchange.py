@@ -24,9 +24,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_host.installed import entries_of
-from miro_host.plugins import PluginError, installed_part
-from miro_host.raised import at_place, defined_at, raised
+from miro_exact.installed import entries_of
+from miro_exact.plugins import PluginError, installed_part
+from miro_exact.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image

@@ -17,8 +17,8 @@ from typing import Any, cast
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.plugins import PluginError, Registry
-from miro_host.raised import raised
+from miro_exact.plugins import PluginError, Registry
+from miro_exact.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario

@@ -26,8 +26,8 @@ import msgspec
 
 from miro_exact.bad_input import did_you_mean
 from miro_exact.clock import ticks
-from miro_host.plugins import PluginError
-from miro_host.raised import at_place, defined_at
+from miro_exact.plugins import PluginError
+from miro_exact.raised import at_place, defined_at
 from miro_protocol.table import TICKS_PER_MS
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod

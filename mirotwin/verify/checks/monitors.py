@@ -22,8 +22,8 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_host.plugins import PluginError
-from miro_host.raised import raised
+from miro_exact.plugins import PluginError
+from miro_exact.raised import raised
 from miro_protocol.events import Damaged, Received
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period, RobotId

@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TypeVar
 
 import msgspec
 
-from miro_host.plugins import use_one_of
+from miro_exact.plugins import use_one_of
 from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds

@@ -11,7 +11,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
-from miro_host.plugins import PluginError
+from miro_exact.plugins import PluginError
 from miro_robot.image import Image
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World

@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.plugins import PluginError
+from miro_exact.raised import at_place, defined_at, raised
 from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
 from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
 from miro_host.pilot import Pilot
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
-from miro_host.raised import at_place, defined_at, raised
 from miro_host.references.interface import CheckedReference, ReferenceParameters, Trajectory
 from miro_host.registries import REFERENCES
 from miro_host.wheels import Wheels

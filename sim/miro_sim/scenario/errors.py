@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_host.plugins import PluginError, use_one_of
+from miro_exact.plugins import PluginError, use_one_of
 from miro_protocol import toml_text
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.plugins import REGISTRIES, struct_of

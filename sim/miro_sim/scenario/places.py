@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.domain import DomainError
+from miro_exact.plugins import PluginError
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH
 from miro_host.eye.patterns import ROBOT_HEIGHT_M, TEAMS
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera

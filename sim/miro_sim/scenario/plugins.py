@@ -6,9 +6,9 @@ from typing import Any
 
 import msgspec
 
-from miro_host.installed import described
-from miro_host.plugins import PluginError, Registry
-from miro_host.raised import raised
+from miro_exact.installed import described
+from miro_exact.plugins import PluginError, Registry
+from miro_exact.raised import raised
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES, AnyEstimator, AnyReference, Controller
 
 REGISTRIES: dict[type, Registry[Any]] = {AnyReference: REFERENCES, AnyEstimator: ESTIMATORS, Controller: LAWS}

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from msgspec.structs import astuple
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
+from miro_exact.plugins import PluginError
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
-from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_robot.board import Board

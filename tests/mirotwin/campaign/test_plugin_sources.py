@@ -9,7 +9,7 @@ from mirotwin import campaign
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.versions import versions_here
 from mirotwin.campaign.workers import Processes
-from tests.host.distribution import install
+from tests.exact.distribution import install
 from tests.host.test_plugins import GOOD
 from tests.mirotwin.campaign.conftest import plan_of
 

@@ -6,7 +6,7 @@ import pytest
 
 from mirotwin.recording.reader import read
 from tests import children
-from tests.host.distribution import install
+from tests.exact.distribution import install
 from tests.host.test_plugins import GOOD
 from tests.mirotwin.program import COMMAND
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tests.host import distribution
+from tests.exact import distribution
 
 CHECKS = '''
 from mirotwin.verify.checks.interface import Check, Monitor

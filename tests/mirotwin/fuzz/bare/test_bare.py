@@ -22,7 +22,7 @@ from mirotwin.fuzz.bare import (
 )
 from mirotwin.verify.bare.exchange import NamedCheck
 from mirotwin.verify.bare.run import BarePlayback
-from tests.host import distribution
+from tests.exact import distribution
 from tests.mirotwin.verify.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])

@@ -14,7 +14,7 @@ from mirotwin.fuzz.oracle import BareProcessorOracle
 from mirotwin.verify.bare.case import case_text, rerun_bare_case
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.bare.run import BarePlayback
-from tests.host import distribution
+from tests.exact import distribution
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 from tests.states import restore, snapshot
 

@@ -15,9 +15,9 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
+from miro_exact import installed
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_host import installed
-from miro_host.raised import raised
+from miro_exact.raised import raised
 
 Plugin = TypeVar("Plugin")
 

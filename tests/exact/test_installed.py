@@ -6,8 +6,8 @@ from importlib.machinery import EXTENSION_SUFFIXES
 
 import pytest
 
-from miro_host.installed import described, differences
-from tests.host.distribution import install
+from miro_exact.installed import described, differences
+from tests.exact.distribution import install
 
 PARTS = {"steady": "plug_steady:Parameters"}
 
