@@ -31,7 +31,6 @@ FIRMWARE = {
     "coverage": Lazy("firmware.fw_profile", "Shows which lines of the firmware ran."),
     "vcd": Lazy("firmware.fw_trace", "Writes the wires as a VCD file."),
     "header": Lazy("firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
-    "vectors": Lazy("firmware.fw_image", "Writes single-step test vectors of the processor."),
 }
 
 

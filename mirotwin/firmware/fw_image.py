@@ -1,30 +1,24 @@
-"""`mirotwin fw disasm`: an image as a listing with symbols and C lines."""
+"""`mirotwin fw disasm`, an image as a listing with symbols and C lines; `mirotwin fw header`, the wire for C."""
 
 from __future__ import annotations
 
-from itertools import count
 from pathlib import Path
 from typing import Annotated
 
 import click
 
-from miro_exact.rng import Stream
 from miro_protocol.c_header import render
 from miro_robot.image import SPACE_BYTES
 from miro_robot.image.debug_info import DebugInfo
 from miro_robot.inspect.listing import text_lines
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_robot.mcs51.vector_draw import draw_vectors
-from miro_robot.mcs51.vectors import encode
 from mirotwin.firmware.code_place import SYMBOL, functions_at
-from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.held_signals import held_signals
-from mirotwin.shell.options import FORCE, NAME, OUT, SEED, Engine, Whole
-from mirotwin.shell.outputs import OutputFolder, check_new, whole_file
+from mirotwin.shell.options import FORCE, NAME, OUT
+from mirotwin.shell.outputs import check_new, whole_file
 from mirotwin.shell.program import show_line
-from mirotwin.shell.progress import ProgressBar
 
 
 class DisasmOptions(Options, frozen=True, kw_only=True):
@@ -75,39 +69,3 @@ def header(options: HeaderOptions) -> None:
     check_new(out, "--out", options.force)
     with whole_file(out, "--out") as staging:
         staging.write_bytes(render().encode())
-
-
-OPCODES = 256
-NAMES = tuple(f"{opcode:02x}.json" for opcode in range(OPCODES))
-"""The files written, all that `--force` replaces."""
-
-
-class VectorsOptions(Options, frozen=True, kw_only=True):
-    COMMAND = "fw vectors"
-    out: Annotated[Path, OUT.saying("Folder for the 256 files.")]
-    per_opcode: Annotated[int, Option(type=Whole(1, 1_000_000), help="Vectors per opcode.")] = 8
-    seed: Annotated[int, SEED.saying("Of the states.")] = 1
-    force: Annotated[bool, FORCE.saying("Replace files of these names in the folder.")] = False
-    engine: Engine = None
-
-
-@command_of(VectorsOptions)
-def vectors(options: VectorsOptions) -> None:
-    """Writes one JSON file per opcode, in the form of the SingleStepTests: state before, state after, and the
-    accesses of each machine cycle. The same seed writes the same bytes; more vectors per opcode only add to
-    them. tests/vectors/README.md describes the format.
-    """
-    folder = OutputFolder(options.out, options.force, NAMES)
-
-    with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
-        for opcode, name in enumerate(NAMES):
-            with hold.released():
-                drawn = _vectors(opcode, options)
-            folder.part(name).write_bytes(drawn)
-            bar.to(opcode + 1)
-
-
-def _vectors(opcode: int, options: VectorsOptions) -> bytes:
-    """The file of one opcode."""
-    word = map(Stream(options.seed, f"vectors/mcs51/{opcode:02x}").u32, count())
-    return encode(draw_vectors(opcode, options.per_opcode, lambda n: next(word) * n >> 32))

@@ -1,13 +1,12 @@
 """The published single-step vectors: the CPU does what they say, and they say what they should."""
 
 import pytest
-from click.testing import CliRunner
 from msgspec import ValidationError
 
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH
-from miro_robot.mcs51.vectors import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, State, VectorRunner, decode
-from mirotwin.commands import main
+from tests.vectors.draw import write
 from tests.vectors.paths import MCS51
+from tests.vectors.single_step import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, State, VectorRunner, decode
 
 NAMES = [f"{opcode:02x}.json" for opcode in range(256)]
 MOVX = {0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3}
@@ -15,11 +14,6 @@ MOVX = {0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3}
 
 def vectors_of(opcode):
     return decode((MCS51 / f"{opcode:02x}.json").read_bytes())
-
-
-def mirotwin(*arguments):
-    result = CliRunner().invoke(main, ["fw", "vectors", *arguments])
-    return result.exit_code, result.stderr
 
 
 def test_there_is_one_file_for_each_opcode():
@@ -53,39 +47,19 @@ def test_vectors_have_the_cycles_and_fetches_of_the_instruction_table(opcode):
         assert kinds.count(LATCH) == len(changed)
 
 
-def test_the_command_writes_the_committed_files(tmp_path):
-    assert mirotwin("--out", str(tmp_path / "new")) == (0, "")
+def test_drawing_again_writes_the_committed_files(tmp_path):
+    write(tmp_path / "new")
     for name in NAMES:
         assert (tmp_path / "new" / name).read_bytes() == (MCS51 / name).read_bytes()
 
 
 def test_fewer_vectors_are_the_first_of_more_and_another_seed_draws_others(tmp_path):
-    for folder, arguments in (("two", []), ("other", ["--seed", "2"])):
-        assert mirotwin("--out", str(tmp_path / folder), "--per-opcode", "2", *arguments) == (0, "")
+    write(tmp_path / "two", per_opcode=2)
+    write(tmp_path / "other", per_opcode=2, seed=2)
     for opcode in (0x00, 0x24, 0x85, 0xD0):
         name = f"{opcode:02x}.json"
         assert decode((tmp_path / "two" / name).read_bytes()) == vectors_of(opcode)[:2]
         assert (tmp_path / "two" / name).read_bytes() != (tmp_path / "other" / name).read_bytes()
-
-
-def test_a_folder_with_other_things_is_refused_unless_forced(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    code, error = mirotwin("--out", str(tmp_path), "--per-opcode", "1")
-    assert code == 2
-    assert error.startswith(f"mirotwin: error: {tmp_path}: the folder is not empty (notes.txt); ")
-    assert mirotwin("--out", str(tmp_path), "--per-opcode", "1", "--force") == (0, "")
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-    assert len(list(tmp_path.iterdir())) == 257
-
-
-@pytest.mark.parametrize(
-    "arguments", [["--per-opcode", "0"], ["--seed", "-1"], ["--out", "/dev/null/x"], ["--out", "/dev/null"]]
-)
-def test_what_cannot_be_written_is_one_line_and_exit_code_2(arguments, tmp_path):
-    code, error = mirotwin("--out", str(tmp_path / "new"), *arguments)
-    assert code == 2
-    assert error.startswith("mirotwin: error: ")
-    assert error.count("\n") == 1
 
 
 def test_a_state_that_does_not_list_what_changes_is_refused():

@@ -11,12 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from miro_exact import engine
-from miro_robot.mcs51.vectors import VectorRunner
 from tests.robot.ucsim import compiled, csmith, s51, states, timers, vector_check
 from tests.robot.ucsim.exclusions import COMPARED
 from tests.robot.ucsim.lockstep import compare
 from tests.robot.ucsim.walk import Walker
 from tests.vectors.paths import MCS51
+from tests.vectors.single_step import VectorRunner
 
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")
 needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs sdcc")

@@ -1,4 +1,4 @@
-"""Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `mirotwin fw vectors` wrote.
+"""Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `tests.vectors.draw` wrote.
 
 Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
 """
@@ -6,9 +6,9 @@ Vectors that `exclusions.py` rules out, or that hold pins low from outside, are 
 import sys
 from pathlib import Path
 
-from miro_robot.mcs51.vectors import RESET, VectorRunner, decode
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import ALIKE_AFTER_MOVX, COMPARED, MOVX, PSW, allowed
+from tests.vectors.single_step import RESET, VectorRunner, decode
 
 _BATCH = 2000  # vectors per start of the simulator
 

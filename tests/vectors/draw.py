@@ -1,15 +1,29 @@
-"""Random machine states for single-step vectors.
+"""Random machine states for single-step vectors: `python -m tests.vectors.draw --out DIR` writes a file per opcode.
 
-The format and the execution are in `vectors.py`. The source of chance is a function given by the caller: `draw(n)`
+The format and the execution are in `single_step.py`. The source of chance is a function given by the caller: `draw(n)`
 returns an integer from 0 to n - 1.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
+from itertools import count
+from pathlib import Path
 
+from miro_exact.rng import Stream
 from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE, disassemble
-from miro_robot.mcs51.vectors import MOVC, MOVX, PORTS, REGISTERS, State, Vector, VectorRunner, table_address
+from tests.vectors.single_step import (
+    MOVC,
+    MOVX,
+    PORTS,
+    REGISTERS,
+    State,
+    Vector,
+    VectorRunner,
+    encode,
+    table_address,
+)
 
 Draw = Callable[[int], int]
 
@@ -160,11 +174,11 @@ class _Drawing:
         return State(state.pc, state.sfr, state.iram, state.xram, state.pins, sorted(code.items()))
 
 
-def draw_vectors(opcode: int, count: int, draw: Draw) -> list[Vector]:
-    """`count` vectors of one opcode; their results are those of our CPU."""
+def draw_vectors(opcode: int, number: int, draw: Draw) -> list[Vector]:
+    """`number` vectors of one opcode; their results are those of our CPU."""
     bench = VectorRunner()
     found: list[Vector] = []
-    while len(found) < count:
+    while len(found) < number:
         initial = _Drawing(opcode, draw).state()
         final, cycles = bench.run(initial)
         if _is_defined(final):
@@ -187,3 +201,21 @@ def _name(state: State) -> str:
     size = LENGTH[code[state.pc]]
     raw = " ".join(f"{code[(state.pc + offset) & 0xFFFF]:02x}" for offset in range(size))
     return f"{raw}  {disassemble(bytes(code), state.pc)}"
+
+
+def write(folder: Path, per_opcode: int = 8, seed: int = 1) -> None:
+    """Writes 00.json to ff.json. The same seed writes the same bytes; more vectors per opcode only add to them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for opcode in range(0x100):
+        word = map(Stream(seed, f"vectors/mcs51/{opcode:02x}").u32, count())
+        vectors = draw_vectors(opcode, per_opcode, lambda n, word=word: next(word) * n >> 32)
+        (folder / f"{opcode:02x}.json").write_bytes(encode(vectors))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--per-opcode", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    write(options.out, options.per_opcode, options.seed)

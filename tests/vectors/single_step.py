@@ -1,7 +1,7 @@
 """Single-step vectors: machine state, one instruction, machine state, and what went over the buses.
 
-Drawing random states is in `vector_draw.py`; `tests/vectors/README.md` describes the format to people who use the
-files. The form is that of the SingleStepTests collections.
+Drawing random states is in `draw.py`; the README beside this file describes the format to people who use the files.
+The form is that of the SingleStepTests collections.
 """
 
 from __future__ import annotations
