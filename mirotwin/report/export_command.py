@@ -108,11 +108,12 @@ def export(options: ExportOptions) -> int:
     a recording for Foxglove.
 
     pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
-    direction, and the network as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m
-    miro_protocol.dissector`) shows the fields:
+    direction, and the network as interface; link type 250 (RTAC serial). A script for Wireshark shows the
+    fields:
 
     \b
         mirotwin export run.mcap --out run.pcapng
+        python -m miro_protocol.dissector > miro.lua
         tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
 
     A stream file is for `mirotwin replay`, for editors and for git; a capture does not hold stop bits, a stream file

@@ -1,4 +1,4 @@
-"""Writes the Wireshark dissector, in Lua: `python -m miro_protocol.dissector > protocol/miro.lua`.
+"""Writes the Wireshark dissector, in Lua: `python -m miro_protocol.dissector > miro.lua`.
 
 A packet is a run of characters without a pause, as `pcapng.py` writes them, so the spacing rule holds within it and
 ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is the number of
@@ -23,7 +23,7 @@ from miro_protocol.transmission import DOWN, UP
 
 _HEAD = """\
 -- Wireshark dissector of the Mirotwin radio frames. Written by `python -m miro_protocol.dissector`; do not edit.
--- tshark -X lua_script:protocol/miro.lua -d rtacser.data,miro -r run.pcapng
+-- tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng
 
 """
 
