@@ -10,6 +10,8 @@ The names are those of the stub beside this file. They are loaded on first use: 
 time, and the program (`entry`) starts at once.
 """
 
+from mirotwin import conform as _conform  # noqa: F401  adds its check, whoever reads a scenario
+
 
 def names_of_stub(package):
     """The `__getattr__` of a package whose `__init__.pyi` says where its names come from, a line each."""

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterator
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
-from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
-from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.rules import CHAPTERS
+from mirotwin.conform.by_answers import NOT_OBSERVABLE
+from mirotwin.conform.rule import Rule, Topology
+from mirotwin.conform.rules import CHAPTERS
 
 LEFT_OUT = {
     "bad stop bits": ("P04", "P13", "P43", "P49"),

@@ -8,10 +8,10 @@ import pytest
 
 from miro_robot.firmware import image_path
 from mirotwin.shell.verdicts import VERDICTS, worst
+from tests.mirotwin.conform.images import FAULTS, HANGS
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.testing.sessions import session
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
-from tests.mirotwin.verify.conform.images import FAULTS, HANGS
 
 EXPECTED = {
     "no_fault = true": "passed",

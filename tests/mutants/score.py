@@ -103,8 +103,8 @@ def jobs_of(count, seed, tried=()):
 def judged(image, tried=()):
     """Rules that an image breaks, each tried by itself, and the processor time; `tried`: () is all of them."""
     from miro_robot.image import load_hex  # a new process gets its engine first
-    from mirotwin.verify.conform.rules import RULES
-    from mirotwin.verify.conform.run import try_rule, with_faults
+    from mirotwin.conform.rules import RULES
+    from mirotwin.conform.run import try_rule, with_faults
 
     rules = [rule for rule in RULES if not tried or rule.id in tried]
     begun = time.process_time()
@@ -203,7 +203,7 @@ def main():
 
 
 def _score(jobs, asked, whole):
-    from mirotwin.verify.conform.rules import RULES
+    from mirotwin.conform.rules import RULES
 
     all_rules = tuple(rule.id for rule in RULES)
     broken, conform_seconds = judged(shipped().image)

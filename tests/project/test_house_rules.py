@@ -1,7 +1,9 @@
 """The house rules: ruff, mypy --strict, layers, the length of files, tests without types, indices that compile."""
 
 import ast
+import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,45 @@ def test_no_file_is_longer_than_800_lines():
 @pytest.mark.parametrize(("lines", "refused"), [(800, None), (801, "801 lines, 800 are allowed: split it")])
 def test_what_is_said_about_the_length_of_a_file(lines, refused):
     assert problem("y = 2\n" * lines) == refused
+
+
+LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+FLOORS = {
+    room.strip(): floor
+    for contract in LAYERS
+    if contract.get("containers") == ["mirotwin"]
+    for floor, rooms in enumerate(reversed(contract["layers"]))
+    for room in rooms.split("|")
+}
+
+
+def higher_rooms(source, room):
+    """The rooms on the same floor as `room` or above it that a text of the source names as a module."""
+    texts = [
+        node.value
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    found = [match[1] for text in texts if (match := re.fullmatch(r"mirotwin\.(\w+)(\.\w+)*(:\w+)?", text))]
+    return [other for other in found if other != room and FLOORS.get(other, -1) >= FLOORS[room]]
+
+
+def test_no_room_names_a_higher_one_by_a_text():
+    paths = [path for path in SOURCES if path.suffix == ".py" and path.is_relative_to(ROOT / "mirotwin")]
+    rooms = {path: path.relative_to(ROOT / "mirotwin").parts[0].removesuffix(".py") for path in paths}
+    found = {
+        str(path): higher_rooms(path.read_text(), room) for path, room in rooms.items() if room in FLOORS
+    }
+    assert not {path: others for path, others in found.items() if others}
+    assert len(found) > 100
+
+
+def test_a_room_that_is_named_by_a_text_is_found():
+    source = (
+        'OWN = {"a": "mirotwin.conform.rule:Rule", "b": "mirotwin.shell.options", "c": "mirotwin.checks"}'
+    )
+    assert higher_rooms(source, "verify") == ["conform"]
+    assert higher_rooms(source, "commands") == []
 
 
 def annotated_tests(source):

@@ -22,6 +22,7 @@ from miro_exact.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks import OWN
 from mirotwin.verify.checks.interface import Check, problem_of_class
 
 ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
@@ -31,29 +32,7 @@ CHECKS: Registry[object] = Registry(
     word="check",
     key="check",
     base="mirotwin.verify.checks.interface:Check",
-    own={
-        "no_fault": "mirotwin.verify.checks.faults:NoFault",
-        "lm629_protocol": "mirotwin.verify.checks.faults:Lm629Protocol",
-        "main_loop_alive": "mirotwin.verify.checks.faults:MainLoopAlive",
-        "stack_clear": "mirotwin.verify.checks.faults:StackClear",
-        "acts_at_all": "mirotwin.verify.checks.alive:ActsAtAll",
-        "failsafe_stop_ms": "mirotwin.verify.checks.failsafe:FailsafeStop",
-        "motors_off_ms": "mirotwin.verify.checks.failsafe:MotorsOff",
-        "moves_only_when_fresh": "mirotwin.verify.checks.reception:MovesOnlyWhenFresh",
-        "accepts_only_sent": "mirotwin.verify.checks.reception:AcceptsOnlySent",
-        "acts_within_ms": "mirotwin.verify.checks.reception:ActsWithin",
-        "back_in_sync_within_ms": "mirotwin.verify.checks.reception:BackInSync",
-        "frames_accepted_min": "mirotwin.verify.checks.reception:FramesAccepted",
-        "answers_within_ms": "mirotwin.verify.checks.answers:AnswersWithin",
-        "answers_only_in_turn": "mirotwin.verify.checks.answers:AnswersOnlyInTurn",
-        "happens": "mirotwin.verify.checks.happens:Happens",
-        "never_happens": "mirotwin.verify.checks.happens:NeverHappens",
-        "wheels_within_m_s": "mirotwin.verify.checks.wheels:WheelsWithin",
-        "tracks_within_cm": "mirotwin.verify.checks.course:TracksWithin",
-        "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
-        "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
-        "conforms_to": "mirotwin.verify.conform.rule_monitor:ConformsTo",
-    },
+    own=OWN,
 )
 """By name; none is imported before it is named."""
 

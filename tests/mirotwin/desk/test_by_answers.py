@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from mirotwin.conform.by_answers import NOT_OBSERVABLE
+from mirotwin.conform.rules import RULES
 from mirotwin.desk.robot_port import RobotPort
-from mirotwin.verify.conform.by_answers import NOT_OBSERVABLE
-from mirotwin.verify.conform.rules import RULES
 from tests.mirotwin.desk.rig import ROBOT
 from tests.mirotwin.verify.checks.rig import planted
 from tests.mutants.sdcc import needs_sdcc

@@ -9,8 +9,8 @@ import pytest
 
 from mirotwin.fuzz.files import CampaignFolder, unused
 from tests import children
+from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, planted
-from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 pytestmark = pytest.mark.slow
 

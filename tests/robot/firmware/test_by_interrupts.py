@@ -8,8 +8,8 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.conditions import Reached
 from miro_sim.world.world import World
-from mirotwin.verify.conform.rules import RULES, find
-from mirotwin.verify.conform.trial import run_trial, trial_of
+from mirotwin.conform.rules import RULES, find
+from mirotwin.conform.trial import run_trial, trial_of
 from tests.mutants.build import build
 from tests.mutants.score import judged
 from tests.mutants.sdcc import needs_sdcc

@@ -8,9 +8,9 @@ An hour at the symbol level is `python -m benchmarks.undetected noise`.
 import sys
 
 from miro_sim.world.world import World
+from mirotwin.conform.probe import Listening
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.conform.probe import Listening
 from mirotwin.verify.rig_options import silent_scenario
 
 

@@ -11,9 +11,9 @@ from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Monitor
 from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
+from tests.mirotwin.conform.images import BABBLES, HANGS, image_of
 from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
-from tests.mirotwin.verify.conform.images import BABBLES, HANGS, image_of
 from tests.robot.board.rig import RESET, START
 from tests.robot.board.rig import image_of as assembled
 

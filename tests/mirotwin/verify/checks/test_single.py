@@ -14,6 +14,7 @@ from miro_sim.world.world import World
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, Tracks
 from mirotwin.verify.checks.alive import FRAMES, frames_needed
 from mirotwin.verify.checks.monitors import Checks
+from tests.mirotwin.conform.images import BABBLES, HANGS, READS_BOTH, image_of
 from tests.mirotwin.verify.checks.rig import (
     MS,
     built,
@@ -24,7 +25,6 @@ from tests.mirotwin.verify.checks.rig import (
     silent_world,
     team,
 )
-from tests.mirotwin.verify.conform.images import BABBLES, HANGS, READS_BOTH, image_of
 
 # Dead, deaf and lame robots fail any run that sends them frames; robots that nothing reaches are not judged.
 

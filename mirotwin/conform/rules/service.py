@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
-from mirotwin.verify.conform.hints import number
-from mirotwin.verify.conform.observed import Observed, Words
-from mirotwin.verify.conform.rule import FIRMWARE, FRAME, RECEPTION, VERSIONS, Chapter, Topology
-from mirotwin.verify.conform.rules.failsafe import stops_behind
-from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
+from mirotwin.conform.hints import number
+from mirotwin.conform.observed import Observed, Words
+from mirotwin.conform.rule import FIRMWARE, FRAME, RECEPTION, VERSIONS, Chapter, Topology
+from mirotwin.conform.rules.failsafe import stops_behind
+from mirotwin.conform.rules.sound import nothing_refused
+from mirotwin.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Service frames and unknown contents")
 

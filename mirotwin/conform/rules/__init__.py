@@ -7,8 +7,8 @@ from functools import cache
 from itertools import groupby
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from mirotwin.verify.conform.rule import Chapter, Rule
-from mirotwin.verify.conform.rules import (
+from mirotwin.conform.rule import Chapter, Rule
+from mirotwin.conform.rules import (
     answers,
     boot,
     chips,

@@ -6,11 +6,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mirotwin.verify.conform.rules import ALL, RULES
+from mirotwin.conform.rules import ALL, RULES
+from tests.mirotwin.conform.images import BABBLES, FAULTS, HANGS, POKES, PUSHES, READS_BOTH, RUNS_OUT
+from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
-from tests.mirotwin.verify.conform.images import BABBLES, FAULTS, HANGS, POKES, PUSHES, READS_BOTH, RUNS_OUT
-from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 
 def program(folder, code):
@@ -57,7 +57,7 @@ def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_pa
     assert [path.name for path in folder.iterdir()] == ["other"]
 
 
-ROBOTS_OWN = Path(__file__).parents[4] / "robot_fw" / "miro_robot" / "firmware" / "miro.ihx"
+ROBOTS_OWN = Path(__file__).parents[3] / "robot_fw" / "miro_robot" / "firmware" / "miro.ihx"
 
 
 def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin, tmp_path):

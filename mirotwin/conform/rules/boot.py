@@ -7,10 +7,10 @@ from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
-from mirotwin.verify.conform.hints import in_words
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import POWER_ON, TURNS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
+from mirotwin.conform.hints import in_words
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import POWER_ON, TURNS, Chapter, Topology
+from mirotwin.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Power-on")
 STRAPS = Chapter("Straps")

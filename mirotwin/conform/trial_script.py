@@ -31,8 +31,7 @@ from miro_protocol.table import (
 )
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_NAME
-from mirotwin.verify.checks.orders import Order, saturated
-from mirotwin.verify.conform.hints import (
+from mirotwin.conform.hints import (
     characters,
     in_a_row,
     in_words,
@@ -41,8 +40,9 @@ from mirotwin.verify.conform.hints import (
     payload_of,
     wheels_instead,
 )
-from mirotwin.verify.conform.observed import Answer, Observed, Words, within
-from mirotwin.verify.conform.rule import Topology
+from mirotwin.conform.observed import Answer, Observed, Words, within
+from mirotwin.conform.rule import Topology
+from mirotwin.verify.checks.orders import Order, saturated
 
 _LTRJ = BY_NAME["LTRJ"].opcode
 _VELOCITY = 0x08

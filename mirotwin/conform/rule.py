@@ -12,7 +12,7 @@ from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
-    from mirotwin.verify.conform.trial_script import TrialScript
+    from mirotwin.conform.trial_script import TrialScript
 
     Written = Callable[[TrialScript], None]
 

@@ -26,16 +26,16 @@ from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
+from mirotwin.conform.probe import why_lost
+from mirotwin.conform.rule import Rule
+from mirotwin.conform.rule_monitor import ConformsTo
+from mirotwin.conform.rules import presupposed, presupposed_first
+from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.conform.probe import why_lost
-from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.rule_monitor import ConformsTo
-from mirotwin.verify.conform.rules import presupposed, presupposed_first
-from mirotwin.verify.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 
 FAULTS_KEPT = 20
 """Of a robot in a trial."""

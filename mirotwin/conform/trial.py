@@ -19,9 +19,9 @@ from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import of_table
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
+from mirotwin.conform.rule import Rule, Topology
+from mirotwin.conform.trial_script import Expectation, TrialScript
 from mirotwin.verify.checks.interface import Subject
-from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.trial_script import Expectation, TrialScript
 
 MOST_FAULTS = 1000
 LOOK_TICKS = 24_000

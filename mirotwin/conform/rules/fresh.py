@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from miro_protocol.table import FRESH_AGAIN_TICKS, FRESH_STEPS, SEQ_MODULUS, TICKS_PER_MS
-from mirotwin.verify.conform.rule import FRESHNESS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import How, TrialScript, ms
+from mirotwin.conform.rule import FRESHNESS, Chapter, Topology
+from mirotwin.conform.trial_script import How, TrialScript, ms
 
 CHAPTER = Chapter("Freshness")
 AGAIN_MS = FRESH_AGAIN_TICKS / TICKS_PER_MS

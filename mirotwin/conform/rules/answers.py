@@ -10,10 +10,10 @@ from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import BITS_PER_CHARACTER, ROBOT_BIT_TICKS, SYNC, TELEMETRY, Flags
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
-from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
-from mirotwin.verify.conform.observed import Answer, Observed, within
-from mirotwin.verify.conform.rule import BOTH, FRAME, FRESHNESS, RECEPTION, THREE, TURNS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import Found, Frame, How, Says, TrialScript, ms, over_by
+from mirotwin.conform.hints import characters, in_a_row, no_answer, number
+from mirotwin.conform.observed import Answer, Observed, within
+from mirotwin.conform.rule import BOTH, FRAME, FRESHNESS, RECEPTION, THREE, TURNS, Chapter, Topology
+from mirotwin.conform.trial_script import Found, Frame, How, Says, TrialScript, ms, over_by
 
 CHAPTER = Chapter("Answers")
 BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS

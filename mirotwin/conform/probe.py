@@ -12,15 +12,15 @@ from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
+from mirotwin.conform.hints import characters
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import BOTH, Rule, Topology
+from mirotwin.conform.rule_monitor import ObservingMonitor
+from mirotwin.conform.sealing import MISTAKES
+from mirotwin.conform.trial import Trial, run_trial, trial_of
+from mirotwin.conform.trial_script import Frame, TrialScript, obeys
 from mirotwin.verify.checks.interface import Check, Monitor, Subject
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.conform.hints import characters
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import BOTH, Rule, Topology
-from mirotwin.verify.conform.rule_monitor import ObservingMonitor
-from mirotwin.verify.conform.sealing import MISTAKES
-from mirotwin.verify.conform.trial import Trial, run_trial, trial_of
-from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
 
 Listener = ObservingMonitor[Check]
 

@@ -19,15 +19,15 @@ from miro_protocol.table import ROBOT_COUNTS, TICKS_PER_MS
 from miro_protocol.transmission import Transmission, joined
 from miro_sim.world.conditions import answer_of
 from miro_sim.world.events import Cursor
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import Rule, Topology
+from mirotwin.conform.run import Outcome, in_order
+from mirotwin.conform.trial import trial_of
+from mirotwin.conform.trial_script import Found, Frame, How, Pairs, TrialScript
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import RobotPort
 from mirotwin.shell.program import complain
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import Rule, Topology
-from mirotwin.verify.conform.run import Outcome, in_order
-from mirotwin.verify.conform.trial import trial_of
-from mirotwin.verify.conform.trial_script import Found, Frame, How, Pairs, TrialScript
 
 _REASONS = {
     "it is switched off and on, or reset": "P01 P02 P03 P19 P55 P56",

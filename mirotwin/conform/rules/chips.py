@@ -5,11 +5,11 @@ from __future__ import annotations
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
-from mirotwin.verify.conform.observed import Answer, Observed
-from mirotwin.verify.conform.rule import FRAME, PORT, POWER_ON, Chapter
-from mirotwin.verify.conform.rules.answers import flagged
-from mirotwin.verify.conform.rules.sound import nothing_refused
-from mirotwin.verify.conform.trial_script import Found, TrialScript
+from mirotwin.conform.observed import Answer, Observed
+from mirotwin.conform.rule import FRAME, PORT, POWER_ON, Chapter
+from mirotwin.conform.rules.answers import flagged
+from mirotwin.conform.rules.sound import nothing_refused
+from mirotwin.conform.trial_script import Found, TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01

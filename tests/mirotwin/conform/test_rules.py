@@ -12,19 +12,19 @@ from miro_protocol.table import DOWNLINK, TELEMETRY
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Symbols
 from miro_sim.world.world import World
+from mirotwin.conform.hints import wheels_instead
+from mirotwin.conform.rule_monitor import ConformsTo
+from mirotwin.conform.rules import ALL, find
+from mirotwin.conform.run import try_rule
+from mirotwin.conform.sealing import MISTAKES as SEALINGS
+from mirotwin.conform.sealing import Sealing, mistake_in
+from mirotwin.conform.trial import trial_of
+from mirotwin.conform.trial_script import Frame
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.orders import Order
-from mirotwin.verify.conform.hints import wheels_instead
-from mirotwin.verify.conform.rule_monitor import ConformsTo
-from mirotwin.verify.conform.rules import ALL, find
-from mirotwin.verify.conform.run import try_rule
-from mirotwin.verify.conform.sealing import MISTAKES as SEALINGS
-from mirotwin.verify.conform.sealing import Sealing, mistake_in
-from mirotwin.verify.conform.trial import trial_of
-from mirotwin.verify.conform.trial_script import Frame
+from tests.mirotwin.conform.images import HANGS, image_of
+from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.verify.checks.rig import built, finish, needs_sdcc, own_image, silent_world
-from tests.mirotwin.verify.conform.images import HANGS, image_of
-from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 IDS = [rule.id for rule in ALL]
 
@@ -67,7 +67,7 @@ def test_rules_are_numbered_in_order_have_a_name_each_and_say_must_and_where_the
     for rule in ALL:
         assert "MUST" in rule.text
         page, _, section = rule.source.partition(", ")
-        assert f"# {section}\n" in (Path(__file__).parents[4] / page).read_text()
+        assert f"# {section}\n" in (Path(__file__).parents[3] / page).read_text()
 
 
 @pytest.mark.parametrize("id", ["P18", "P29", "P44", "P48", "P49"])

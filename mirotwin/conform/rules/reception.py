@@ -10,9 +10,9 @@ from miro_protocol.crc import POLYNOMIAL_REFLECTED
 from miro_protocol.frames import seal
 from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, FrameType
 from miro_protocol.whitening import whiten
-from mirotwin.verify.conform.hints import payload_of
-from mirotwin.verify.conform.rule import BOTH, FRAME, RECEPTION, VERSIONS, WHY, Chapter, Topology
-from mirotwin.verify.conform.trial_script import GAP_MS, Frame, How, TrialScript
+from mirotwin.conform.hints import payload_of
+from mirotwin.conform.rule import BOTH, FRAME, RECEPTION, VERSIONS, WHY, Chapter, Topology
+from mirotwin.conform.trial_script import GAP_MS, Frame, How, TrialScript
 
 CHAPTER = Chapter("Reception")
 _CHANCE = Stream(0, "conform/reception")

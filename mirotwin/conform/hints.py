@@ -11,12 +11,12 @@ from miro_protocol.decoder import TelemetryDecoder
 from miro_protocol.events import Damaged
 from miro_protocol.table import SEQ_MODULUS, SYNC, TELEMETRY, TICKS_PER_MS, VELOCITY_SATURATION, FrameType
 from miro_protocol.transmission import follows
+from mirotwin.conform.sealing import mistake_in
 from mirotwin.verify.checks.orders import Order, saturated
-from mirotwin.verify.conform.sealing import mistake_in
 
 if TYPE_CHECKING:
     from miro_sim.world.events import Event
-    from mirotwin.verify.conform.trial_script import Frame
+    from mirotwin.conform.trial_script import Frame
 
 Pair = tuple[int, int]
 _SHIFTS = range(1, 17)

@@ -14,13 +14,13 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import Event
+from mirotwin.conform.hints import between, in_a_row, in_words, number
+from mirotwin.conform.observed import Observed, within
+from mirotwin.conform.probe import listen
+from mirotwin.conform.rule import Rule
+from mirotwin.conform.trial import trial_of
+from mirotwin.conform.trial_script import Expectation
 from mirotwin.verify.checks.orders import Orders
-from mirotwin.verify.conform.hints import between, in_a_row, in_words, number
-from mirotwin.verify.conform.observed import Observed, within
-from mirotwin.verify.conform.probe import listen
-from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.trial import trial_of
-from mirotwin.verify.conform.trial_script import Expectation
 
 Row = tuple[int, str, str]
 """Tick, what, and details."""

@@ -14,10 +14,10 @@ from miro_exact.bad_input import BadInput
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import Rule
+from mirotwin.conform.trial import trial_of
 from mirotwin.verify.checks.interface import C_co, Check, Kind, Monitor, Subject
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.trial import trial_of
 
 
 class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
@@ -33,7 +33,7 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
     def the_rule(self) -> Rule:
         """ValueError for a rule that there is not."""
-        from mirotwin.verify.conform.rules import find  # the rules are read when one is asked for
+        from mirotwin.conform.rules import find  # the rules are read when one is asked for
 
         try:
             return find(self.rule)

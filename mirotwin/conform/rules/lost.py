@@ -6,10 +6,10 @@ A trial has neither. It sets the filter gains to 0, so that a wheel stands while
 from __future__ import annotations
 
 from miro_protocol.frames import TelemetryFrame
-from mirotwin.verify.conform.observed import Answer, Observed
-from mirotwin.verify.conform.rule import FRESHNESS, Chapter
-from mirotwin.verify.conform.rules.boot import keeps_off
-from mirotwin.verify.conform.trial_script import Frame, TrialScript, ms
+from mirotwin.conform.observed import Answer, Observed
+from mirotwin.conform.rule import FRESHNESS, Chapter
+from mirotwin.conform.rules.boot import keeps_off
+from mirotwin.conform.trial_script import Frame, TrialScript, ms
 
 CHAPTER = Chapter("Wheels that do not follow")
 _POSITION_ERROR = 0x20

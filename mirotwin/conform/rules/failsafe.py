@@ -14,10 +14,10 @@ from miro_protocol.table import (
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
-from mirotwin.verify.conform.hints import in_words
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import FRESHNESS, WHEELS, Chapter
-from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
+from mirotwin.conform.hints import in_words
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import FRESHNESS, WHEELS, Chapter
+from mirotwin.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")
 

@@ -11,6 +11,11 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.image import Image
+from mirotwin.conform.explain import explain
+from mirotwin.conform.rule import Rule
+from mirotwin.conform.rules import ALL as EVERY_RULE
+from mirotwin.conform.rules import LONG, RULES, chapter_of, find, spans
+from mirotwin.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
@@ -31,11 +36,6 @@ from mirotwin.verify.cases.artifacts import (
     report_line,
 )
 from mirotwin.verify.cases.case import write_case
-from mirotwin.verify.conform.explain import explain
-from mirotwin.verify.conform.rule import Rule
-from mirotwin.verify.conform.rules import ALL as EVERY_RULE
-from mirotwin.verify.conform.rules import LONG, RULES, chapter_of, find, spans
-from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 
 LINES = 5
 """Firmware faults that are listed."""
@@ -144,7 +144,7 @@ def conform(options: ConformOptions) -> int:
     if at_port:
         if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
             raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
-        from mirotwin.verify.conform.by_answers import try_at_port  # loads pyserial
+        from mirotwin.conform.by_answers import try_at_port  # loads pyserial
 
         properties = {"port": at_port}
         tried = try_at_port(rules, options.desk)

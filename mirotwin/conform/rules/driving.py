@@ -8,10 +8,10 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.probe import why_deaf
-from mirotwin.verify.conform.rule import FIRMWARE, FRAME, TURNS, Chapter, Topology
-from mirotwin.verify.conform.trial_script import Found, Frame, How, TrialScript, ms
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.probe import why_deaf
+from mirotwin.conform.rule import FIRMWARE, FRAME, TURNS, Chapter, Topology
+from mirotwin.conform.trial_script import Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")
 _LTRJ = BY_NAME["LTRJ"].opcode

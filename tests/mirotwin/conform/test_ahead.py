@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from mirotwin.conform import run
+from mirotwin.conform.rules import RULES
+from mirotwin.conform.run import FEWEST, Outcome, tried_ahead, try_all
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.conform import run
-from mirotwin.verify.conform.rules import RULES
-from mirotwin.verify.conform.run import FEWEST, Outcome, tried_ahead, try_all
 from tests import children
+from tests.mirotwin.conform.images import FAULTS, HANGS, image_of
 from tests.mirotwin.verify.checks.rig import own_image
-from tests.mirotwin.verify.conform.images import FAULTS, HANGS, image_of
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="Linux alone forks")
 SOME = RULES[: 2 * FEWEST]
@@ -105,8 +105,8 @@ def test_outcomes_are_those_of_one_process(code):
 
 HOLDS = """
 import os, time
-from mirotwin.verify.conform import run
-from mirotwin.verify.conform.rules import RULES
+from mirotwin.conform import run
+from mirotwin.conform.rules import RULES
 
 run.has_core = lambda: True
 def tried(rule):

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mirotwin.conform import run
+from mirotwin.conform.rules import RULES, find, presupposed
+from mirotwin.conform.run import Outcome, try_all, with_faults
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.conform import run
-from mirotwin.verify.conform.rules import RULES, find, presupposed
-from mirotwin.verify.conform.run import Outcome, try_all, with_faults
+from tests.mirotwin.conform.images import FAULTS, HANGS, image_of
+from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
-from tests.mirotwin.verify.conform.images import FAULTS, HANGS, image_of
-from tests.mirotwin.verify.conform.mistakes import MISTAKES
 
 pytestmark = pytest.mark.slow
 

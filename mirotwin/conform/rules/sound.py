@@ -9,10 +9,10 @@ from miro_protocol.actions import Power, Reset
 from miro_protocol.table import SYNC
 from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
-from mirotwin.verify.conform.observed import Observed
-from mirotwin.verify.conform.rule import FAULTS, FRESHNESS, POWER_ON, THREE, TURNS, Chapter
-from mirotwin.verify.conform.rules.boot import keeps_off
-from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
+from mirotwin.conform.observed import Observed
+from mirotwin.conform.rule import FAULTS, FRESHNESS, POWER_ON, THREE, TURNS, Chapter
+from mirotwin.conform.rules.boot import keeps_off
+from mirotwin.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Soundness")
 LONG = Chapter("Long trials")
