@@ -430,7 +430,7 @@ class Adapter:
         inner = children(value)
         text = shown_value(whole) if not inner or isinstance(whole, int) else str(value.kind or "")
         place = None
-        if value.moment is not None and value.space in SIZES:
+        if isinstance(value.moment, Moment) and value.space in SIZES:
             thread = self.timeline.cores.index(value.moment.core)
             place = f"{thread}:{value.space}:{value.address:#x}"
         return {

@@ -13,16 +13,13 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.image.c_types import CType, Fields, value_of
 from miro_robot.mcs51.opcodes import BITS
-
-if TYPE_CHECKING:
-    from mirotwin.debug.symbols import Moment
 
 _TOKEN = re.compile(r"\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
 _MOST_CHARACTERS, _MOST_TOKENS, _MOST_SHIFT, _MOST_DIGITS = 4096, 128, 64, 80
@@ -40,6 +37,16 @@ class NoValue(BadInput):
         super().__init__("", "", what, remedy)
 
 
+class Lookup(Protocol):
+    """What an expression is asked at: a processor that stands somewhere (`symbols.Moment`)."""
+
+    def find(self, name: str, module: str) -> Value:
+        """The meaning of a name; `module`: the file that is named before it. Raises NoValue."""
+
+    def read(self, space: str, address: int, count: int) -> bytes:
+        """Bytes of a memory. Raises BadInput for one that is not there."""
+
+
 class Value(msgspec.Struct, frozen=True):
     """Something an expression means. `kind`, `space`, `address`: of what lies in a memory of `moment`.
 
@@ -49,14 +56,14 @@ class Value(msgspec.Struct, frozen=True):
     kind: CType | None = None
     space: str = ""
     address: int = 0
-    moment: Moment | None = None
+    moment: Lookup | None = None
     number: Any = None
     members: Mapping[str, Callable[[], Value]] | None = None
     fields: Fields = {}
     note: str = ""
 
 
-Term = Callable[["Moment"], Value]
+Term = Callable[[Lookup], Value]
 _ZERO = Value(number=0)
 
 
@@ -180,7 +187,7 @@ _SIGNS: dict[str, Callable[..., Any]] = {
 def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
     """An operator's value of those of its operands."""
 
-    def applied(moment: Moment) -> Value:
+    def applied(moment: Lookup) -> Value:
         try:
             found = apply(*(number(term(moment)) for term in terms))
             float(found)  # so that numbers do not grow without end
@@ -196,7 +203,7 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
 def _either(stops: bool, left: Term, right: Term) -> Term:
     """`||` (stops where the left side is true) and `&&`."""
 
-    def either(moment: Moment) -> Value:
+    def either(moment: Lookup) -> Value:
         found = bool(number(left(moment)))
         return Value(number=int(found if found == stops else bool(number(right(moment)))))
 
@@ -312,7 +319,7 @@ def _member_of(term: Term, name: str, text: str) -> Term:
         return lambda moment: _member(term(moment), name, text)
     index = int(name[:9])
 
-    def bit(moment: Moment) -> Value:
+    def bit(moment: Lookup) -> Value:
         value = term(moment)
         bits = 32 if value.kind is None else 1 if value.kind.kind == "bit" else 8 * value.kind.size
         if index >= bits:
