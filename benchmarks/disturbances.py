@@ -23,7 +23,7 @@ from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
 from mirotwin.campaign.workers import Processes
-from mirotwin.shell.program import cores
+from mirotwin.shell.processes import cores
 
 FIGURES = ("fig6", "fig8")
 FRAME_S = 1001 / 30000

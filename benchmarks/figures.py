@@ -27,7 +27,7 @@ from mirotwin.campaign.ranges import seeds_of
 from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
-from mirotwin.shell.program import cores
+from mirotwin.shell.processes import cores
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 RMS = ("rms_position_cm", "rms_x_cm", "rms_y_cm", "rms_theta_deg")

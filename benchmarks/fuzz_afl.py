@@ -19,6 +19,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.engine import EngineInput, write_seeds
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.spec import TargetSpec
 
 WARM = 500
@@ -46,7 +47,7 @@ def measured(folder: Path, spec: TargetSpec, inputs: list[bytes], wall_s: float)
     write_seeds(folder / "seeds", inputs)
     lengths = min(map(len, inputs)), max(map(len, inputs))
     given = EngineInput(spec.text(), folder / "seeds", folder / "out", lengths=lengths)
-    with AflRun(given, spec.make()) as run:
+    with AflRun(given, make_target(spec)) as run:
         while run.progress().executions < WARM:
             time.sleep(0.1)
         both = run.jobs[0].process.pid, child_of(run.jobs[0].process.pid)

@@ -24,6 +24,7 @@ from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.engine import EngineInput, write_dictionary, write_seeds
 from mirotwin.fuzz.hypothesis_process import HypothesisRun
 from mirotwin.fuzz.inputs import message_tokens, seeds
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from tests.mutants.build import CACHE, IMAGE
@@ -114,14 +115,14 @@ def _failed(image: Image, heard: Input) -> list[str]:
 def _of_engine(wanted: Wanted, folder: Path) -> Trial:
     spec = TargetSpec(image=wanted.path, robots=ROBOTS, slot=SLOT)
     try:
-        target = spec.make()
+        target = make_target(spec)
     except BadInput as error:
         return Trial(wanted, 0.0, 0.0, refused=error.what)
     given = seeds(spec.input, ROBOTS, SLOT)
     write_seeds(folder / "seeds", given)
     write_dictionary(folder / "dictionary", message_tokens(ROBOTS))
     begin = EngineInput(spec.text(), folder / "seeds", folder / "out", folder / "dictionary", 1, wanted.seed)
-    engine = (AflRun if wanted.engine == "afl" else HypothesisRun)(begin, spec.make())
+    engine = (AflRun if wanted.engine == "afl" else HypothesisRun)(begin, make_target(spec))
     looked = _Looked(target)
     with ExitStack() as at_end:
         begun_s, spent_s = time.monotonic(), 0.0

@@ -44,7 +44,7 @@ from mirotwin.campaign.reproduce.claims import number as shown
 from mirotwin.campaign.reproduce.plan import STARTS, Start
 from mirotwin.campaign.workers import processes
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
-from mirotwin.shell.program import cores
+from mirotwin.shell.processes import cores
 
 SEED = 1999
 SEARCH = range(2000, 2005)

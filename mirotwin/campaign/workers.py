@@ -17,7 +17,7 @@ from typing import Any
 
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
-from mirotwin.shell.program import cores, safe_path
+from mirotwin.shell.processes import cores, safe_path
 
 NAME = "mirotwin worker"
 FAILED = 1

@@ -1,4 +1,4 @@
-"""Who makes up inputs: AFL++ where it is installed, else Hypothesis. Their processes have a target each, leave files.
+"""What input generators have in common. Each runs in processes with a target each, which hand inputs over as files.
 
 Nothing here imports a hot module: a process that has a target chooses its engine by the specification first.
 """
@@ -9,15 +9,12 @@ import os
 import struct
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.spec import TargetSpec
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
@@ -28,8 +25,6 @@ LOG_BYTES = 1 << 20
 """A log is emptied when it is longer: afl-fuzz writes a line for each input that it takes up."""
 LONGEST_BYTES = 1024
 """AFL++ makes no longer inputs: a thousand characters are a second on the air, and a hundred frames."""
-_TOKENS, _TOKEN = 32, 64
-"""How many inputs are words of a foreign format, and how much of them."""
 _COUNT = struct.Struct("<Q")
 
 
@@ -273,36 +268,3 @@ def write_seeds(folder: Path, inputs: Iterable[bytes]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for number, data in enumerate(inputs):
         (folder / f"seed-{number:04d}").write_bytes(data[:LONGEST_BYTES])
-
-
-def engine_for(
-    spec: TargetSpec,
-    inputs: Sequence[bytes],
-    folder: CampaignFolder,
-    target: Target,
-    jobs: int,
-    seed: int | None,
-) -> tuple[Engine, list[str]]:
-    """AFL++, or Hypothesis, with what a user should hear about it. Raises BadInput for what cannot be."""
-    from mirotwin.fuzz.afl.run import AflRun, shared_cores
-    from mirotwin.fuzz.afl.settings import missing
-    from mirotwin.fuzz.inputs import message_tokens, wire_tokens
-
-    seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
-    write_seeds(seeds, inputs)
-    if spec.board == "bare":
-        tokens = [data[:_TOKEN] for data in inputs[:_TOKENS]]
-    else:
-        tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
-    write_dictionary(dictionary, tokens)
-    given = EngineInput(spec.text(), seeds, folder.folder("engine"), dictionary, jobs, seed)
-    lacking = missing()
-    if lacking is None:
-        return AflRun(given, target), shared_cores(jobs)
-    if find_spec("hypothesis") is None:
-        remedy = "install it with `pip install 'mirotwin[hypothesis]'`"
-        raise BadInput("Hypothesis", "", "Hypothesis is not installed", remedy)
-    from mirotwin.fuzz.hypothesis_process import HypothesisRun
-
-    note = f"{lacking}; until then Hypothesis makes up the inputs, which is slower and not guided by edges"
-    return HypothesisRun(given, target), [note]

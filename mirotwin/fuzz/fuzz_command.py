@@ -1,16 +1,20 @@
-"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes."""
+"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes.
+
+This is one of the few places that know the wall clock.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 import click
 
 from miro_exact import engine as engines
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
@@ -21,26 +25,35 @@ from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.firmware.code_place import address_of
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
-from mirotwin.fuzz.engine import Engine, Explorer, engine_for
+from mirotwin.fuzz.engine import Engine, Explorer
+from mirotwin.fuzz.engines import engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.fuzz_output import FuzzProgress, report
 from mirotwin.fuzz.input_coverage import InputCoverage
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.oracle import oracle_of
+from mirotwin.fuzz.results import Results, clock
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
 from mirotwin.recording.decode_command import ROBOTS
 from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
-from mirotwin.shell.program import Terminated, complain, cores
+from mirotwin.shell.processes import cores
+from mirotwin.shell.program import Terminated, complain, show_line
+from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType, wall_time
+from mirotwin.shell.verdicts import VERDICTS
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import CHECK, EXPECT, as_settings
 from mirotwin.verify.rig_options import silent_scenario
+
+if TYPE_CHECKING:
+    from rich.progress import ProgressColumn
 
 LONGEST_S = 1e7
 _NINE_BITS = 0x80  # of SCON: SM0
@@ -153,6 +166,8 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = False
 
 
+LINE_S = 10.0
+"""Wall time between two plain lines, where stderr is no terminal."""
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at after a Ctrl-C."""
 
@@ -206,7 +221,7 @@ def _campaign(
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
     check_outside(folder.path, options.corpus)
     covering = _covering(options.covering, image)
-    target = spec.make()
+    target = make_target(spec)
     oracle = oracle_of(target, check)
     inputs = dict.fromkeys(filter(None, target.seeds()))
     if options.corpus is not None:
@@ -215,7 +230,7 @@ def _campaign(
         for note in notes:
             complain(note)
     _check_at_rest(target, image, options.crystal or TICKS_PER_SECOND)
-    reached = InputCoverage(image, spec.make)
+    reached = InputCoverage(image, lambda: make_target(spec))
     if covering is not None and covering.address in reached.total:
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
@@ -236,7 +251,7 @@ def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, opti
         complain("every input fails or executes no branch: there is nothing to go on from")
         return Engine()
     jobs = max(1, cores() - 1) if options.jobs is None else options.jobs
-    engine, notes = engine_for(spec, passing, folder, spec.make(), jobs, options.seed)
+    engine, notes = engine_for(spec, passing, folder, make_target(spec), jobs, options.seed)
     for note in notes:
         complain(note)
     return engine
@@ -276,10 +291,72 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | No
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
-    code = report(campaign, left, stopped is None, check_in_file, quiet)
+    code = _report(Results(campaign, left, stopped is None, check_in_file), quiet)
     if stopped is not None:
         raise stopped
     return code
+
+
+def _report(results: Results, quiet: bool) -> int:
+    """Shows what a campaign came to, then writes its files; the exit code."""
+    if not quiet:
+        for part in results.overview():
+            if isinstance(part, str):
+                show_line(part)
+            else:
+                show(part)
+    for note in results.notes():
+        complain(note)
+    for line in results.crashes():
+        show_line(line)
+    results.write()  # after the results were shown: a full disk must not hide them
+    if not quiet:
+        show_line(f"written to {results.out}")
+    return VERDICTS[results.verdict].code
+
+
+class FuzzProgress(ProgressBar):
+    """A context manager; `show(campaign)` may be called as often as one likes."""
+
+    PATIENCE_S = 0.0
+
+    def __init__(self, what: str, time_s: float, quiet: bool) -> None:
+        super().__init__(f"fuzzing {what}", time_s, quiet)
+        self._time_s = time_s
+        self._quiet = quiet
+        self._line_s = time.monotonic()
+
+    def __enter__(self) -> Self:
+        self.to(0.0, said="starting")
+        return self
+
+    def show(self, campaign: Campaign) -> None:
+        """Draws the line again, or writes one if the last is some time ago."""
+        run_s = campaign.run_s
+        if self._shown:
+            self.to(min(run_s, self._time_s), said=said(campaign))
+        elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
+            self._line_s = time.monotonic()
+            left = clock(max(0.0, self._time_s - run_s))
+            complain(f"{self.what}: {clock(run_s)}: {said(campaign)}, {left} left")
+
+    def _columns(self) -> list[ProgressColumn]:
+        from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
+        words = [TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]")]
+        return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
+
+
+def said(campaign: Campaign) -> str:
+    """Rates and counts of a campaign, in short."""
+    edges, triage = campaign.progress().edges, campaign.triage
+    parts = [f"{campaign.rate:.0f}/s"]
+    if edges is not None:  # else the engine has not said yet
+        parts.append(amount(edges, "edge"))
+    parts.append(amount(len(triage.confirmed) or "no", "crash", "crashes"))
+    if triage.unconfirmed:
+        parts.append(f"{len(triage.unconfirmed)} unconfirmed")
+    return ", ".join(parts)
 
 
 def _tell(crash: Crash) -> None:

@@ -23,10 +23,10 @@ from pathlib import Path
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import replace_file
-from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.engine import Engine, Explorer, Job, counter
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.spec import TargetSpec, spec_of
-from mirotwin.shell.program import python_module
+from mirotwin.shell.processes import end_with_parent, python_module
 
 ROUND_EXAMPLES = 500
 """Inputs between two times that Hypothesis forgets: it has then climbed once."""
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str]) -> int:
     text, seeds_folder, folder, seed = arguments
     try:
         spec = spec_of(text)
-        target = spec.make()
+        target = make_target(spec)
     except BadInput as error:
         print(error, file=sys.stderr)
         return 2

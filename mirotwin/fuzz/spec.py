@@ -6,20 +6,12 @@ Nothing here imports a hot module: the process that reads a specification choose
 from __future__ import annotations
 
 import json
-from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
-from miro_exact import engine
 from miro_exact.bad_input import BadInput
-
-if TYPE_CHECKING:
-    from mirotwin.fuzz.target import Target
-
-MAKERS = {"miro": "mirotwin.fuzz.target:robot_target", "bare": "mirotwin.fuzz.bare:bare_target"}
-"""Board -> "module:function"; the function takes the specification and returns its target."""
 
 MAP_SIZE = 8192
 """Bytes of the edge map. AFL++ is 1.5 times as fast with it as with its own 64 KiB; firmware has some hundred edges."""
@@ -58,18 +50,6 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
         `@@` never stands in it: afl-fuzz would put the name of a file there.
         """
         return json.dumps(msgspec.to_builtins(self)).replace("@@", "@\\u0040")
-
-    def make(self) -> Target:
-        """The target, on the engine that the specification names. Raises BadInput for what cannot be had."""
-        if self.engine:
-            engine.select(self.engine)
-        place = self.maker or MAKERS[self.board]
-        module, _, name = place.partition(":")
-        try:
-            make = getattr(import_module(module), name)
-        except (ImportError, AttributeError, ValueError) as error:
-            raise BadInput("target", "maker", f"{place}: {error}", "write it as module:function") from None
-        return cast("Target", make(self))
 
 
 def spec_of(text: str) -> TargetSpec:

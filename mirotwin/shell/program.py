@@ -270,30 +270,3 @@ class MainGroup(LazyGroup):
         except Exception as error:
             return _ended(INTERNAL_ERROR, _report(error))
         return code if isinstance(code, int) else DONE
-
-
-_SAFE_PATH = "PYTHONSAFEPATH"
-
-
-def python_module(name: str, *arguments: str) -> list[str]:
-    """The command that runs a module of ours in a new process."""
-    return [sys.executable, "-P", "-m", name, *arguments]
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@contextmanager
-def safe_path() -> Iterator[None]:
-    """Processes that begin meanwhile do not import from the current folder, whatever starts them."""
-    before = os.environ.get(_SAFE_PATH)
-    os.environ[_SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_SAFE_PATH]
-        else:
-            os.environ[_SAFE_PATH] = before

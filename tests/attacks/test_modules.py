@@ -7,7 +7,7 @@ import pytest
 from intelhex import IntelHex
 
 from mirotwin.fuzz.afl.settings import missing
-from mirotwin.shell.program import python_module
+from mirotwin.shell.processes import python_module
 from tests import children
 from tests.mirotwin.verify.bare.firmwares import POLLS
 from tests.robot.mcs51.asm import assemble

@@ -29,7 +29,7 @@ from typing import Literal
 import msgspec
 
 from mirotwin.campaign.workers import processes
-from mirotwin.shell.program import cores
+from mirotwin.shell.processes import cores
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED

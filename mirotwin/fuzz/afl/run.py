@@ -10,8 +10,9 @@ from functools import partial
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.settings import end_with_parent, environment, job_name, line
+from mirotwin.fuzz.afl.settings import environment, job_name, line
 from mirotwin.fuzz.engine import Engine, Job
+from mirotwin.shell.processes import end_with_parent
 
 
 def cores_for(jobs: int, proc: Path = Path("/proc")) -> list[int]:

@@ -29,9 +29,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.settings import end_with_parent
 from mirotwin.fuzz.engine import counter
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.spec import spec_of
+from mirotwin.shell.processes import end_with_parent
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
@@ -134,7 +135,7 @@ def main(arguments: Sequence[str]) -> int:
     """The process: returns its exit code."""
     beside = arguments[1] if len(arguments) > 1 else ""
     try:
-        target = spec_of(arguments[0]).make()
+        target = make_target(spec_of(arguments[0]))
         if serve(target, counter(Path(f"{beside}.counts")) if beside else lambda executions: None):
             return NOTHING
         return run_once(target, sys.stdin.buffer.read())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import sys
 from collections.abc import Mapping
@@ -10,7 +9,7 @@ from collections.abc import Mapping
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import EngineInput
 from mirotwin.fuzz.spec import MAP_SIZE
-from mirotwin.shell.program import python_module
+from mirotwin.shell.processes import python_module
 
 PROGRAM = "afl-fuzz"
 ANSWER_MS = 10_000
@@ -76,14 +75,3 @@ def missing() -> str | None:
     if shutil.which(PROGRAM) is None:
         return f"{PROGRAM} is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
     return None
-
-
-_SET_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG, `man 2 prctl`
-
-_library = ctypes.CDLL(None) if sys.platform == "linux" else None
-
-
-def end_with_parent(signal: int) -> None:
-    """Has this process get `signal` when its parent ends. Without effect where there is no such thing."""
-    if _library is not None:
-        _library.prctl(_SET_PARENT_DEATH_SIGNAL, signal, 0, 0, 0)

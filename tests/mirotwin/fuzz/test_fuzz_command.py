@@ -15,8 +15,8 @@ from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, plant
 pytestmark = pytest.mark.slow
 
 PROGRAM = """
-import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_output as output
-output.LINE_S = 1.0
+import mirotwin.fuzz.fuzz_command as fuzz
+fuzz.LINE_S = 1.0
 from tests.mirotwin.fuzz.conftest import RandomEngine
 fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (
     RandomEngine(target, inputs, folder.folder("engine"), seed), [])

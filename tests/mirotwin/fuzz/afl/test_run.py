@@ -14,6 +14,7 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import FrameType
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.engine import EngineInput, read_executions, write_seeds
+from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.spec import TargetSpec
 from tests import children
 from tests.mirotwin.fuzz.afl.double import ROOT, WORD, Double, spec
@@ -118,7 +119,7 @@ def test_a_robot_is_fuzzed_from_one_frame(tmp_path):
     frame = encode(TeamFrame(FrameType.TEAM, 1, ((200, 200),) * 3), 3)
     write_seeds(tmp_path / "seeds", [frame])
     given = EngineInput(specification.text(), tmp_path / "seeds", tmp_path / "out")
-    with AflRun(given, specification.make()) as run:
+    with AflRun(given, make_target(specification)) as run:
         first = until(lambda: run.progress().edges, "the frame's edges")
         until(lambda: (run.progress().edges or 0) > first, "an edge more")
         assert run.new_crashes() == []

@@ -1,0 +1,162 @@
+"""What a campaign comes to: counts, coverage, crashes with the line that repeats each, and the files that hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+from rich.table import Table
+
+from miro_exact.bad_input import amount
+from miro_robot.inspect.coverage import branch_share, line_share
+from miro_robot.inspect.lcov import Tracefile
+from mirotwin.firmware.coverage_files import table, write
+from mirotwin.fuzz.campaign import Campaign
+from mirotwin.fuzz.triage import UNCONFIRMED, Crash
+from mirotwin.shell.json_text import json_bytes
+from mirotwin.shell.verdicts import Verdict
+from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
+
+COVERAGE = "coverage.info"
+SUMMARY = "summary.json"
+
+
+class Results:
+    """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
+
+    `check`: FILE.py:FUNCTION of --check.
+    """
+
+    def __init__(self, campaign: Campaign, left: int, complete: bool, check: str | None) -> None:
+        self.campaign = campaign
+        self.left = left
+        self.complete = complete
+        self.check = check
+        self.triage = campaign.triage
+        self.out = campaign.triage.folder.path
+        self.progress = campaign.progress()
+        self.coverage = self.triage.coverage(self.out / COVERAGE, self.triage.reached.total)
+        self.never = never_reached(self.coverage.tracefile)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Failed: something was found, a function was not reached, or a check had no occasion."""
+        missed = self.campaign.covering is not None and self.campaign.reached_by is None
+        unjudged = "not judged" in self._open_checks().values()
+        return "failed" if self.triage.confirmed or missed or unjudged else "passed"
+
+    def overview(self) -> Iterator[str | Table]:
+        """Lines, and a table of the coverage."""
+        campaign, progress = self.campaign, self.progress
+        edges = "" if progress.edges is None else f", {amount(progress.edges, 'edge')}"
+        made = (
+            f"{amount(progress.executions, 'execution')} in {clock(campaign.run_s)} ({campaign.rate:.0f}/s)"
+        )
+        new = f"{amount(campaign.inputs or 'no', 'input')} that found something new"
+        yield f"{self.triage.target.image.path.name}: {made}{edges}, {new}"
+        yield table(self.coverage.tracefile)
+        if self.never:
+            yield f"never reached: {', '.join(self.never)}"
+        if campaign.expected:
+            yield f"{', '.join(campaign.expected)}: judged {amount(campaign.judged or 'no', 'input')}"
+
+    def notes(self) -> Iterator[str]:
+        """What is not as one would wish."""
+        campaign, triage = self.campaign, self.triage
+        if self.left:
+            inputs = amount(self.left, "input of the engine was", "inputs of the engine were")
+            yield f"{inputs} not looked at; a longer --time does"
+        if triage.unrepeated:
+            yield f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again"
+        if campaign.covering is not None and campaign.reached_by is None:
+            inputs = amount(campaign.inputs or "no", "input")
+            what = f"--covering {campaign.covering.name}: not reached by {inputs}"
+            yield f"{what}; give it more --time, or a --corpus"
+        for name, verdict in self._open_checks().items():
+            yield f"expectation {verdict}: {name}: no input that was looked at lets it judge"
+
+    def crashes(self) -> Iterator[str]:
+        """Each crash, and the input that reached a function, with the lines that repeat it."""
+        triage = self.triage
+        yield amount(len(triage.confirmed) or "no", "crash", "crashes")
+        for crash in triage.confirmed:
+            yield from self._crash(crash)
+        if triage.unconfirmed:
+            what = "not confirmed: wrong on the target, right in a World"
+            yield f"{len(triage.unconfirmed)} {what}; kept in {self.out / UNCONFIRMED}"
+            for crash in triage.unconfirmed:
+                yield from self._crash(crash)
+        reached_by, covering = self.campaign.reached_by, self.campaign.covering
+        if reached_by is not None and covering is not None:
+            yield f"--covering {covering.name}: reached by {reached_by}"
+            yield f"    {replay_line(reached_by, foreign_path(triage.target.image))}"
+
+    def write(self) -> None:
+        """The files of the campaign. Raises OutputError."""
+        write(self.coverage.tracefile, self.coverage, self.out / COVERAGE, "--out")
+        self.triage.folder.write("", SUMMARY, json_bytes(self._summary(), indent=2) + b"\n")
+
+    def _open_checks(self) -> dict[str, Verdict]:
+        """The checks of --expect that judged no input."""
+        verdicts = self.campaign.verdicts
+        return {
+            name: "not observable" if "not observable" in found else "not judged"
+            for name, found in verdicts.items()
+            if not found & {"passed", "failed"}
+        }
+
+    def _crash(self, crash: Crash) -> Iterator[str]:
+        where = f" in {crash.function}" if crash.function else ""
+        where += f", which {crash.cause}" if crash.cause else ""
+        more = self.triage.more[crash.name]
+        again = f"; {amount(more, 'more input')}" if more else ""
+        before, after = crash.sizes
+        yield f"  {crash.name}{where}: {crash.verdict} ({amount(after, 'byte')}, found with {before}{again})"
+        check = self.check
+        in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
+        stream = self.out / crash.folder / f"{crash.name}.stream"
+        image = foreign_path(self.triage.target.image)
+        yield f"    {replay_line(stream, image, in_file)}"
+        yield f"    {debug_line(stream, image, check=in_file)}"
+
+    def _summary(self) -> dict[str, Any]:
+        campaign, progress, tracefile = self.campaign, self.progress, self.coverage.tracefile
+        lines, branches = line_share(tracefile), branch_share(tracefile)
+        return {
+            "firmware_sha256": self.triage.target.image.sha256,
+            "complete": self.complete,
+            "run_s": campaign.run_s,
+            "executions": progress.executions,
+            "edges": progress.edges,
+            "inputs": campaign.inputs,
+            "inputs_left": self.left,
+            "inputs_judged": campaign.judged,
+            "unrepeated": self.triage.unrepeated,
+            "lines": msgspec.to_builtins(lines),
+            "branches": msgspec.to_builtins(branches),
+            "functions_never_reached": self.never,
+            "reached_by": None if campaign.reached_by is None else str(campaign.reached_by),
+            "crashes": [
+                {
+                    **msgspec.to_builtins(crash),
+                    "confirmed": crash.confirmed,
+                    "more": self.triage.more[crash.name],
+                }
+                for crash in self.triage.found
+            ],
+        }
+
+
+def never_reached(tracefile: Tracefile) -> list[str]:
+    """Names of functions of which no instruction ran first."""
+    return sorted(
+        name for record in tracefile.values() for name, (_, count) in record.functions.items() if not count
+    )
+
+
+def clock(time_s: float) -> str:
+    """A duration as minutes and seconds, `1:05`, or `2:00:00` with hours."""
+    minutes, seconds = divmod(int(time_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

@@ -1,0 +1,46 @@
+"""Processes of ours: how a module runs in one, on how many cores, and what they must not import or outlive."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_SAFE_PATH = "PYTHONSAFEPATH"
+
+
+def python_module(name: str, *arguments: str) -> list[str]:
+    """The command that runs a module of ours in a new process."""
+    return [sys.executable, "-P", "-m", name, *arguments]
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Processes that begin meanwhile do not import from the current folder, whatever starts them."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
+
+
+_SET_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG, `man 2 prctl`
+
+_library = ctypes.CDLL(None) if sys.platform == "linux" else None
+
+
+def end_with_parent(signal: int) -> None:
+    """Has this process get `signal` when its parent ends. Without effect where there is no such thing."""
+    if _library is not None:
+        _library.prctl(_SET_PARENT_DEATH_SIGNAL, signal, 0, 0, 0)
