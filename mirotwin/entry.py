@@ -16,6 +16,7 @@ from _thread import start_new_thread
 from types import FrameType
 
 INTERRUPTED = 130
+"""As in `shell.verdicts`: nothing is imported here that Ctrl-C could leave half imported."""
 LOADING, RUNNING, ENDED = range(3)
 
 _phase = LOADING

@@ -26,7 +26,7 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import check_new, whole_file
-from mirotwin.shell.program import DONE, FIRMWARE_FAULT, show_line, tell_notes
+from mirotwin.shell.program import show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
 
@@ -86,4 +86,4 @@ def look(options: LookOptions) -> int:
     with whole_file(out, "--out") as staging:
         staging.write_bytes(drawn[0])
     show_line(f"{out}")
-    return FIRMWARE_FAULT if report_faults(world) else DONE
+    return report_faults(world)

@@ -22,16 +22,9 @@ from mirotwin.campaign.workers import Processes
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
 from mirotwin.shell.outputs import told_when_full
-from mirotwin.shell.program import (
-    BAD_INPUT,
-    DONE,
-    EXPECTATION_FAILED,
-    FIRMWARE_FAULT,
-    complain,
-    show_line,
-    tell_notes,
-)
+from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.expectations import Expected, as_settings
 
 LINES = 5
@@ -123,10 +116,10 @@ def _judge(plan: Plan, results: Path) -> int:
     )
     if errors:
         complain(f"{errors} of {plan.runs} runs have an error; {results} says which")
-        return BAD_INPUT
+        return exit_code("error")
     if faults:
         complain(f"{faults} of {plan.runs} runs had firmware faults")
-        return FIRMWARE_FAULT
+        return exit_code("fault")
     if failed + unjudged > plan.allowed_failed_share * plan.runs:
         allowed = f"{100 * plan.allowed_failed_share:g} % may"
         if failed:
@@ -135,7 +128,7 @@ def _judge(plan: Plan, results: Path) -> int:
             complain(
                 f"expectation not judged: {unjudged} of {plan.runs} runs had no occasion for a check; {allowed}"
             )
-        return EXPECTATION_FAILED
+        return exit_code("failed")
     return DONE
 
 

@@ -13,14 +13,15 @@ from rich.table import Table
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.campaign.columns import CHECK
 from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, SHOWN, MetricDifference, differences
-from mirotwin.campaign.rows import UNSETTLED, VERDICTS, Arm, ResultRows, paired, paired_levels
+from mirotwin.campaign.rows import SHARES, UNSETTLED, Arm, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as show_table
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import JSON, PATH, FiniteNumber
-from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
+from mirotwin.shell.program import complain, show_line
+from mirotwin.shell.verdicts import DONE, exit_code
 
 MOST_GROUPS = 50
 """More are in --json only."""
@@ -102,10 +103,10 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
 
 def _groups_table(groups: Sequence[Arm]) -> Table:
     figures = ("of", "median", "95 % interval", "5 %", "95 %", "worst")
-    table = plain_table(*groups[0].factors, "runs", *VERDICTS, "metric", right=figures)
+    table = plain_table(*groups[0].factors, "runs", *SHARES, "metric", right=figures)
     for group in groups:
         head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
-        head += [f"{group.verdicts[name]}" for name in VERDICTS]
+        head += [f"{group.verdicts[name]}" for name in SHARES]
         for name, found in group.metrics.items():
             table.add_row(*head, _labelled(group.metric_label(name)), *_cells(found))
             head = [""] * len(head)
@@ -116,7 +117,7 @@ def _labelled(metric: str) -> str:
     """A metric that is 0 or 1 for each run, with what 1 means."""
     if metric.startswith(CHECK):
         return f"{metric} (1: failed)"
-    return f"{metric} (1: yes)" if metric in (*VERDICTS, UNSETTLED) else metric
+    return f"{metric} (1: yes)" if metric in (*SHARES, UNSETTLED) else metric
 
 
 def _cells(found: Figures | None) -> list[str]:
@@ -177,7 +178,7 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
             complain(f"{unpaired} of {ours_only.count} runs of {where} are not in {there}")
     for one in worse:
         complain(f"worse than {path}: {_sentence(one)}")
-    return EXPECTATION_FAILED if worse else DONE
+    return exit_code("failed" if worse else "passed")
 
 
 def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:

@@ -12,13 +12,14 @@ from miro_sim.scenario.settings import EXPECT
 from mirotwin.campaign.comparison import GATED, SHOWN, differences
 from mirotwin.campaign.design import inline
 from mirotwin.campaign.results import ResultsInfo
-from mirotwin.campaign.rows import VERDICTS, Arm, ResultRows, label_of, paired_levels
+from mirotwin.campaign.rows import SHARES, Arm, ResultRows, label_of, paired_levels
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, render, write_page
 from mirotwin.run.run_options import RunOptions
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import FORCE, NAME, OUT, QUIET
+from mirotwin.shell.verdicts import VERDICTS, judge
 
 
 def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
@@ -62,7 +63,7 @@ def campaign_page(path: Path) -> bytes:
     comparisons = _comparisons(rows, made)
     failed = _failed(rows)
     verdicts, seeds = rows.column("verdict"), rows.column("seed")
-    counts = {name: verdicts.count(name) for name in ("passed", "not judged", *VERDICTS)}
+    counts = {name: verdicts.count(name) for name in ("passed", "not judged", *SHARES)}
     values = {
         "file": path.name,
         "about": rows.about,
@@ -134,15 +135,9 @@ def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
 
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
     """A word, and the numbers after it."""
-    words = {
-        "not judged": "not judged",
-        "failed": "failed",
-        "fault": "with a firmware fault",
-        "error": "with an error",
-    }
-    wrong = [name for name in words if counts[name]]
-    said = ", ".join(f"{counts[name]} {words[name]}" for name in wrong)
-    return ["passed", *wrong][-1], said or f"{counts['passed']} runs passed"
+    wrong = [name for name in reversed(VERDICTS) if name != "passed" and counts.get(name)]
+    said = ", ".join(f"{counts[name]} {VERDICTS[name].badge}" for name in wrong)
+    return judge(wrong), said or f"{counts['passed']} runs passed"
 
 
 def _data(rows: ResultRows) -> bytes:

@@ -19,7 +19,8 @@ from mirotwin.campaign.design import Value, inline
 from mirotwin.campaign.results import read
 from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
 
-VERDICTS = ("failed", "fault", "error")
+SHARES = ("failed", "fault", "error")
+"""Verdicts whose share is a figure."""
 UNSETTLED = "unsettled"
 SETTLING = "settling_s"
 EVERYONE = "all runs"
@@ -73,7 +74,7 @@ class ResultRows:
         """All that `numbers` knows; results of another version may have fewer."""
         there = set(self.table.column_names)
         figures = [name for name in FIGURES if name in there and name not in NOT_FIGURES]
-        return [*figures, *VERDICTS, UNSETTLED, *(CHECK + name for name in self.about.checks)]
+        return [*figures, *SHARES, UNSETTLED, *(CHECK + name for name in self.about.checks)]
 
     def check_metric(self, name: str) -> str:
         """Raises BadInput for a name that is no metric of these rows."""
@@ -92,7 +93,7 @@ class ResultRows:
 
     def numbers(self, name: str) -> Numbers:
         """One for each row; NaN where a run does not have it."""
-        if name in VERDICTS:
+        if name in SHARES:
             found = [verdict == name for verdict in self.column("verdict")]
         elif name == UNSETTLED:
             found = [None if settled is None else not settled for settled in self.column("settled")]
@@ -140,7 +141,7 @@ class ResultRows:
             arm = Arm(
                 factors=dict(zip(by, levels, strict=True)),
                 runs=len(members),
-                verdicts={name: counted.count(name) for name in VERDICTS},
+                verdicts={name: counted.count(name) for name in SHARES},
                 never_settled=[settled[row] for row in members].count(False),
                 metrics={name: figures(columns[name][of], seeds[of]) for name, of in there.items()},
             )

@@ -23,7 +23,7 @@ from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
-from mirotwin.shell.verdicts import worst
+from mirotwin.shell.verdicts import judge
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.monitors import Checks
@@ -104,8 +104,8 @@ def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorde
 
 
 def _verdicts(judges: Iterable[Checks]) -> dict[str, str]:
-    """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
+    """Those of the run, and of checks that steps began; a name that is there twice has its judge verdict."""
     found: dict[str, str] = {}
     for one in (one for group in judges for one in group.verdicts()):
-        found[one.name] = worst([found.get(one.name, one.verdict), one.verdict])
+        found[one.name] = judge([found.get(one.name, one.verdict), one.verdict])
     return found

@@ -24,9 +24,9 @@ from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, QUIET, SEED, Engine, StackFrom
 from mirotwin.shell.outputs import check_file, whole_file
-from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
+from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.shell.verdicts import VERDICTS, Verdict, worst
+from mirotwin.shell.verdicts import DONE, VERDICTS, Verdict, exit_code
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
     case_lines,
@@ -181,7 +181,7 @@ def conform(options: ConformOptions) -> int:
             part.write_bytes(junit_xml("mirotwin conform", cases, properties))
     if lost is not None:
         raise lost
-    return code or VERDICTS[worst(_counting(one, bool(options.ids)) for one in outcomes)].code
+    return code or exit_code(*(_counting(one, bool(options.ids)) for one in outcomes))
 
 
 def _counting(outcome: Outcome, named: bool) -> Verdict:
@@ -214,7 +214,7 @@ def _explain(rule: Rule, firmware: Image, seed: int) -> int:
     lines, failed, faults = explain(rule, firmware, seed)
     for line in lines:
         show_line(line)
-    return FIRMWARE_FAULT if faults else EXPECTATION_FAILED if failed else DONE
+    return exit_code("fault" if faults else "failed" if failed else "passed")
 
 
 def _make_room(folder: Path, rules: Sequence[Rule]) -> None:
@@ -324,4 +324,4 @@ def _report_faults(outcomes: Sequence[Outcome]) -> int:
     more = sum(outcome.fault_count for outcome in outcomes) - len(faults)
     if more:
         complain(f"{amount(more, 'more firmware fault')} in these trials")
-    return FIRMWARE_FAULT if faults else DONE
+    return exit_code("fault" if faults else "passed")

@@ -17,7 +17,8 @@ from mirotwin.debug.subject import DebugSubject, open_subject
 from mirotwin.debug.wire import Wire
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.options import Whole
-from mirotwin.shell.program import BAD_INPUT, DONE, complain, show_line
+from mirotwin.shell.program import complain, show_line
+from mirotwin.shell.verdicts import BAD_INPUT, DONE
 
 COMMAND = Option(
     "-x", metavar="COMMAND", apart="dap", help="Do this command of the console, then end; may be repeated."

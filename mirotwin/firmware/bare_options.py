@@ -18,8 +18,9 @@ from mirotwin.firmware.code_place import address_of, check_code_at, place_of
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole
-from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
+from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.verdicts import exit_code
 
 STDIN = "-"
 _SCON, _NINE_BITS = 0x98, 0x80
@@ -206,17 +207,17 @@ def _start(image: Image, options: BareOptions) -> int:
 
 def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
     """Says on stderr why a run ended that did not end as planned; returns the exit code."""
-    code = DONE
+    verdict = "passed"
     for fault in machine.faults:
         complain(f"firmware fault: {fault}")
     if machine.faults_lost:
         complain(f"firmware faults: {machine.faults_lost} more are not listed")
     if ended is Ended.CYCLES:
         complain(f"stopped at the limit, at {stopped_at(machine)}")
-        code = LIMIT_REACHED
+        verdict = "limit"
     elif ended is Ended.HALTED:
         complain(f"the program ended at {stopped_at(machine)}; no interrupt can wake it")
-        code = DONE if options.until is None else EXPECTATION_FAILED
+        verdict = "passed" if options.until is None else "failed"
     if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
         complain(f"addresses have no names: {machine.image.symbols.problem}")
     waiting = machine.input.waiting_for
@@ -237,7 +238,7 @@ def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
             f"--code-in-xram: the program has overwritten {amount(len(changed), 'byte')} of its image, "
             f"the first at {changed[0]:#06x}"
         )
-    return FIRMWARE_FAULT if machine.faults else code
+    return exit_code(verdict, *("fault" for _ in machine.faults))
 
 
 def stopped_at(machine: BareMachine) -> str:

@@ -19,8 +19,9 @@ from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.capture.source import READ_ERRORS, Source, open_source
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import JSON, NAME, QUIET, Engine
-from mirotwin.shell.program import DONE, complain
+from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import DONE
 
 DIRECTIONS = {"down": DOWN, "up": UP}
 

@@ -9,7 +9,8 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS, NEVER_TIC
 from miro_sim.periods import Period
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.recorder import Recorder
-from mirotwin.shell.program import DONE, FIRMWARE_FAULT, complain
+from mirotwin.shell.program import complain
+from mirotwin.shell.verdicts import DONE, exit_code
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World  # a hot module: not before the engine was chosen
@@ -73,7 +74,7 @@ def report_faults(world: World, to_tick: int = NEVER_TICK) -> int:
     for robot in world.robots:
         faults = [fault for fault in robot.board.faults if fault.tick <= to_tick]
         if faults:
-            code = FIRMWARE_FAULT
+            code = exit_code("fault")
             more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
             complain(f"firmware fault: net{robot.network}/robot{robot.slot}: {faults[0]}{more}")
     return code

@@ -36,7 +36,8 @@ from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.options import ALL, NAME, QUIET, Engine, plain_parameters
 from mirotwin.shell.outputs import file_in
-from mirotwin.shell.program import DIVERGENCE, DONE, complain
+from mirotwin.shell.program import complain
+from mirotwin.shell.verdicts import DONE, exit_code
 
 
 class SourceDifference(Record, frozen=True):
@@ -320,7 +321,7 @@ def _verdict(
 ) -> int:
     code = DONE
     if found:
-        code = DIVERGENCE
+        code = exit_code("differs")
         complain(f"the recordings differ in control period {exact.period}, {found[0].said(WORDS)}")
         if exact.state is not None:
             complain(f"their states differ from {exact.state} on")
@@ -328,7 +329,7 @@ def _verdict(
             print_firmwares(exact.instruction, WORDS)
     shorter, longer = sorted(periods, key=len)
     if len(shorter) != len(longer) and compare.rule.to_tick is None:
-        code = DIVERGENCE
+        code = exit_code("differs")
         complain(f"A has {amount(len(periods[0]), 'control period')}, B has {len(periods[1])}")
     for note in notes:
         complain(note)

@@ -35,8 +35,9 @@ from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom, plain_parameters
 from mirotwin.shell.outputs import RECORDINGS, file_in
-from mirotwin.shell.program import DIVERGENCE, DONE, complain
+from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_path
@@ -261,10 +262,10 @@ def _verdict(
         complain(f"the replay differs in control period {found[0].period}, {found[0]}")
         if apart is not None:
             print_firmwares(apart)
-        return DIVERGENCE
+        return exit_code("differs")
     if periods is not None and len(replayed) < periods:
         complain(f"the replay ended after {len(replayed)} of {periods} recorded control periods")
-        return DIVERGENCE
+        return exit_code("differs")
     if not compare.as_json:
         how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         count = compare.rule.compared(replayed)

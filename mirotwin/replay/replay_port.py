@@ -23,8 +23,9 @@ from mirotwin.report.page.port_page import beside_twin
 from mirotwin.rerun.job import Job, sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.outputs import RECORDING, OutputFolder
-from mirotwin.shell.program import DIVERGENCE, DONE, NOTHING_JUDGED, complain
+from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import exit_code
 from mirotwin.verify.cases.case import tables_of
 
 WORDS = ("robot", "twin")
@@ -117,7 +118,7 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
     comparison = beside_twin(job, quiet or as_json, rule)
     found = comparison.differences
     count = sum(map(len, comparison.robots.values()))
-    code = DIVERGENCE if found else DONE if count else NOTHING_JUDGED
+    code = exit_code("differs" if found else "passed" if count else "not observable")
     if as_json:
         head = {"file": job.file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
         head["not_judged"] = comparison.not_judged

@@ -23,8 +23,9 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine
 from mirotwin.shell.outputs import check_new, whole_file
-from mirotwin.shell.program import BAD_INPUT, DONE, complain
+from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import BAD_INPUT, DONE
 
 
 def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:

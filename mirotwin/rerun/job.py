@@ -38,7 +38,7 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
-from mirotwin.shell.verdicts import worst
+from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import image_beside
 from mirotwin.verify.cases.rerun import CaseVerdict, Rerun, rerun, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
@@ -269,7 +269,7 @@ class Job(msgspec.Struct, frozen=True):
     def verdict_of_case(self, checks: Checks) -> CaseVerdict:
         """What the checks that it names say this time, or all where it has no verdict; `checks` were there."""
         named = [one.verdict for one in checks.verdicts() if one.name in checks.named]
-        verdict = worst(named) if self.case.verdict else checks.verdict()
+        verdict = judge(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
         return verdict_of(self.case.verdict, checks.failures, self.case.changed, verdict, why)
 

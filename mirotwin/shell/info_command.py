@@ -11,7 +11,8 @@ from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.console import facts_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import FIRMWARE, Engine
-from mirotwin.shell.program import BAD_INPUT, DONE, complain
+from mirotwin.shell.program import complain
+from mirotwin.shell.verdicts import BAD_INPUT, DONE
 
 PACKAGES = (
     "numpy", "msgspec", "click", "rich", "mcap", "pillow", "pyserial", "crcmod-plus", "pyvcd",

@@ -22,28 +22,13 @@ import click
 
 from miro_exact.bad_input import BadInput, did_you_mean, one_line, shortened
 from miro_exact.engine import EngineError, select
+from mirotwin.shell.verdicts import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED, SIGNALLED, SIGPIPE
 
 
 def show_traceback(error: BaseException) -> None:
     """Writes it to stderr, if it is wanted. For plug-ins: an error that nothing caused has no more to say."""
     if error.__cause__ is not None and os.environ.get("MIROTWIN_TRACEBACK"):
         sys.stderr.write("".join(traceback.format_exception(error)))
-
-
-DONE = 0
-EXPECTATION_FAILED = 1
-BAD_INPUT = 2
-FIRMWARE_FAULT = 3
-DIVERGENCE = 4
-NOTHING_JUDGED = 5
-"""As pytest's, where no test was collected."""
-LIMIT_REACHED = 42
-INTERNAL_ERROR = 70
-"""EX_SOFTWARE of sysexits.h."""
-INTERRUPTED = 130
-SIGPIPE = 13
-SIGNALLED = 128
-"""Plus the number of the signal: what a shell reports for a program that a signal ended."""
 
 
 class Terminated(BaseException):

@@ -25,7 +25,7 @@ from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.outputs import check_file, whole_file
 from mirotwin.shell.program import show_line, tell_notes
-from mirotwin.shell.verdicts import VERDICTS, worst
+from mirotwin.shell.verdicts import VERDICTS, exit_code
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_bare_case
@@ -245,7 +245,7 @@ def _summary(outcomes: Sequence[Outcome]) -> int:
     if unseen := sum(one.unseen for one in outcomes):
         said += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
     show_line(said)
-    return VERDICTS[worst(counted)].code
+    return exit_code(*counted)
 
 
 def _test_case(outcome: Outcome, time_s: float) -> TestCase:

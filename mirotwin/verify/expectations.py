@@ -13,7 +13,7 @@ from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
 from mirotwin.recording.runner import report_faults
 from mirotwin.shell.command import Option
 from mirotwin.shell.program import complain
-from mirotwin.shell.verdicts import VERDICTS, Verdict, worst
+from mirotwin.shell.verdicts import VERDICTS, Verdict, judge
 from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.monitors import Checks
@@ -113,4 +113,4 @@ def verdict_of_run(checks: Checks, player: Player | None) -> Verdict:
     if player is None:
         return checks.verdict()
     step = "passed" if player.failure is None else "failed"
-    return worst([checks.verdict(), step, *(group.verdict() for group in player.checks)])
+    return judge([checks.verdict(), step, *(group.verdict() for group in player.checks)])

@@ -35,8 +35,9 @@ from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.held_signals import Hold, held_signals
 from mirotwin.shell.options import FORCE, JOBS, OUT, QUIET, Engine
 from mirotwin.shell.outputs import OutputError, OutputFolder, check_new, told_when_full, whole_file
-from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
+from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.verdicts import exit_code
 
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
@@ -148,4 +149,4 @@ def _failures(found: Sequence[RunRow]) -> int:
         complain(f"{len(failed)} of {len(found)} runs failed; {ROWS} says which")
     if faults := sum(row.faults for row in found):
         complain(f"{faults} firmware faults; rows.csv says in which runs")
-    return BAD_INPUT if failed else FIRMWARE_FAULT if faults else DONE
+    return exit_code("error" if failed else "fault" if faults else "passed")

@@ -12,7 +12,8 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.report.page.bokeh_page import document_json, island, javascript, require_bokeh
 from mirotwin.shell.outputs import check_new, whole_file
-from mirotwin.shell.program import DONE, show_line
+from mirotwin.shell.program import show_line
+from mirotwin.shell.verdicts import DONE
 
 MOST_BYTES = 50_000_000
 """Of a page: browsers take more, people and mail do not."""

@@ -29,7 +29,7 @@ from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, trac
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 from mirotwin.rerun.job import Job
 from mirotwin.shell.json_text import json_bytes
-from mirotwin.shell.verdicts import worst
+from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.case import tables_of
 
 SILENT = "silent"
@@ -145,15 +145,13 @@ def _verdict(material: Material) -> tuple[str, str]:
     failed = [one for one in verdicts if one.verdict == "failed"]
     count = amount(len(verdicts), "check")
     of = f"{len(failed)} of {count} failed" if failed else count
-    if again.faults:
-        return "fault", of
-    if material.verdict:
+    if material.verdict and not again.faults:
         return material.verdict, f"no check, but what its report says; {count}"
-    if failed or (steps is not None and steps.failed):
-        return "failed", of
-    if material.extras.broken_off:
+    parts: list[str] = [again.verdict, *(one.verdict for one in verdicts[len(again.verdicts) :])]
+    parts += [*("fault" for _ in again.faults), *("failed" for _ in (steps.failed if steps else ""))]
+    verdict = judge(parts)
+    if material.extras.broken_off and verdict not in ("fault", "failed"):
         return "broken off", of
-    verdict = worst([again.verdict, *(one.verdict for one in verdicts[len(again.verdicts) :])])
     return verdict, of
 
 

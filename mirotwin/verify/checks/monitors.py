@@ -31,7 +31,7 @@ from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.shell.verdicts import Verdict, worst
+from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_of, named_in
 from mirotwin.verify.checks.interface import (
     Check,
@@ -170,11 +170,13 @@ class Checks:
 
     def verdict(self) -> Verdict:
         """Of all checks together. Those that are always on, and are named by nobody, need no occasion."""
-        if any(failure.fault for failure in self.failures):
-            return "fault"
-        optional = "not judged" if self.ended_early else ""
-        found = [one for one in self.verdicts() if one.name in self.named or one.verdict != "not judged"]
-        return worst(one.verdict for one in found if one.verdict != optional)
+        faults = ["fault" for one in self.failures if one.fault]
+        named = () if self.ended_early else self.named
+        found = self.verdicts()
+        return judge(
+            [*faults, *(one.verdict for one in found if one.name in named)],
+            (one.verdict for one in found if one.name not in named),
+        )
 
 
 class _RobotMonitors:
