@@ -25,8 +25,7 @@ from mirotwin.conform.run import Outcome, in_order
 from mirotwin.conform.trial import trial_of
 from mirotwin.conform.trial_script import Found, Frame, How, Pairs, TrialScript
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.desk.robot_port import RobotPort
-from mirotwin.shell.program import complain
+from mirotwin.desk.robot_port import Note, RobotPort
 from mirotwin.verify.checks.interface import Failure
 
 _REASONS = {
@@ -85,13 +84,13 @@ class PortScript(TrialScript):
         return frame
 
 
-def try_at_port(rules: Sequence[Rule], desk: DeskOptions) -> Iterator[Outcome]:
-    """Each as soon as it is known. Raises BadInput where no robot answers, PortError."""
-    with RobotPort(desk, trial_of(rules[0]).scenario) as port:
+def try_at_port(rules: Sequence[Rule], desk: DeskOptions, note: Note) -> Iterator[Outcome]:
+    """Each as soon as it is known. `note`: gets what else to say. Raises BadInput where no robot answers, PortError."""
+    with RobotPort(desk, trial_of(rules[0]).scenario, note=note) as port:
         topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
         if len(port.slots) > 1:
             who = " and ".join(map(str, port.slots))
-            complain(f"{desk.port}: robots {who} answer; robot {port.slots[0]} is tried")
+            note(f"{desk.port}: robots {who} answer; robot {port.slots[0]} is tried")
 
         def tried(rule: Rule) -> Outcome:
             if rule.id in NOT_OBSERVABLE:

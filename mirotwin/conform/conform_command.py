@@ -147,7 +147,7 @@ def conform(options: ConformOptions) -> int:
         from mirotwin.conform.by_answers import try_at_port  # loads pyserial
 
         properties = {"port": at_port}
-        tried = try_at_port(rules, options.desk)
+        tried = try_at_port(rules, options.desk, complain)
     else:
         firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
         if options.explain is not None:

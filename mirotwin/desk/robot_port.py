@@ -1,4 +1,4 @@
-"""Robots behind a serial port of this PC, under the names of a `World`: what a PC can do with them and see of them.
+"""Robots behind a serial port of this PC as a `Machine`: what a PC can do with them and see of them.
 
     with RobotPort(desk, scenario) as port:      opened; at the end, whatever happened: stop frames
         port.greet()                             who is there; tick 0 is now
@@ -6,7 +6,7 @@
         port.run_until(Answer(slot=0), within=ms(80))
 
 Ticks are 24 in a microsecond of the wall clock (`miro://` without `realtime` has its own), and an event is known when
-its characters are there. What needs a robot's inside, or a switch on it, raises NotObservable.
+its characters are there. What needs a robot's inside, or a switch on it, raises NotObservable: `LACKS` says why.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from types import TracebackType
+from typing import Any, BinaryIO, NoReturn
 from urllib.parse import urlsplit
 
 import msgspec
@@ -27,6 +27,7 @@ import serial
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
+from miro_protocol.actions import Action
 from miro_protocol.decoder import Decoder, TelemetryDecoder
 from miro_protocol.events import Event as Decoded
 from miro_protocol.events import Received
@@ -34,22 +35,25 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import FRESH_AGAIN_TICKS, SEQ_MODULUS, FrameType
 from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
 from miro_sim.periods import Period
-from miro_sim.scenario.keys import Scenario
-from miro_sim.world.conditions import Answer, Condition, Heard, Sent, answer_of
+from miro_sim.scenario.keys import NetworkSpec, Scenario
+from miro_sim.world.conditions import Condition, answer_of
 from miro_sim.world.events import Cursor, Event, HostLog
+from miro_sim.world.machine import Feature, NotObservable, require
+from miro_sim.world.robot import Robot
 from miro_sim.world.waits import Waits
 from mirotwin.desk.guard import DeskOptions, Guard
-from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.shell.held_signals import held_signals
-from mirotwin.shell.program import complain
-
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
 
 PORT = "port"
 """`source` of a recording that was made here."""
-SEEN = (Answer, Heard, Sent)
-"""The conditions that a PC can see."""
+LACKS: dict[Feature, str] = {
+    "bad stop": "on a port: no serial port sends a bad stop bit",
+    "inside": "on a port: it is inside the robot",
+    "switch": "on a port: only a twin has such a switch",
+    "save": "on a port: only a twin can be saved",
+}
+"""What a PC can neither do nor see, and why."""
 BAUD = 9600
 BLOCKED_S = 1.0
 """A port that takes no characters for so long is blocked: its buffers are full, and no program reads them."""
@@ -94,28 +98,29 @@ _REMEDIES = {
 }
 
 
+Note = Callable[[str], object]
+
+
+def _ignore(line: str) -> None:
+    pass
+
+
 class PortError(BadInput):
     """A port that cannot be opened, or is there no more."""
 
 
-class NotObservable(Exception):
-    """Something of a robot that no port shows."""
+class PortNetwork(msgspec.Struct, frozen=True):
+    """The network of a port. A PC sees no robot from inside."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"{what}: not observable on a port")
-
-
-def check_observable(scenario: Scenario) -> None:
-    """Raises NotObservable for a test that needs more than the one network of a port, and a PC that sees no pitch."""
-    if len(scenario.networks) > 1:
-        raise NotObservable(f"{len(scenario.networks)} networks, of which a port is one")
-    if scenario.networks[0].host != "silent":
-        raise NotObservable("a controller, which needs a camera")
+    spec: NetworkSpec
+    log: HostLog
+    index: int = 0
+    robots: tuple[Robot, ...] = ()
 
 
 class RobotPort:
     """The robots at `desk.port`, in a network and for a duration as in `scenario`. `name`: of what is sent, in errors.
-    `recorder`: to be set where it is recorded.
+    `note`: gets what else to say, a line each.
 
     `wire`: what went out, and whole answers and the characters between them, as they came; its ticks count from the
     opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
@@ -124,16 +129,23 @@ class RobotPort:
     `dropped`: characters that came faster than a line carries them.
     """
 
-    def __init__(self, desk: DeskOptions, scenario: Scenario, name: str = "") -> None:
+    lacks = LACKS
+    clock = TICKS_PER_SECOND
+    image = None
+    robots: tuple[Robot, ...] = ()
+    in_period = stopped = False
+
+    def __init__(self, desk: DeskOptions, scenario: Scenario, name: str = "", note: Note = _ignore) -> None:
         assert desk.port is not None
         self.url = desk.port
         self.guard = Guard(desk, name)
         self.scenario = scenario
+        self.note = note
         self.recorder: Recorder | None = None
         spec = scenario.networks[0]
         self.log = HostLog(0, lambda tick: tick, spec.robots)
-        self.robots = ()  # a PC sees none from inside
-        self.networks = [SimpleNamespace(spec=spec, log=self.log, index=0, robots=self.robots)]
+        self.networks = (PortNetwork(spec, self.log),)
+        self.waits = Waits(self)
         self.observers: list[Callable[[Period], object]] = []
         self.wire: list[Transmission] = []
         self.late_ticks: list[int] = []
@@ -141,7 +153,7 @@ class RobotPort:
         self.delays: list[int] = []
         self._asked: dict[int, int] = {}
         self.began_tick = self.free_tick = 0
-        self.in_period = self.stopped = self.prompt = self._blocked = False
+        self.prompt = self._blocked = False
         self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
         self._heard_tick = self._end_tick = self._recorded = self._came = self.dropped = 0
@@ -153,7 +165,9 @@ class RobotPort:
         self.prompt = not self._virtual and realtime_priority()
         return self
 
-    def __exit__(self, *raised: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         with held_signals():
             self.stop()
             realtime_priority(False)
@@ -161,9 +175,11 @@ class RobotPort:
             self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
             with suppress(*PORT_ERRORS):
                 self._serial.close()
+            if self.recorder is not None:
+                self.recorder.__exit__(kind, error, trace)
         if self.dropped:
             count = amount(self.dropped, "character is", "characters are")
-            complain(f"{self.url}: {count} left out, which came faster than {BAUD} baud carries")
+            self.note(f"{self.url}: {count} left out, which came faster than {BAUD} baud carries")
 
     # ---- time --------------------------------------------------------------------------------------------
 
@@ -195,26 +211,26 @@ class RobotPort:
     def run_for(self, for_ticks: int) -> None:
         self.run_to(self.tick + for_ticks)
 
-    def run_until(self, condition: Condition, *others: Condition, within: int | None = None) -> Event:
-        for one in (condition, *others):
-            if not isinstance(one, SEEN):
-                raise NotObservable(f"{one}")
-        return self.waits.until([condition, *others], within)
+    def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event:
+        return self.waits.until([condition] if isinstance(condition, Condition) else condition, within)
 
     def run_piece(self, tick: int) -> None:
         """For `Waits`: until then, but no longer than to the next characters that come."""
         self._take(self._read(max(0, tick - self.tick)))
 
     def begin_period(self) -> None:
-        """For `Waits`, as the next three: time only goes on here, and what came is in the log."""
+        """For `Waits`, as the next four: time only goes on here, and what came is in the log."""
+
+    def end_period(self) -> None:
+        pass
 
     def rendezvous(self, tick: int) -> int:
         return tick
 
-    def mark(self) -> RobotPort:
-        return self
+    def mark(self) -> None:
+        pass
 
-    def go_back(self, mark: RobotPort) -> None:
+    def go_back(self, mark: None) -> None:
         pass
 
     # ---- sending -----------------------------------------------------------------------------------------
@@ -226,8 +242,7 @@ class RobotPort:
         self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: Sequence[int] = ()
     ) -> int:
         """Sends now, or waits until `at_tick` first; the tick of the first start bit. Raises BadInput, PortError."""
-        if bad_stop:
-            raise NotObservable("a character with a bad stop bit")
+        require(self, "a transmission", "bad stop" if bad_stop else None)
         if at_tick is not None:
             self.run_to(at_tick)
         numbers = self.guard.check(data, f"tick {self.tick}")
@@ -247,6 +262,16 @@ class RobotPort:
         tick = sent.tick - self.began_tick
         self.log.note(Event(tick=tick, what="sent", data=data))
         return tick
+
+    @property
+    def earliest_action_tick(self) -> int:
+        return self.tick
+
+    def do(self, action: Action) -> NoReturn:
+        raise NotObservable(f"{type(action).__name__}: not observable {LACKS['switch']}")
+
+    def robot(self, network: int = 0, slot: int = 0) -> NoReturn:
+        raise NotObservable(f"net{network}/robot{slot}: not observable {LACKS['inside']}")
 
     def play(self, sent: Iterable[Transmission], each: Callable[[int], object] = lambda tick: None) -> None:
         """Sends these at their ticks, and reads meanwhile and a little longer; `each` is told how far it is."""
@@ -289,7 +314,7 @@ class RobotPort:
             if counted := self._who_answers(robots, sent):
                 self.slots, self._counted = tuple(sorted(counted)), counted
                 self.began_tick = self._now
-                self.waits = Waits(cast("World", self))
+                self.waits.forget()
                 return robots
         self._keep(self._decoder.flush(), self._heard_tick)
         raise BadInput(self.url, "", *self._why_nobody(sizes, first))
@@ -403,6 +428,10 @@ class RobotPort:
 
     # ---- a recording like any other ----------------------------------------------------------------------
 
+    def record(self, stream: BinaryIO, source: RunSource) -> None:
+        """Records from the opening on, until the port is closed. `source`: of the twin."""
+        self.recorder = Recorder(stream, source)
+
     def _record(self, until_tick: int) -> None:
         """Writes the periods that are over by then: what is broken off is there up to there."""
         if self.recorder is None:
@@ -419,10 +448,19 @@ class RobotPort:
             self.recorder.flush_if_due()
         del self.wire[:done]
 
-    def __getattr__(self, name: str) -> NoReturn:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        raise NotObservable(f"`{name}` of a robot's world")
+
+@contextmanager
+def port_for_test(desk: DeskOptions, scenario: Scenario, name: str, note: Note) -> Iterator[RobotPort]:
+    """Robots that a test may speak to. Raises NotObservable for a test that needs more than the one network of a port,
+    and a PC that sees no pitch; BadInput, PortError.
+    """
+    if (count := len(scenario.networks)) > 1:
+        raise NotObservable(f"{count} networks: not observable on a port, which is the radio of one")
+    if scenario.networks[0].host != "silent":
+        raise NotObservable("a controller, which needs a camera: not observable on a port")
+    with RobotPort(desk, scenario, name, note) as port:
+        port.greet()
+        yield port
 
 
 def _check_address(url: str, scheme: str) -> None:

@@ -17,7 +17,7 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort
 from mirotwin.recording.compare import CompareRule
-from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.recording.recorder import RunSource
 from mirotwin.replay.differences import differences_as_json, print_differences, print_json
 from mirotwin.report.page.port_page import beside_twin
 from mirotwin.rerun.job import Job, sent_in
@@ -49,10 +49,9 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     with (
         folder,
         folder.part(RECORDING).open("wb") as stream,
-        Recorder(stream, source) as recorder,
-        RobotPort(desk, job.scenario, job.file) as port,
+        RobotPort(desk, job.scenario, job.file, complain) as port,
     ):
-        port.recorder = recorder
+        port.record(stream, source)
         port.greet(sent=sent)
         folder.keep = (RECORDING,)  # of a talk that was broken off
         shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS

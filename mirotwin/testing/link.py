@@ -13,12 +13,13 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_protocol.actions import RadioState
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
 from miro_sim.world.conditions import Answer, Condition, Heard, answer_of
 from miro_sim.world.events import Cursor, Event
+from miro_sim.world.machine import Machine
 from miro_sim.world.waits import WaitExpired, Waits
-from miro_sim.world.world import World
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.frame_sender import FrameSender
@@ -41,15 +42,15 @@ class SentFrame(msgspec.Struct, frozen=True):
 class Link(FrameSender):
     """The host's end of `network`. Sequence numbers count by themselves; `velocities` are those that were sent last."""
 
-    def __init__(self, world: World, network: int = 0) -> None:
-        super().__init__(world, network, -1)
+    def __init__(self, machine: Machine, network: int = 0) -> None:
+        super().__init__(machine, network, -1)
         self.answers: list[tuple[int, TelemetryFrame]] = []
         """(tick, answer) of all that were heard."""
-        self._waits = Waits(world)
-        self._cursor = Cursor(world.networks[network].log)
+        self._waits = Waits(machine)
+        self._cursor = Cursor(machine.networks[network].log)
         self._open: list[TelemetryFrame] = []
         self._characters: list[Event] = []
-        world.observers.append(lambda period: self._gather())
+        machine.observers.append(lambda period: self._gather())
 
     # Sending
 
@@ -74,14 +75,14 @@ class Link(FrameSender):
         number: int | None = None
         if isinstance(frame, bytes | bytearray):
             data = bytes(frame)
-            tick = self.world.inject(data, self.network, at_tick, tuple(bad_stop))
+            tick = self.machine.inject(data, self.network, at_tick, tuple(bad_stop))
         else:
             message = self._of_slots(velocities, ask, seq) if frame is None else frame
             number, data = message.seq, encode(message, self.robots)
             tick = self.put(message, at_tick, bad_stop)
         sent = SentFrame(tick, tick + len(data) * HOST_CHARACTER_TICKS, number, data)
         if wait:
-            self.world.run_to(sent.end_tick)
+            self.machine.run_to(sent.end_tick)
         return sent
 
     def _of_slots(self, velocities: Velocities | None, ask: bool, seq: int | None) -> TeamFrame:
@@ -106,11 +107,11 @@ class Link(FrameSender):
     @shown_where_it_was_called
     def drive(self, velocities: Velocities, for_ticks: int) -> None:
         """Sends `velocities` once a control period (33.4 ms) for so long, and lets the last period pass."""
-        end_tick = self.world.tick + for_ticks
-        while self.world.tick < end_tick:
-            begun = self.world.tick
+        end_tick = self.machine.tick + for_ticks
+        while self.machine.tick < end_tick:
+            begun = self.machine.tick
             self.send(velocities=velocities)
-            self.world.run_to(min(begun + CONTROL_PERIOD_TICKS, end_tick))
+            self.machine.run_to(min(begun + CONTROL_PERIOD_TICKS, end_tick))
 
     def ping(self, slot: int = 0) -> SentFrame:
         """A service frame that changes nothing."""
@@ -125,7 +126,8 @@ class Link(FrameSender):
 
     def radio(self, state: Literal["up", "down", "noise"]) -> None:
         """Lets the radio of the network work, be off, or give noise, from now on."""
-        self.world.run_to(self.world.set_radio(state, self.network))
+        action = RadioState(self.machine.earliest_action_tick, self.network, state)
+        self.machine.run_to(self.machine.do(action))
 
     # Hearing
 
@@ -176,7 +178,7 @@ class Link(FrameSender):
         self, taken: Callable[[], T | None], condition: Condition, within: int, what: str, judged: bool = True
     ) -> T:
         """What `taken` gives now, or after an event of this condition. Raises WaitFailed when the time is over."""
-        begun_tick, left = self.world.tick, within
+        begun_tick, left = self.machine.tick, within
         seen: list[Event] = []
         while True:
             self._gather()
@@ -185,23 +187,23 @@ class Link(FrameSender):
             try:
                 seen.append(self._waits.until([condition], left))
             except WaitExpired as expired:
-                raise WaitFailed.of(expired, self.world, what, begun_tick, seen, judged) from None
-            left = max(0, begun_tick + within - self.world.tick)
+                raise WaitFailed.of(expired, self.machine, what, begun_tick, seen, judged) from None
+            left = max(0, begun_tick + within - self.machine.tick)
 
     @shown_where_it_was_called
     def expect_silence(self, for_ticks: int) -> None:
         """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
-        begun_tick = self.world.tick
+        begun_tick = self.machine.tick
         end_tick = begun_tick + for_ticks
         what = f"silence for {for_ticks / 24_000:g} ms"
         silence = Heard(network=self.network)
         event = None
         while event is None or event.tick <= begun_tick:
             try:
-                event = self._waits.until([silence], max(0, end_tick - self.world.tick))
+                event = self._waits.until([silence], max(0, end_tick - self.machine.tick))
             except WaitExpired as expired:
                 if expired.tick < end_tick:
-                    raise WaitFailed.of(expired, self.world, what, begun_tick, judged=False) from None
+                    raise WaitFailed.of(expired, self.machine, what, begun_tick, judged=False) from None
                 return
         expect = expect_of("never_happens", silence, begun_tick, end_tick)
         raise WaitFailed(f"{what}: broken", begun_tick, event.tick, [event], expect)
@@ -210,7 +212,7 @@ class Link(FrameSender):
         """Reads what the PC has heard by now."""
         cursor = self._cursor
         for serial, event in cursor.log.since(cursor.next):
-            if event.what in ("heard", "answer") and event.tick > self.world.tick:
+            if event.what in ("heard", "answer") and event.tick > self.machine.tick:
                 break
             cursor.next = serial + 1
             if event.what == "heard":

@@ -6,23 +6,24 @@ pytest --mirotwin-port=/dev/ttyUSB0 --mirotwin-allow-motion
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from functools import partial
+from typing import Any, NoReturn
 
 import pytest
 
 from miro_exact.bad_input import BadInput
+from miro_sim.world.machine import NotObservable, why_not
 from miro_sim.world.waits import WaitExpired
+from miro_sim.world.world import World
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.desk.robot_port import NotObservable, RobotPort, check_observable
+from mirotwin.desk.robot_port import LACKS, RobotPort, port_for_test
 from mirotwin.testing.link import Link
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.rig_options import rig_options
 
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
-
 NAME = "mirotwin-port"
 """Of the plugin that has these fixtures."""
+OF_A_TWIN = {*dir(World), *World.STATE, *World.NOT_STATE}
 
 
 def desk_of(config: pytest.Config) -> DeskOptions:
@@ -46,12 +47,10 @@ class PortFixtures:
         try:
             marks = request.node.iter_markers("mirotwin")
             asked = rig_options(marks, request.node.path.parent, None, _mirotwin_seed)
-            check_observable(asked.scenario)
-            if asked.scenario.expect:
-                names = ", ".join(asked.scenario.expect)
-                request.node.add_report_section("call", "mirotwin", f"{names}: not observable on a port")
-            with RobotPort(self.desk, asked.scenario, request.node.name) as port:
-                port.greet()
+            note = partial(request.node.add_report_section, "call", "mirotwin")
+            with port_for_test(self.desk, asked.scenario, request.node.name, note) as port:
+                for name in asked.scenario.expect:
+                    note(why_not(port, f"check {name}", "inside"))
                 yield port
         except NotObservable as error:
             pytest.skip(str(error))
@@ -60,11 +59,11 @@ class PortFixtures:
 
     @pytest.fixture
     def links(self, world: RobotPort) -> list[Link]:
-        return [Link(cast("World", world))]
+        return [Link(world)]
 
     @pytest.fixture
     def robots(self) -> NoReturn:
-        pytest.skip("not observable on a port: the inside of a robot")
+        pytest.skip(f"robot: not observable {LACKS['inside']}")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, Any, Any]:
@@ -73,6 +72,10 @@ class PortFixtures:
             return (yield)
         except NotObservable as error:
             pytest.skip(str(error))
+        except AttributeError as error:
+            if isinstance(error.obj, RobotPort) and error.name in OF_A_TWIN:
+                pytest.skip(f"world.{error.name}: not observable on a port: only a twin has it")
+            raise
         except WaitExpired as error:
             world = getattr(item, "funcargs", {})["world"]
             raise WaitFailed.of(error, world).with_traceback(error.__traceback__) from None

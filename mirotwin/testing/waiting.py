@@ -14,8 +14,8 @@ from miro_exact.bad_input import BadInput, amount
 from miro_protocol.decoder import Decoder, Received, Scanner, TelemetryDecoder
 from miro_protocol.frames import ContentError, TeamFrame, describe
 from miro_sim.world.events import Event
+from miro_sim.world.machine import Machine
 from miro_sim.world.waits import WaitExpired
-from miro_sim.world.world import World
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import at
 
@@ -52,7 +52,7 @@ class WaitFailed(AssertionError):
     def of(
         cls,
         expired: WaitExpired,
-        world: World,
+        machine: Machine,
         what: str = "",
         begun_tick: int | None = None,
         before: Sequence[Event] = (),
@@ -65,7 +65,7 @@ class WaitFailed(AssertionError):
         """
         begun_tick = expired.begun_tick if begun_tick is None else begun_tick
         what = what or f"no {' or '.join(map(str, expired.conditions))}"
-        why = f": {why_ended(world)}" if world.finished else ""
+        why = f": {why_ended(machine)}" if machine.finished else ""
         seen = [event for event in (*before, *expired.seen) if event.tick >= begun_tick]
         seen.sort(key=lambda event: event.tick)
         expect = None
@@ -74,11 +74,12 @@ class WaitFailed(AssertionError):
         return cls(f"{what}{why}", begun_tick, expired.tick, seen, expect)
 
 
-def why_ended(world: World) -> str:
-    """Why a world goes no further."""
-    if world.stopped:
-        return f"the run was stopped by a firmware fault: {world.faults[0]}"
-    return f"the limit of virtual time was reached, duration_s = {world.scenario.duration_s:g}"
+def why_ended(machine: Machine) -> str:
+    """Why a machine goes no further."""
+    if machine.stopped:
+        fault = next(fault for robot in machine.robots for fault in robot.board.faults)
+        return f"the run was stopped by a firmware fault: {fault}"
+    return f"the limit of virtual time was reached, duration_s = {machine.scenario.duration_s:g}"
 
 
 def in_words(events: Sequence[Event]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The host of a network for which a test or a step speaks: frames with their numbers, put on the air of a world."""
+"""The host of a network for which a test or a step speaks: frames with their numbers, put on the air of a machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from miro_protocol.frames import Message, TeamFrame, asking_step, encode, format_of
 from miro_protocol.table import FRESH_STEPS, SEQ_MODULUS, FrameType
-from miro_sim.world.world import World
+from miro_sim.world.machine import Machine
 
 Pair = tuple[int, int]
 """(left, right) in 1/256 count per LM629 sample."""
@@ -15,10 +15,10 @@ Pair = tuple[int, int]
 class FrameSender:
     """`seq`: the number that was sent last; `velocities`: of all slots, sent last."""
 
-    def __init__(self, world: World, network: int, seq: int) -> None:
-        self.world = world
+    def __init__(self, machine: Machine, network: int, seq: int) -> None:
+        self.machine = machine
         self.network = network
-        self.robots: int = world.networks[network].spec.robots
+        self.robots: int = machine.networks[network].spec.robots
         self.seq = seq
         self.velocities: list[Pair] = [(0, 0)] * self.robots
 
@@ -54,7 +54,7 @@ class FrameSender:
         first = len(form.lead) + len(form.sync)
         for bit in wrong_bits:
             data[first + bit // 8] ^= 1 << bit % 8
-        tick = self.world.inject(bytes(data), self.network, at_tick, tuple(bad_stop))
+        tick = self.machine.inject(bytes(data), self.network, at_tick, tuple(bad_stop))
         self.seq = message.seq
         if isinstance(message, TeamFrame):
             self.velocities = list(message.velocities)

@@ -20,9 +20,11 @@ from miro_exact.clock import (
     TICKS_PER_SECOND,
 )
 from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
 from miro_sim.world.conditions import Edge, Network, Reached, Recorded, Slot, SpeedMS, WheelSpeeds
+from miro_sim.world.machine import Feature
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 
 if TYPE_CHECKING:
@@ -45,9 +47,16 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Base. `number`: from 1 on, as messages count them. `note`: for people, in the messages of the step."""
 
     VERB: ClassVar[str] = ""
+    CHANGES: ClassVar[bool] = True
+    """What follows would be something else without it."""
 
     number: int = 0
     note: str = ""
+
+    @property
+    def needs(self) -> Feature | None:
+        """Of the machine."""
+        return None
 
     @property
     def network(self) -> int:
@@ -108,6 +117,10 @@ class SendFrame(Send, frozen=True, kw_only=True):
     seq: Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)] | None = None
     wrong_bits: tuple[int, ...] = ()
     bad_stop: tuple[int, ...] = ()
+
+    @property
+    def needs(self) -> Feature | None:
+        return "bad stop" if self.bad_stop else None
 
     def problem(self, network: ScenarioNetwork) -> str:
         if self.seq is None and network.host != "silent":
@@ -219,6 +232,10 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
 
     hex: str
 
+    @property
+    def needs(self) -> Feature | None:
+        return "bad stop" if "!" in self.hex else None
+
     def problem(self, network: ScenarioNetwork) -> str:
         words = self.hex.split()
         for word in words:
@@ -234,7 +251,7 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
 
     def do(self, player: Player) -> None:
         data, bad_stop = self.characters()
-        player.world.inject(data, self.network, bad_stop=bad_stop)
+        player.machine.inject(data, self.network, bad_stop=bad_stop)
 
 
 SENDS: dict[str, type[Send]] = {
@@ -284,8 +301,14 @@ class StreamStep(OfRobot, frozen=True, kw_only=True):
 class ConditionStep(Step, frozen=True, kw_only=True):
     """Base of those that look for events."""
 
+    CHANGES = False
+
     verb: str
     condition: Awaited
+
+    @property
+    def needs(self) -> Feature | None:
+        return self.condition.needs
 
     @property
     def network(self) -> int:
@@ -347,6 +370,8 @@ class CheckStep(OfRobot, frozen=True, kw_only=True):
     """`check`: checks as in `[expect]`, judged from now on, for the robots of `network`, or for that in `slot`."""
 
     VERB = "check"
+    CHANGES = False
+    needs = "inside"
 
     check: dict[str, Any]
     network_: Network | None = msgspec.field(default=None, name="network")
@@ -368,40 +393,47 @@ class RadioStep(OfNetwork, frozen=True, kw_only=True):
     """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver hears noise)."""
 
     VERB = "radio"
+    needs = "switch"
 
     radio: Literal["up", "down", "noise"]
 
     def do(self, player: Player) -> None:
-        player.world.set_radio(self.radio, self.network)
+        machine = player.machine
+        machine.do(RadioState(machine.earliest_action_tick, self.network, self.radio))
 
 
 class ResetStep(OfRobot, frozen=True, kw_only=True):
     """`reset`: the level of a robot's reset pin; 1 holds its processor in reset."""
 
     VERB = "reset"
+    needs = "switch"
 
     reset: Literal[0, 1]
 
     def do(self, player: Player) -> None:
-        player.world.set_reset(self.reset, self.network, player.slot(self.slot, self.network))
+        slot, machine = player.slot(self.slot, self.network), player.machine
+        machine.do(Reset(machine.earliest_action_tick, self.network, slot, self.reset))
 
 
 class PowerStep(OfRobot, frozen=True, kw_only=True):
     """`power`: a robot is switched off, or on."""
 
     VERB = "power"
+    needs = "switch"
 
     power: Literal["on", "off"]
 
     def do(self, player: Player) -> None:
-        level = int(self.power == "on")
-        player.world.set_power(level, self.network, player.slot(self.slot, self.network))
+        slot, machine = player.slot(self.slot, self.network), player.machine
+        machine.do(Power(machine.earliest_action_tick, self.network, slot, int(self.power == "on")))
 
 
 class SaveStep(Step, frozen=True, kw_only=True):
     """`save`: the world's state, as `World.save` gives it, into a file of this name (`NAME.world`)."""
 
     VERB = "save"
+    CHANGES = False
+    needs = "save"
 
     save: str
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import takewhile
 
 import msgspec
 
@@ -24,6 +25,7 @@ from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.conditions import Answer, Condition, Reached, WheelSpeeds, When, answer_fields, speeds_of
 from miro_sim.world.events import Event
+from miro_sim.world.machine import Machine, why_not
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, at, ms_ticks
@@ -41,9 +43,9 @@ class Host(FrameSender):
     before; so many frames are `left`, None: no end.
     """
 
-    def __init__(self, world: World, network: int) -> None:
-        super().__init__(world, network, 0)
-        self.first_slot = min(robot.slot for robot in world.scenario.networks[network].robot)
+    def __init__(self, machine: Machine, network: int) -> None:
+        super().__init__(machine, network, 0)
+        self.first_slot = min(robot.slot for robot in machine.scenario.networks[network].robot)
         self.end()
 
     def command(self, slot: int, left_m_s: float | None, right_m_s: float | None) -> None:
@@ -57,8 +59,8 @@ class Host(FrameSender):
 
     def begin(self, every_ticks: int, frames: int | None, ask: bool) -> None:
         """Frames from now on, with the velocities that were sent or commanded last."""
-        self.due_tick = self.world.earliest_tick(self.network)
-        self.lead_ticks = self.due_tick - self.world.tick
+        self.due_tick = self.machine.earliest_tick(self.network)
+        self.lead_ticks = self.due_tick - self.machine.tick
         self.every_ticks, self.ask, self.left = every_ticks, ask, frames
         self.top_up()
 
@@ -73,7 +75,7 @@ class Host(FrameSender):
 
     def top_up(self) -> None:
         """Announces the frames that are due."""
-        while self.next_tick <= self.world.tick:
+        while self.next_tick <= self.machine.tick:
             self.put(self.team(self.ask))
             self.due_tick += self.every_ticks
             if self.left is not None:
@@ -105,17 +107,30 @@ class _Failed(Exception):
 
 
 class Player:
-    """`done`: so many steps were. `saved`: by name, what `save` steps kept. `checks`: those that steps began."""
+    """`steps`: those that the machine can do and show, up to the first that it cannot do and that changes what follows;
+    `unseen`: a line for each that it cannot do or show. `count`: of all steps; `done`: so many were. `saved`: by name,
+    what `save` steps kept. `checks`: those that steps began.
+    """
 
-    def __init__(self, world: World, steps: Sequence[Step], origin: str = "") -> None:
-        self.world = world
-        self.steps = list(steps)
+    def __init__(self, machine: Machine, steps: Sequence[Step], origin: str = "") -> None:
+        self.machine = machine
+        lines = [(step, why_not(machine, step, step.needs)) for step in steps]
+        self.unseen = [line for _, line in lines if line]
+        to_change = takewhile(lambda both: not (both[1] and both[0].CHANGES), lines)
+        self.steps = [step for step, line in to_change if not line]
+        self.count = len(steps)
         self.origin = origin
-        self.hosts = [Host(world, index) for index in range(len(world.networks))]
+        self.hosts = [Host(machine, index) for index in range(len(machine.networks))]
         self.done = 0
         self.failure: StepFailure | None = None
         self.saved: dict[str, bytes] = {}
         self.checks: list[Checks] = []
+
+    @property
+    def world(self) -> World:
+        """The machine of steps that need more than every machine has."""
+        assert isinstance(self.machine, World)
+        return self.machine
 
     def run(self) -> None:
         """The whole run: `play`, then `finish`."""
@@ -125,9 +140,9 @@ class Player:
     def play(self) -> None:
         """Does the steps. Raises ScenarioError for one that the file cannot have meant."""
         for step in self.steps[self.done :]:
-            begun_tick = self.world.tick
+            begun_tick = self.machine.tick
             try:
-                if self.world.finished:
+                if self.machine.finished:
                     raise _Failed(begun_tick, "to be done", self._end())
                 step.do(self)
             except _Failed as failed:
@@ -142,9 +157,9 @@ class Player:
 
     def finish(self) -> None:
         """Runs to the end; what goes on by itself goes on. Ends the checks that steps began."""
-        world = self.world
-        while not world.finished:
-            world.run_to(min(world.period_end, self._next_tick()))
+        machine = self.machine
+        while not machine.finished:
+            machine.run_to(min(machine.period_end, self._next_tick()))
             self._top_up()
         for checks in self.checks:
             checks.finish()
@@ -159,21 +174,21 @@ class Player:
         self, wanted: Condition, kind: Condition, within_ms: float | None, from_now: bool = False
     ) -> None:
         """On to the first event of `kind`, which has to be the one that is wanted; both may be the same."""
-        world = self.world
+        machine = self.machine
         if from_now:
             self._forget()
-        until_tick = NEVER_TICK if within_ms is None else world.tick + ms_ticks(within_ms)
+        until_tick = NEVER_TICK if within_ms is None else machine.tick + ms_ticks(within_ms)
         said = f"{wanted}" if within_ms is None else f"{wanted} within {within_ms:g} ms"
         seen: list[Event] = []
         event = self._next(kind, until_tick, seen)
         if event is None:
-            raise _Failed(world.tick, said, self._nothing(wanted, seen), True)
+            raise _Failed(machine.tick, said, self._nothing(wanted, seen), True)
         if kind != wanted and not wanted.met_by(event):
             raise _Failed(event.tick, said, self._other(wanted, event))
 
     def hold(self, condition: Condition, for_ms: float, never: bool) -> None:
         """So long from now on, in which the wheels have to turn so fast, or the condition must `never` become true."""
-        world, forbidden, said = self.world, condition, f"no {condition}"
+        machine, forbidden, said = self.machine, condition, f"no {condition}"
         if isinstance(condition, WheelSpeeds) and not never:
             holds = condition.predicate
             forbidden = When(
@@ -181,43 +196,43 @@ class Player:
             )
             said = f"{condition}"
         self._forget()
-        until_tick = world.tick + ms_ticks(for_ms)
+        until_tick = machine.tick + ms_ticks(for_ms)
         event = self._next(forbidden, until_tick, [])
         if event is not None:
             raise _Failed(event.tick, f"{said} for {for_ms:g} ms", self._other(condition, event))
-        if world.tick < until_tick:
-            raise _Failed(world.tick, f"{for_ms:g} ms of it", self._end())
+        if machine.tick < until_tick:
+            raise _Failed(machine.tick, f"{for_ms:g} ms of it", self._end())
 
     def _forget(self) -> None:
         """What has happened before now does not count."""
-        self.world.waits.collect()
-        self.world.waits.pass_over()
+        self.machine.waits.collect()
+        self.machine.waits.pass_over()
 
     def _next(self, condition: Condition, until_tick: int, seen: list[Event]) -> Event | None:
         """The next event for which `condition` is true, up to `until_tick`; `seen` gets those before it."""
-        world = self.world
+        machine = self.machine
         while True:
             stop_tick = min(until_tick, self._next_tick())
-            within = None if stop_tick == NEVER_TICK else max(0, stop_tick - world.tick)
+            within = None if stop_tick == NEVER_TICK else max(0, stop_tick - machine.tick)
             try:
-                return world.run_until(condition, within=within)
+                return machine.run_until(condition, within=within)
             except WaitExpired as expired:
                 seen += expired.seen
                 del seen[:-SEEN_AT_MOST]
-            if world.finished or world.tick >= until_tick:
+            if machine.finished or machine.tick >= until_tick:
                 return None
             self._top_up()
 
     def pause(self, for_ms: float) -> None:
         """Lets time pass; what happens is kept for the next wait."""
-        world, until_tick = self.world, self.world.tick + ms_ticks(for_ms)
-        while world.tick < until_tick and not world.finished:
-            longest_tick = world.tick + CONTROL_PERIOD_TICKS
-            world.run_to(min(until_tick, longest_tick, self._next_tick()))
-            world.waits.collect()
+        machine, until_tick = self.machine, self.machine.tick + ms_ticks(for_ms)
+        while machine.tick < until_tick and not machine.finished:
+            longest_tick = machine.tick + CONTROL_PERIOD_TICKS
+            machine.run_to(min(until_tick, longest_tick, self._next_tick()))
+            machine.waits.collect()
             self._top_up()
-        if world.tick < until_tick:
-            raise _Failed(world.tick, "time to pass", self._end())
+        if machine.tick < until_tick:
+            raise _Failed(machine.tick, "time to pass", self._end())
 
     def _next_tick(self) -> int:
         return min(host.next_tick for host in self.hosts)
@@ -230,7 +245,7 @@ class Player:
         """Checks from now on, of the robots in that network and slot; None: of all."""
         places = [
             (robot.network, robot.slot)
-            for robot in self.world.robots
+            for robot in self.machine.robots
             if network in (None, robot.network) and slot in (None, robot.slot)
         ]
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
@@ -238,12 +253,12 @@ class Player:
     # What was found
 
     def _end(self) -> str:
-        stopped = "a firmware fault has stopped the run" if self.world.stopped else "the run is over"
+        stopped = "a firmware fault has stopped the run" if self.machine.stopped else "the run is over"
         return f"that {stopped}"
 
     def _nothing(self, wanted: Condition, seen: Sequence[Event]) -> str:
         """What there was instead of the event that was wanted."""
-        found = [self._end()] if self.world.finished else []
+        found = [self._end()] if self.machine.finished else []
         if isinstance(wanted, WheelSpeeds):
             found.append(self._speeds(wanted))
         found.append(_meanwhile(seen))
@@ -264,7 +279,7 @@ class Player:
         return said
 
     def _speeds(self, wanted: WheelSpeeds) -> str:
-        robot = self.world.robot(wanted.network, self.slot(wanted.slot, wanted.network))
+        robot = self.machine.robot(wanted.network, self.slot(wanted.slot, wanted.network))
         left, right = speeds_of(robot)
         return f"left_m_s = {left:.4f}, right_m_s = {right:.4f}"
 

@@ -189,7 +189,7 @@ def case_of_step(player: Player, trace: Trace) -> str | None:
     failure = player.failure
     if failure is None or failure.tick <= failure.begun_tick:
         return None
-    step = player.steps[failure.number - 1]
+    step = player.steps[player.done]
     if not isinstance(step, ConditionStep) or (isinstance(step, WaitStep) and not failure.timed_out):
         return None
     name = "happens" if isinstance(step, WaitStep) else "never_happens"

@@ -19,6 +19,7 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, Flags
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import PC, Event
+from miro_sim.world.machine import Feature
 
 if TYPE_CHECKING:
     from miro_sim.world.robot import Robot
@@ -52,6 +53,8 @@ class Condition(
     """What an event says, by the fields that ask for it."""
     DETAILS: ClassVar[tuple[str, ...]] = ()
     """The fields in which events of one kind at one place differ."""
+    needs: ClassVar[Feature | None] = None
+    """Of the machine; a PC hears and sends without anything more."""
 
     network: Network = 0
 
@@ -84,6 +87,8 @@ class Condition(
 
 class AtRobot(Condition, frozen=True, kw_only=True):
     """Base of what happens at the robot in `slot`."""
+
+    needs: ClassVar[Feature | None] = "inside"
 
     slot: Slot | None = None
 
@@ -263,6 +268,8 @@ class Fault(AtRobot, frozen=True, kw_only=True, tag="fault"):
 
 class Touch(Condition, frozen=True, kw_only=True, tag="touch"):
     """A robot of the network touches another robot on the pitch, seen on the contact grid of 1 ms."""
+
+    needs: ClassVar[Feature | None] = "inside"
 
 
 class When(AtRobot, frozen=True, kw_only=True, tag="when"):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import Any
 
 import msgspec
 
@@ -18,13 +18,10 @@ from miro_exact.state import Flat
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import PC, Cursor, Event
+from miro_sim.world.machine import Machine, require
 from miro_sim.world.watch import Entry, Watch
 
-if TYPE_CHECKING:
-    from miro_sim.world.world import Mark, World
-
-    Before = tuple[int, list[int], list[bytes], Mark]
-
+Before = tuple[int, list[int], list[bytes], Any]
 FIRST_PIECE_TICKS = 24_000
 """1 ms. Pieces double up to the end of the control period: most waits are short, and a piece costs a snapshot."""
 SEEN_AT_MOST = 1000
@@ -48,13 +45,13 @@ class WaitExpired(TimeoutError):
 
 
 class Waits:
-    """The waits of one world, and what happened since the last one ended.
+    """The waits of one machine, and what happened since the last one ended.
 
     `backlog`: events that no wait has consumed. `cursors`: by network and slot, on its log.
     `reached`: the number of the instruction at which a wait ended before it was executed.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: Machine) -> None:
         self.world = world
         self.forget()
 
@@ -79,8 +76,10 @@ class Waits:
         self.backlog = [entry for entry in self.backlog if entry[0][0] >= self.world.tick]
 
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
-        """See `World.run_until`."""
+        """See `World.run_until`. Raises NotObservable for what the machine does not show."""
         world = self.world
+        for condition in conditions:
+            require(world, condition, condition.needs)
         if within is not None and not isinstance(within, int):
             raise ValueError(f"{within!r} is no whole number of ticks; mirotwin.ms(40) gives one")
         if within is not None and within < 0:

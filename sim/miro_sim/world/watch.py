@@ -19,7 +19,7 @@ from miro_sim.world.conditions import CONDITIONS, PORT_PINS, Condition, Edge, Re
 from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
-    from miro_sim.world.world import World
+    from miro_sim.world.machine import Machine
 
 _EDGES, _TRUE = 1 << 40, 1 << 41
 """Serial numbers of what is in no log: an edge adds the place of its pin, since at one tick there is one of each."""
@@ -30,12 +30,12 @@ _BY_TICK = itemgetter(0)
 
 
 class Watch:
-    """A context: within it the robots of `world` look out for `conditions`.
+    """A context: within it the robots of a machine look out for `conditions`.
 
     Raises ValueError for a network, slot or symbol that is not there. `conditions`: each with network and slot.
     """
 
-    def __init__(self, world: World, conditions: Sequence[Condition]) -> None:
+    def __init__(self, world: Machine, conditions: Sequence[Condition]) -> None:
         self.world = world
         self.conditions = [
             (self._robot_id(condition), self._with_address(condition)) for condition in conditions
@@ -124,10 +124,12 @@ class Watch:
         """The condition with the address that its symbol has."""
         if not isinstance(condition, Reached) or condition.symbol is None:
             return condition
-        symbol = self.world.image.symbols.find(condition.symbol)
+        image = self.world.image
+        assert image is not None  # a machine with an inside
+        symbol = image.symbols.find(condition.symbol)
         if symbol is None or symbol.space != "code":
             what = "is no symbol of" if symbol is None else "is not in code memory:"
-            raise ValueError(f"{condition.symbol!r} {what} {self.world.image.path}")
+            raise ValueError(f"{condition.symbol!r} {what} {image.path}")
         return msgspec.structs.replace(condition, symbol=None, address=symbol.address)
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import hashlib
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import permutations
 from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_exact.domain import MAX_SEED
 from miro_exact.engine import check_arithmetic
 from miro_exact.state import TICK, Flat, Octets
@@ -33,6 +33,7 @@ from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.bodies import Bodies, Pair
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event
+from miro_sim.world.machine import Feature
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.saved import Identity, opened, sealed
@@ -129,6 +130,16 @@ class World:
     def digest(self) -> str:
         """SHA-256 in hex over the state at the end of the last control period, which holds the digest before."""
         return self.chain.hex()
+
+    @property
+    def lacks(self) -> Mapping[Feature, str]:
+        """As of every machine; a twin shows all."""
+        return {}
+
+    @property
+    def clock(self) -> int:
+        """Ticks per second."""
+        return TICKS_PER_SECOND
 
     @property
     def finished(self) -> bool:

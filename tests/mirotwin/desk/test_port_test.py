@@ -169,6 +169,12 @@ def test_commands(link, world):
 def test_switch(link):
     link.radio("down")
 
+def test_digest(world):
+    assert world.digest == ""
+
+def test_a_name_that_no_machine_has(world):
+    assert world.digset == ""
+
 def test_nobody_asks(link):
     link.expect(Telemetry, within=ms(50))
 
@@ -183,15 +189,17 @@ def test_expectation(link):
 
 SAID = """\
 mirotwin: robots at miro://*; what a port does not show is skipped
+*'RobotPort' object has no attribute 'digset'*
 *test_nobody_asks*
 *WaitFailed: no answer within 50 ms*
 *test_motion*
 *--allow-motion*
 """
 SKIPPED = """\
-*not observable on a port: the inside of a robot*
-*command with name = "STT": not observable on a port*
-*`set_radio` of a robot's world: not observable on a port*
+*robot: not observable on a port: it is inside the robot*
+*command with name = "STT": not observable on a port: it is inside the robot*
+*RadioState: not observable on a port: only a twin has such a switch*
+*world.digest: not observable on a port: only a twin has it*
 """
 
 
@@ -201,7 +209,7 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     for name, steps in (("poll", POLL), ("inside", INSIDE)):
         (pytester.path / f"{name}.scenario.toml").write_text(HEAD + steps)
     found = pytester.runpytest_subprocess("-rs", "-p", "no:xdist", f"--mirotwin-port={ROBOT}")
-    found.assert_outcomes(passed=4, skipped=4, failed=2)
+    found.assert_outcomes(passed=4, skipped=5, failed=3)
     found.stdout.fnmatch_lines(SAID)
     found.stdout.fnmatch_lines_random(SKIPPED)
 

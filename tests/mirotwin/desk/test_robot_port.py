@@ -19,10 +19,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.actions import Reset
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
+from miro_sim.world.conditions import CONDITIONS, Answer, Heard, Sent
+from miro_sim.world.machine import NotObservable
 from mirotwin import Telemetry
 from mirotwin.desk import robot_port
 from mirotwin.desk.guard import DeskOptions
@@ -69,8 +72,8 @@ def pty():
     found.close()
 
 
-def robots_at(url, motion=True):
-    return RobotPort(DeskOptions(port=str(url), allow_motion=motion), SCENARIO)
+def robots_at(url, motion=True, note=print):
+    return RobotPort(DeskOptions(port=str(url), allow_motion=motion), SCENARIO, note=note)
 
 
 def stops(data):
@@ -353,17 +356,32 @@ def test_a_blocked_port_takes_nothing_more_but_stop_frames(pty):
 
 
 @pytest.mark.parametrize("many", [1, 5000])
-def test_characters_that_come_faster_than_the_line_carries_them_are_left_out(pty, capsys, many):
+def test_characters_that_come_faster_than_the_line_carries_them_are_left_out(pty, many):
     answer = encode(TelemetryFrame(40, 1), 3)
-    with robots_at(pty.path) as port:
+    notes = []
+    with robots_at(pty.path, note=notes.append) as port:
         for _ in range(many):
             port._take(answer)
         kept = sum(len(sent.data) for sent in port.wire)
         assert kept + port.dropped + port._decoder.pending == many * len(answer)
         assert port._end_tick - port._now < 80 * 24_000_000
-    assert (
-        "characters are left out, which came faster than 9600 baud carries" in capsys.readouterr().err
-    ) == (many > 1)
+    assert ("characters are left out, which came faster than 9600 baud carries" in str(notes)) == (many > 1)
+
+
+def test_what_is_inside_a_robot_is_refused_with_the_reason():
+    inside = [kind for kind in CONDITIONS.values() if kind not in (Answer, Heard, Sent)]
+    needed = {"pin": "txd", "address": 0, "left_m_s": 0.0}
+    with robots_at(ROBOT) as port:
+        for kind in inside:
+            fields = {key: value for key, value in needed.items() if key in kind.__struct_fields__}
+            with pytest.raises(NotObservable, match="not observable on a port: it is inside the robot"):
+                port.run_until(kind(**fields), within=0)
+        with pytest.raises(
+            NotObservable, match="Reset: not observable on a port: only a twin has such a switch"
+        ):
+            port.do(Reset(port.earliest_action_tick, 0, 0, 1))
+        with pytest.raises(NotObservable, match="no serial port sends a bad stop bit"):
+            port.inject(b"U", bad_stop=(0,))
 
 
 def test_a_robot_that_talks_all_the_time_for_an_hour_is_heard_whole(pty, monkeypatch):

@@ -1,0 +1,108 @@
+"""What links, steps and waits may do with a machine: a `World`, or robots at a port of this PC.
+
+A condition or a step says what it `needs` of a machine; a machine says what it `lacks`, and why. What only a twin has
+(memory, digests, saved states) is not here but in `World`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from miro_protocol.actions import Action
+from miro_sim.periods import Period
+from miro_sim.scenario.keys import NetworkSpec, Scenario
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_sim.world.conditions import Condition
+    from miro_sim.world.events import Event, HostLog
+    from miro_sim.world.robot import Robot
+    from miro_sim.world.waits import Waits
+
+Feature = Literal["bad stop", "inside", "switch", "save"]
+"""A character with a bad stop bit, the inside of a robot, its switches and those of radios, saving the state."""
+
+
+class NotObservable(Exception):
+    """What this machine can neither show nor do."""
+
+
+class MachineNetwork(Protocol):
+    """One network of a machine. `robots`: those whose inside it shows."""
+
+    @property
+    def spec(self) -> NetworkSpec: ...
+    @property
+    def index(self) -> int: ...
+    @property
+    def log(self) -> HostLog: ...
+    @property
+    def robots(self) -> Sequence[Robot]: ...
+
+
+class Machine(Protocol):
+    """See `World`, which has all of these. `lacks`: by feature, the words behind "not observable".
+
+    `clock`: ticks per second; `image`: None where it is not known what the robots run.
+    """
+
+    observers: list[Callable[[Period], object]]
+
+    @property
+    def lacks(self) -> Mapping[Feature, str]: ...
+    @property
+    def scenario(self) -> Scenario: ...
+    @property
+    def image(self) -> Image | None: ...
+    @property
+    def networks(self) -> Sequence[MachineNetwork]: ...
+    @property
+    def robots(self) -> Sequence[Robot]: ...
+    @property
+    def waits(self) -> Waits: ...
+    @property
+    def clock(self) -> int: ...
+    @property
+    def tick(self) -> int: ...
+    @property
+    def finished(self) -> bool: ...
+    @property
+    def stopped(self) -> bool: ...
+    @property
+    def earliest_action_tick(self) -> int: ...
+
+    def robot(self, network: int = 0, slot: int = 0) -> Robot: ...
+    def run_to(self, tick: int) -> None: ...
+    def run_for(self, ticks: int) -> None: ...
+    def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event: ...
+    def earliest_tick(self, network: int = 0) -> int: ...
+    def inject(
+        self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: Sequence[int] = ()
+    ) -> int: ...
+    def do(self, action: Action) -> int: ...
+
+    # Pieces of a control period, for `Waits`. A machine whose time only goes on has nothing to go back to.
+
+    @property
+    def in_period(self) -> bool: ...
+    @property
+    def period_end(self) -> int: ...
+    def begin_period(self) -> None: ...
+    def rendezvous(self, tick: int) -> int: ...
+    def run_piece(self, tick: int) -> None: ...
+    def end_period(self) -> None: ...
+    def mark(self) -> Any: ...
+    def go_back(self, mark: Any) -> None: ...
+
+
+def why_not(machine: Machine, wanted: object, needs: Feature | None) -> str:
+    """The line that says why the machine cannot show or do what is `wanted`, "" if it can."""
+    why = "" if needs is None else machine.lacks.get(needs, "")
+    return why and f"{wanted}: not observable {why}"
+
+
+def require(machine: Machine, wanted: object, needs: Feature | None) -> None:
+    """Raises NotObservable for what the machine cannot show or do."""
+    if why := why_not(machine, wanted, needs):
+        raise NotObservable(why)
