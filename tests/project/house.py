@@ -19,7 +19,11 @@ PRODUCT = ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin")
 OURS = "mirotwin"
 MOST_PARAMETERS = 7
 SHORT = 60
-VERDICT_WORDS = frozenset({"error", "differs", "fault", "failed", "not judged", "not observable"})
+VERDICT_WORDS = frozenset({"error", "differs", "fault", "failed", "not judged", "not observable", "limit"})
+VERDICT_CODES = frozenset(
+    {"BAD_INPUT", "DIVERGENCE", "FIRMWARE_FAULT", "EXPECTATION_FAILED", "NOTHING_JUDGED", "LIMIT_REACHED"}
+)
+"""What exit codes were called before they stood in the table of verdicts."""
 PRINTERS = frozenset({"complain", "show", "tell_notes", "show_traceback", "print", "echo"})
 
 
@@ -167,12 +171,10 @@ def _says_verdict(function):
         for part in (node.left, *node.comparators)
         for value in ast.walk(part)
     }
-    values = (
-        node.value
-        for node in ast.walk(function)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in compared
-    )
-    return any(value in VERDICT_WORDS for value in values)
+    nodes = [node for node in ast.walk(function) if id(node) not in compared]
+    words = {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    return bool(words & VERDICT_WORDS or names & VERDICT_CODES)
 
 
 def _holds_verdict(node):
