@@ -388,7 +388,8 @@ def _schema(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> dict[s
 def _resolved(node: Any, parts: dict[str, Any]) -> Any:
     if isinstance(node, dict):
         if "$ref" in node:
-            return _resolved(parts[node["$ref"]], parts)
+            beside = {key: value for key, value in node.items() if key != "$ref"}  # title, default
+            return {**_resolved(parts[node["$ref"]], parts), **beside}
         return {key: _resolved(value, parts) for key, value in node.items()}
     return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
 

@@ -6,9 +6,7 @@ Foxglove's form. So what reads recordings reads it too. The same recording gives
 
 from __future__ import annotations
 
-from functools import cache
 from io import BytesIO
-from pathlib import Path
 from typing import BinaryIO
 
 import msgspec
@@ -33,16 +31,11 @@ PREFIX = "foxglove."
 
 
 def schema_of(message: msgspec.Struct) -> tuple[str, bytes]:
-    """Name and text of a message's schema: Foxglove's for its messages, ours for all others."""
-    if type(message).__module__ != messages.__name__:
-        return channels.schema_name(type(message)), channels.schema_text(type(message))
-    name = type(message).__name__
-    return PREFIX + name, _published(name)
-
-
-@cache
-def _published(name: str) -> bytes:
-    return (Path(__file__).parent / "schemas" / f"{name}.json").read_bytes()
+    """Name and text of a message's schema. Foxglove draws by the name, so its own messages have Foxglove's."""
+    kind = type(message)
+    published = kind.__module__ == messages.__name__
+    name = PREFIX + kind.__name__ if published else channels.schema_name(kind)
+    return name, channels.schema_text(kind)
 
 
 FAULT = "fault"

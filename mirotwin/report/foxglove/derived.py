@@ -74,7 +74,7 @@ class Derived:
         for robot in period.robots:
             trail = self._trails.setdefault((robot.network, robot.slot), robots.Trail())
             trails += trail.add(robot, period.index, at)
-        yield Said(TRAILS, tick, SceneUpdate((), tuple(trails)))
+        yield Said(TRAILS, tick, SceneUpdate(tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
             found = error_of(robot.truth, robot.reference, tick)
@@ -92,7 +92,7 @@ class Derived:
         return FrameTransforms(tuple(found))
 
     def _standing(self, period: Period, at: Timestamp) -> Iterator[Said]:
-        yield Said(SCENE, period.tick, SceneUpdate((), tuple(self._scene(period, at))))
+        yield Said(SCENE, period.tick, SceneUpdate(tuple(self._scene(period, at))))
         if self._lens is not None:
             for network in _networks(period):
                 message = frames.calibration(network, self._lens.lens, at)

@@ -1,17 +1,22 @@
-"""Messages of Foxglove's schemas, field for field: those that are written here, in the order of the schemas.
+"""Messages of Foxglove's schemas: those that are written here, with the names and the order of the published fields.
 
-Lengths in m, angles as unit quaternions, colours from 0 to 1.
+A field that is never used is absent, as in protobuf. The JSON schemas in a file are made from these classes. Lengths in
+m, angles as unit quaternions, colours from 0 to 1.
 """
 
 from __future__ import annotations
+
+from typing import Annotated
 
 import msgspec
 
 from mirotwin.recording.channels import TimeMessage
 from mirotwin.recording.channels import time_of as time_of
 
-Timestamp = TimeMessage
-ALWAYS = Timestamp(0, 0)
+# The published JSON schemas tell the two apart by these titles (foxglove-sdk, schemas/jsonschema).
+Timestamp = Annotated[TimeMessage, msgspec.Meta(title="time")]
+Duration = Annotated[TimeMessage, msgspec.Meta(title="duration")]
+ALWAYS = TimeMessage(0, 0)
 """The lifetime of what stays until it is replaced."""
 
 
@@ -74,16 +79,12 @@ class LinePrimitive(msgspec.Struct, frozen=True):
     scale_invariant: bool
     points: tuple[Vector3, ...]
     color: Color
-    colors: tuple[Color, ...] = ()
-    indices: tuple[int, ...] = ()
 
 
 class TriangleListPrimitive(msgspec.Struct, frozen=True):
     pose: Pose
     points: tuple[Vector3, ...]
     color: Color
-    colors: tuple[Color, ...] = ()
-    indices: tuple[int, ...] = ()
 
 
 class TextPrimitive(msgspec.Struct, frozen=True):
@@ -101,21 +102,16 @@ class SceneEntity(msgspec.Struct, frozen=True, kw_only=True):
     timestamp: Timestamp
     frame_id: str
     id: str
-    lifetime: Timestamp = ALWAYS
+    lifetime: Duration = ALWAYS
     frame_locked: bool = True
-    metadata: tuple[()] = ()
-    arrows: tuple[()] = ()
     cubes: tuple[SolidPrimitive, ...] = ()
     spheres: tuple[SolidPrimitive, ...] = ()
-    cylinders: tuple[()] = ()
     lines: tuple[LinePrimitive, ...] = ()
     triangles: tuple[TriangleListPrimitive, ...] = ()
     texts: tuple[TextPrimitive, ...] = ()
-    models: tuple[()] = ()
 
 
 class SceneUpdate(msgspec.Struct, frozen=True):
-    deletions: tuple[()]
     entities: tuple[SceneEntity, ...]
 
 

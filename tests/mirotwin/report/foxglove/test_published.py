@@ -1,4 +1,4 @@
-"""Each derived message is what Foxglove published: by its JSON schema, and field for field by its protobuf classes."""
+"""Each derived message is what Foxglove published, field for field: by the protobuf classes in its own package."""
 
 import base64
 import importlib
@@ -8,7 +8,8 @@ import msgspec
 import pytest
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
-from mirotwin.report.foxglove import convert
+from mirotwin.recording import channels
+from mirotwin.report.foxglove import messages
 
 NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
 FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
@@ -19,6 +20,17 @@ def of_protobuf(name):
     return getattr(importlib.import_module(f"foxglove_schemas_protobuf.{name}_pb2"), name)
 
 
+KINDS = {
+    "time": ("Timestamp",),
+    "duration": ("Duration",),
+    "boolean": (FieldDescriptorProto.TYPE_BOOL,),
+    "number": (FieldDescriptorProto.TYPE_DOUBLE,),
+    "integer": (FieldDescriptorProto.TYPE_FIXED32, FieldDescriptorProto.TYPE_ENUM),
+    "string": (FieldDescriptorProto.TYPE_STRING, FieldDescriptorProto.TYPE_BYTES),
+}
+"""Title or type of a JSON schema -> protobuf."""
+
+
 def many(field):
     """Whether a field is repeated; how to ask a descriptor depends on its version."""
     proto = DescriptorProto()
@@ -27,23 +39,20 @@ def many(field):
 
 
 def schema_fields(schema, descriptor, place):
-    """Where a JSON schema and the protobuf message of that name differ in their fields, or in what is in these."""
-    names = [field.name for field in descriptor.fields]
+    """Where a JSON schema has fields that the protobuf message lacks, or has in another order or of other kinds."""
+    published = [field for field in descriptor.fields if field.name in schema["properties"]]
+    names = [field.name for field in published]
     found = [] if list(schema["properties"]) == names else [f"{place}: {list(schema['properties'])}, {names}"]
-    for field in descriptor.fields:
-        part = schema["properties"].get(field.name, {})
+    for field in published:
+        part = schema["properties"][field.name]
         inner = part.get("items", part)
         inside = field.message_type
         if (part.get("type") == "array") is not many(field):
             found.append(f"{place}.{field.name}: one or many")
         if inside is not None and inside.file.package == "foxglove":
             found += schema_fields(inner, inside, f"{place}.{field.name}")
-        elif inside is not None and inner.get("title") not in ("time", "duration"):
-            found.append(f"{place}.{field.name}: no time")
-        elif field.enum_type is not None:
-            values = {one["title"]: one["const"] for one in inner["oneOf"]}
-            if values != {value.name: value.number for value in field.enum_type.values}:
-                found.append(f"{place}.{field.name}: {values}")
+        elif (inside.name if inside else field.type) not in KINDS[inner.get("title", inner["type"])]:
+            found.append(f"{place}.{field.name}: {inner}")
     return found
 
 
@@ -67,26 +76,40 @@ def fill(message, content):
             setattr(message, name, raw)
 
 
-def back(message):
-    """The same fields out of a protobuf message, as JSON."""
+def back(message, content):
+    """The fields that `content` has, out of a protobuf message, as JSON."""
     found = {}
-    for field in message.DESCRIPTOR.fields:
-        value = getattr(message, field.name)
+    for name, inner in content.items():
+        field, value = message.DESCRIPTOR.fields_by_name[name], getattr(message, name)
         if field.message_type is not None and field.message_type.file.package == "google.protobuf":
-            found[field.name] = {"sec": value.seconds, "nsec": value.nanos}
+            found[name] = {"sec": value.seconds, "nsec": value.nanos}
+        elif field.message_type is not None and many(field):
+            found[name] = [back(*pair) for pair in zip(value, inner, strict=True)]
         elif field.message_type is not None:
-            found[field.name] = [back(part) for part in value] if many(field) else back(value)
+            found[name] = back(value, inner)
         elif many(field):
-            found[field.name] = list(value)
+            found[name] = list(value)
         else:
-            found[field.name] = base64.b64encode(value).decode() if isinstance(value, bytes) else value
+            found[name] = base64.b64encode(value).decode() if isinstance(value, bytes) else value
     return found
+
+
+@pytest.mark.parametrize(
+    ("names", "of", "published"),
+    [
+        (("LINE_STRIP", "LINE_LOOP", "LINE_LIST"), "LinePrimitive", "Type"),
+        (("INFO", "WARNING", "ERROR"), "Log", "Level"),
+    ],
+)
+def test_the_constants_are_the_published_ones(names, of, published):
+    values = of_protobuf(of).DESCRIPTOR.enum_types_by_name[published].values_by_name
+    assert [getattr(messages, name) for name in names] == [values[name].number for name in names]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_messages(name):
-    schema = msgspec.json.decode(convert._published(name))
-    assert schema["title"] == f"foxglove.{name}"
+    schema = msgspec.json.decode(channels.schema_text(getattr(messages, name)))
+    assert schema["title"] == name
     assert schema_fields(schema, of_protobuf(name).DESCRIPTOR, name) == []
 
 
@@ -119,7 +142,7 @@ def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown):
             kind = of_protobuf(one.name.removeprefix("foxglove."))
             message = kind()
             fill(message, one.content)
-            assert back(kind.FromString(message.SerializeToString())) == one.content
+            assert back(kind.FromString(message.SerializeToString()), one.content) == one.content
             counts[one.name] += 1
     assert set(counts) == set(FOXGLOVE)
     assert min(counts.values()) >= 2
