@@ -19,9 +19,15 @@ from functools import cached_property, reduce
 from typing import Any, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
+from mirotwin.recording.theory.figures import (
+    Assumption1,
+    Assumption2,
+    Assumption3,
+    DisturbanceFigures,
+    Theory,
+)
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
-from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, DisturbanceFigures, Theory
 
 TEXTS = ("verdict", "error", "failure", "digest")
 OWN = ("run", "draw", "seed", *TEXTS)

@@ -101,6 +101,7 @@ class ImageMessage(msgspec.Struct, frozen=True, gc=False):
     tick: Annotated[int, Meta(ge=0, le=MAX_TICK)]
 
 
+# The docstrings of messages are the descriptions in the schemas of every recording: a changed word changes its bytes.
 class TheoryMessage(msgspec.Struct, frozen=True, gc=False):
     """`theory`: terms of the paper's theory.
 

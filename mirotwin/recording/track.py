@@ -23,7 +23,7 @@ from miro_host.posture import Posture
 from miro_sim.periods import Period, RobotId, RobotPeriod
 from miro_sim.pitch import ground as pitch
 from mirotwin.recording.channels import TheoryMessage
-from mirotwin.recording.theory_track import TheoryTrack
+from mirotwin.recording.theory.track import TheoryTrack
 
 TWO_PI = 6.283185307179586
 SETTLED_CM = 3.0

@@ -11,9 +11,9 @@ import msgspec
 from miro_exact import engine
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from mirotwin.recording.theory.figures import SlidingGains, Theory, gains_of, rms, theory_of
 from mirotwin.recording.track import ErrorSample, Tracks
 from mirotwin.report.learnt import LearntCalibration, LearntWheels
-from mirotwin.report.theory import SlidingGains, Theory, gains_of, rms, theory_of
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.checks.interface import Expectation
 

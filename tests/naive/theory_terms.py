@@ -1,4 +1,4 @@
-"""Twin of `mirotwin.recording.theory_track` and of the chattering index: the whole run at once, with numpy.
+"""Twin of `mirotwin.recording.theory.track` and of the chattering index: the whole run at once, with numpy.
 
 The definitions one after the other, from the records of one robot. Nothing is shared with the code under test.
 """

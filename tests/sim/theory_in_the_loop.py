@@ -13,9 +13,9 @@ from itertools import pairwise
 from rich.console import Console
 from rich.table import Table
 
-from mirotwin.recording.theory_track import PERIOD_S
+from mirotwin.recording.theory.figures import gains_of, theory_of
+from mirotwin.recording.theory.track import PERIOD_S
 from mirotwin.recording.track import Tracks
-from mirotwin.report.theory import gains_of, theory_of
 from tests.sim.world.rig import world_of
 
 CONTROLLER = "network.robot.controller"

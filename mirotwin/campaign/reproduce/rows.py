@@ -17,7 +17,7 @@ class RunRow(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
     at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled` at the
-    end of the run. The last five: `report.theory`, None or 0 where no
+    end of the run. The last five: `recording.theory.figures`, None or 0 where no
     host steered it.
     """
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
-from mirotwin.recording.theory_track import HALF_PI, across
+from mirotwin.recording.theory.track import HALF_PI, across
 from tests.host.theory import ideal, stability
 from tests.host.theory.ideal import PRINTED, ROBOT
 

@@ -18,7 +18,7 @@ from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.yang_kim import Gains
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc, StraightLine
-from mirotwin.recording.theory_track import across
+from mirotwin.recording.theory.track import across
 from tests.host.driving import apart
 from tests.host.theory.mechanics import ROBOT, accelerated, cartesian_rates, inertia
 from tests.host.theory.paper_law import YangKim

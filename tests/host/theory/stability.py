@@ -16,7 +16,7 @@ from miro_exact.dmath import wrap_pi
 from miro_host.laws.yang_kim import Gains, curvature_term, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import StraightLine
-from mirotwin.recording.theory_track import across, radius
+from mirotwin.recording.theory.track import across, radius
 from tests.host.theory.paper_law import YangKim
 
 NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)

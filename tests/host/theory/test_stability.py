@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from miro_host.laws.yang_kim import sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc, StraightLine
-from mirotwin.recording.theory_track import HALF_PI, across, radius
+from mirotwin.recording.theory.track import HALF_PI, across, radius
 from tests.host.driving import ANY_PATH, POSTURES, SPEEDS, TURNS, later
 from tests.host.theory import stability
 from tests.host.theory.ideal import PRINTED

@@ -13,7 +13,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.laws.yang_kim import Gains as PaperGains
 from miro_sim.periods import RobotId
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording.theory_track import PERIOD_S, Broken, TheoryTrack
+from mirotwin.recording.theory.track import PERIOD_S, Broken, TheoryTrack
 
 
 class SlidingGains(msgspec.Struct, frozen=True):

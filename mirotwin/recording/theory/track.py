@@ -27,7 +27,7 @@ from miro_host.laws.yang_kim import POSITION_ERROR_M
 from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
 from mirotwin.recording.channels import TheoryMessage
-from mirotwin.recording.chattering import Chattering
+from mirotwin.recording.theory.chattering import Chattering
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 PI = 3.141592653589793
