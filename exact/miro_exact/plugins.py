@@ -7,10 +7,14 @@ one in its `pyproject.toml`:
     samson = "samson_law:Parameters"
 
 Two of one name are an error that names both, also where one is our own: a run must not depend on which is found first.
+The command line may bring one in a file, `FILE.py:CLASS`. Files that strangers hand over hold names only.
 """
 
+import importlib.util
 from collections.abc import Iterable, Mapping
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -34,7 +38,8 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
 
     `group` is the name of the entry points, `word` what a message calls a plug-in, `key` the scenario key that names
     it, `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
-    `module:class`. `default` is the plug-in of a table that does not say its name, if there is one.
+    `module:class`. `default` is the plug-in of a table that does not say its name, if there is one. `in_files`: those
+    that the command line brought, by name.
     """
 
     group: str
@@ -43,14 +48,17 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
     base: str
     own: Mapping[str, str]
     default: str | None = None
+    in_files: dict[str, type[Plugin]] = {}
 
     def names(self) -> list[str]:
         """All names that can be used: our own in the order of the table, then the others sorted."""
-        found = {entry.name for entry in installed.entries_of(self.group)}
+        found = {*self.in_files, *(entry.name for entry in installed.entries_of(self.group))}
         return [*self.own, *sorted(found.difference(self.own))]
 
     def find(self, name: str) -> type[Plugin]:
         """The struct of parameters of the plug-in `name`. Raises PluginError with the reason in one line."""
+        if name in self.in_files:
+            return self.in_files[name]
         entry = installed_part(self.group, self.word, name, self.own.get(name, ""))
         if entry is None and name in self.own:
             return self._checked(_loaded(self.own[name]), name, self.own[name])
@@ -66,6 +74,28 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
             what = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
             raise PluginError(what, f"repair or uninstall {owner}") from error
         return self._checked(found, name, entry_point)
+
+    def of_file(self, path: str, name: str, option: str) -> type[Plugin]:
+        """The struct `name` of a file in Python, which is run: `option` of the command line named it.
+
+        Raises BadInput, also for a struct with the name of one of our own. An installed one has to give way.
+        """
+        module, base = module_of(path, option), _loaded(self.base)
+        structs = {
+            key: value
+            for key, value in vars(module).items()
+            if isinstance(value, type) and issubclass(value, base) and value is not base
+        }
+        if name not in structs:
+            what = f"there is no class {name!r} derived from {base.__name__}"
+            remedy = did_you_mean(name, list(structs), f"it has {', '.join(structs) or 'none'}")
+            raise BadInput(path, option, what, remedy)
+        struct: Any = structs[name]
+        tag = struct.__struct_config__.tag
+        if tag in self.own:
+            what = f"{self.word} {tag!r} is in mirotwin ({self.own[tag]}), too"
+            raise BadInput(path, f"{option} {name}", what, "give the class another tag")
+        return self._checked(struct, tag, f"{path}:{name}")
 
     def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
         """`found` if it is a struct of parameters as this kind of plug-in needs it."""
@@ -93,6 +123,21 @@ def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
         what = f"{word} {name!r} is in {' and in '.join(places)}"
         raise PluginError(what, f"uninstall {others}, or give one of them another name")
     return entries[0] if entries else None
+
+
+def module_of(path: str, option: str) -> ModuleType:
+    """Runs a file that `option` of the command line names. Raises BadInput."""
+    if not Path(path).is_file():
+        raise BadInput(path, option, "there is no such file", "give the path of a file in Python")
+    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise BadInput(path, option, f"cannot be run: {raised(error)}", "repair it") from error
+    return module
 
 
 def use_one_of(choices: Iterable[str]) -> str:

@@ -63,7 +63,7 @@ def run(options: CampaignOptions) -> int:
     a check, or had no occasion for it. The rows say which.
     """
     require_arrow()
-    plan = load(options.file, (*options.settings, *as_settings(options.expected)))
+    plan = load(options.file, (*options.settings, *as_settings(options.expected, files=False)))
     tell_notes(plan.notes)
     if options.seeds is not None:
         first, count = options.seeds[0], len(options.seeds)

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import BadInput
 from miro_exact.plugins import PluginError, Registry
 from miro_exact.raised import at_place, defined_at, raised, raised_at
 from miro_exact.raised import described as described_error
@@ -35,7 +35,6 @@ from mirotwin.verify.bare.exchange import (
     Exchange,
     NamedCheck,
     check_named,
-    module_of,
 )
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 
@@ -223,19 +222,7 @@ def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:
     if match is None:
         return None
     path, name, parameters = match[1], match[2] or "", match[3] or ""
-    module = module_of(path, OPTION)
-    classes = {key: value for key, value in vars(module).items() if _is_protocol(value)}
-    if name not in classes:
-        remedy = did_you_mean(name, list(classes), f"it has {', '.join(classes) or 'none'}")
-        what = f"there is no class {name!r} derived from Protocol"
-        raise BadInput(path, OPTION, what, remedy)
-    if not classes[name].__struct_config__.frozen:
-        raise BadInput(path, OPTION, f"{name} can change", "give the class frozen=True")
-    return classes[name], name, parameters
-
-
-def _is_protocol(value: object) -> bool:
-    return isinstance(value, type) and issubclass(value, Protocol) and value is not Protocol
+    return PROTOCOLS.of_file(path, name, OPTION), name, parameters
 
 
 def _asked(method: Callable[..., object], call: Callable[[], T]) -> T:

@@ -423,10 +423,12 @@ def _job_of_stream(
     given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
     header, sent = given.header, given.script()
-    keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}}), *settings]
-    scenario = changed(scenario_of_stream(sent, path, header), path, keys, expectations_of)
+    keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
+    written = scenario_of_stream(sent, path, header)
+    scenario = changed(written, path, [*keys, *settings], expectations_of)
     script, own = script_of_stream(sent), header.seed or 0
     check_script(script, path, scenario)
-    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or seed not in (None, own)
+    other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
+    other = other or (bool(settings) and scenario != changed(written, path, keys, expectations_of))
     case = Case(header.verdict or "", header.end_tick or 0, other)
     return Job(scenario, own if seed is None else seed, script, (), path, image, case=case)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
-
-import click
 
 from miro_exact.bad_input import BadInput, amount
 from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
@@ -14,7 +13,7 @@ from mirotwin.recording.runner import report_faults
 from mirotwin.shell.command import Option
 from mirotwin.shell.program import complain
 from mirotwin.shell.verdicts import VERDICTS, Verdict, judge
-from mirotwin.verify.checks.expect import ALWAYS_ON
+from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS
 from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.monitors import Checks
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from miro_sim.world.world import World
     from mirotwin.verify.steps.player import Player
 
+_IN_FILE = re.compile(r"(.+?\.py):(\w+)((?:=.*)?)", re.DOTALL)
 LINES = 5
 """Failures of one check that are listed."""
 
@@ -29,8 +29,8 @@ LINES = 5
 EXPECT = Option(
     "--expect",
     metavar="KEY[=VALUE]",
-    help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
-    " code 1 when one fails.",
+    help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3, or FILE.py:CLASS[=VALUE],"
+    " one of your own; may be repeated. Exit code 1 when one fails.",
 )
 Expected = Annotated[tuple[str, ...], EXPECT]
 CHECK = Option(
@@ -40,21 +40,27 @@ CHECK = Option(
 )
 
 
-def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
+def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
     """What --expect was given, as settings of the scenario; a KEY alone is a check with its defaults.
 
-    Raises UsageError for a check in a file, FILE.py:FUNCTION: only firmware on a bare processor is judged by one.
+    `FILE.py:CLASS` runs the file, and makes its check known by its own name until --expect is read again. Raises
+    BadInput for what is no check, and where `files` are of no use.
     """
-    for text in expected:
-        path, _, function = text.rpartition(":")
-        if path.endswith(".py") and function.isidentifier():
-            what = "a check in a file is for firmware on a bare processor, and given by --check"
-            remedy = (
-                "a check of a run is in an installed distribution, and named by its key:"
-                " `mirotwin examples checks` writes one of your own; pip install it"
-            )
-            raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
-    return tuple(f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true" for text in expected)
+    named = [_IN_FILE.fullmatch(text) or text for text in expected]
+    if not files and any(not isinstance(one, str) for one in named):
+        remedy = "`mirotwin examples checks` writes a check of your own to pip install"
+        raise BadInput("", EXPECT.names[0], "runs of other processes name checks that are installed", remedy)
+    CHECKS.in_files.clear()
+    keys = [one if isinstance(one, str) else f"{_brought(one[1], one[2])}{one[3]}" for one in named]
+    return tuple(f"{EXPECT_KEY}{key}" if "=" in key else f"{EXPECT_KEY}{key}=true" for key in keys)
+
+
+def _brought(path: str, name: str) -> str:
+    """The name of a check in a file, which is known now."""
+    struct = CHECKS.of_file(path, name, EXPECT.names[0])
+    tag = str(struct.__struct_config__.tag)  # type: ignore[attr-defined]
+    CHECKS.in_files[tag] = struct
+    return tag
 
 
 def expectation_lines(checks: Checks) -> Iterator[tuple[Verdict, str]]:

@@ -15,9 +15,7 @@ It is named as `mycheck.py:level_is_kept`, or, where a distribution has it, by a
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -25,7 +23,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.installed import entries_of
-from miro_exact.plugins import PluginError, installed_part
+from miro_exact.plugins import PluginError, installed_part, module_of
 from miro_exact.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
@@ -185,21 +183,6 @@ def installed_check(name: str) -> NamedCheck:
     if not callable(found):
         raise BadInput("", OPTION, f"check {name!r} ({entry.value}) is no function", "name a function")
     return NamedCheck(name, name, found, False)
-
-
-def module_of(path: str, option: str) -> ModuleType:
-    """Runs a file that the command line names. Raises BadInput, which names the option."""
-    if not Path(path).is_file():
-        raise BadInput(path, option, "there is no such file", "give the path of a file in Python")
-    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        raise BadInput(path, option, f"cannot be run: {raised(error)}", "repair it") from error
-    return module
 
 
 def _callable(module: ModuleType, name: str, text: str) -> Check:

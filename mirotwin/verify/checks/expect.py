@@ -39,7 +39,8 @@ CHECKS: Registry[object] = Registry(
 EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 """What a message writes for a parameter without a default."""
 WHERE_CHECKS_ARE = (
-    "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
+    "`mirotwin scenarios checks` lists them, --expect FILE.py:CLASS takes one of your own,"
+    " `mirotwin examples checks` writes one to pip install"
 )
 
 

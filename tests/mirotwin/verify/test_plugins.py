@@ -199,6 +199,63 @@ def test_a_test_is_judged_by_it_and_its_line_repeats_that(mirotwin):
     assert (code, out.splitlines()[-1]) == (0, "1 passed")
 
 
+@pytest.fixture
+def own_file(here):
+    """A check that no distribution has, in a file."""
+    source = CHECKS[: CHECKS.index("class Raises")] + CHECKS[CHECKS.index("class Still") :]
+    (here / "mine.py").write_text(source.replace("stands_still", "never_hears"))
+    return "mine.py:Still"
+
+
+def test_a_check_in_a_file_judges_as_one_that_is_installed(mirotwin, own_file, here):
+    code, out, _ = mirotwin("test", "a.scenario.toml", "--expect", own_file)
+    assert (code, f"    mirotwin test a.scenario.toml --expect {own_file}" in out.splitlines()) == (1, True)
+    assert "expectation failed: never_hears: " in out
+    err = mirotwin.ends(
+        1, "run", "a.scenario.toml", "--expect", own_file, "--out", "out", "-q", "--no-figure"
+    )
+    assert "expectation failed: never_hears: " in err
+    assert "expectation failed: never_hears: " in mirotwin.ends(
+        1, "replay", "out", "--expect", own_file, "-q"
+    )
+    err = mirotwin.refuses("replay", "out", "-q")
+    assert "expect.never_hears: there is no such check; " in err
+    assert "--expect FILE.py:CLASS takes one of your own" in err
+
+
+def test_a_case_of_a_check_in_a_file_is_judged_by_that_check_and_nothing_else_ran(mirotwin, own_file, here):
+    lines = ["# mirotwin stream 2", '#: scenario = "silent"', '#: verdict = "never_hears: of old"']
+    lines += ["#: end_tick = 2000000", "#: [expect]", "#: never_hears = true", "240000 > 31"]
+    (here / "a.stream").write_text("\n".join(lines) + "\n")
+    err = mirotwin.ends(1, "replay", "a.stream", "--expect", own_file)
+    assert "expectation not judged: never_hears: the run had no occasion for it" in err
+    (here / "mine.py").write_text((here / "mine.py").read_text().replace('"frame",', '"received",'))
+    assert "still fails, but not as recorded: never_hears" in mirotwin.ends(
+        1, "replay", "a.stream", "--expect", own_file
+    )
+    (here / "mine.py").write_text(
+        (here / "mine.py").read_text().replace('self.fail(event.tick, "no frame", "one")', "pass")
+    )
+    assert "not reproduced: never_hears passes" in mirotwin.ends(
+        4, "replay", "a.stream", "--expect", own_file
+    )
+    assert "there is no such check" in mirotwin.refuses("replay", "a.stream")
+
+
+def test_a_check_in_a_file_has_a_name_of_its_own(mirotwin, own_file, here):
+    (here / "mine.py").write_text((here / "mine.py").read_text().replace("never_hears", "no_fault"))
+    err = mirotwin.refuses("run", "fig6", "--expect", own_file)
+    assert "mine.py: --expect Still: check 'no_fault' is in mirotwin (" in err
+    assert err.endswith("; give the class another tag")
+    assert "there is no class 'Stil' derived from Check; did you mean Still?" in mirotwin.refuses(
+        "run", "fig6", "--expect", "mine.py:Stil"
+    )
+    (here / "mine.py").write_text("raise RuntimeError('no')")
+    assert "mine.py: --expect: cannot be run: RuntimeError: no (mine.py:1); repair it" in mirotwin.refuses(
+        "run", "fig6", "--expect", own_file
+    )
+
+
 @pytest.mark.slow
 def test_a_campaign_has_a_column_for_it_from_every_process(mirotwin, here):
     from mirotwin import campaign
@@ -234,13 +291,15 @@ def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here)
     "command",
     [("run", "fig6"), ("test", "a.scenario.toml"), ("campaign", "run", "c.toml"), ("fuzz", "--time", "1s")],
 )
-def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, command):
+def test_a_wrong_name_is_told_the_nearest_one_and_a_file_that_is_not_there(mirotwin, command):
     code, out, err = mirotwin(*command, "--expect", "stands_stil")
     assert (code, "there is no such check; did you mean stands_still?" in out + err) == (2, True)
     assert "--expect stands_stil" in out + err
-    err = mirotwin.ends(2, *command, "--expect", "mine.py:stands_still")
-    said = "a check in a file is for firmware on a bare processor, and given by --check; "
-    assert f"--expect mine.py:stands_still: {said}" in err
+    err = mirotwin.ends(2, *command, "--expect", "mine.py:Still")
+    said = "mine.py: --expect: there is no such file"
+    if command[0] == "campaign":
+        said = "--expect: runs of other processes name checks that are installed"
+    assert said in err
 
 
 NOTE = "leaves out calibration, pattern, centroid, window_px, self_calibration"
