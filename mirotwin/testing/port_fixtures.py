@@ -15,21 +15,15 @@ from miro_exact.bad_input import BadInput
 from miro_sim.world.machine import NotObservable, why_not
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
-from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import LACKS, RobotPort, port_for_test
 from mirotwin.testing.link import Link
+from mirotwin.testing.session_options import desk_of
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.rig_options import rig_options
 
 NAME = "mirotwin-port"
 """Of the plugin that has these fixtures."""
 OF_A_TWIN = {*dir(World), *World.STATE, *World.NOT_STATE}
-
-
-def desk_of(config: pytest.Config) -> DeskOptions:
-    """What the command line says of a port."""
-    given = {name: config.getoption(f"mirotwin_{name}", None) for name in DeskOptions.__struct_fields__}
-    return DeskOptions(**{name: value for name, value in given.items() if value is not None})
 
 
 class PortFixtures:

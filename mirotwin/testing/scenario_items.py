@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from mirotwin.testing.port_fixtures import desk_of
-from mirotwin.testing.pytest_plugin import number_option, path_option
+from mirotwin.testing.session_options import desk_of, number_option, path_option
 from mirotwin.testing.test_command import TestOptions, run_scenario
 from mirotwin.verify.steps.running import Outcome, stem_of
 
