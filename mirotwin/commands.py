@@ -94,7 +94,7 @@ SECTIONS = {
     },
     "Recorded data": {
         "replay": Lazy("replay.replay_command", "Sends recorded bytes again and compares."),
-        "diff": Lazy("replay.diff_command", "Compares two recordings."),
+        "diff": Lazy("replay.diff_command", "Compares two recordings, or two firmware images."),
         "report": Lazy("report.report_command", "Makes one page of a run, a case or a failed test."),
         "decode": Lazy("recording.decode_command", "Decodes captured bytes to frames and damage."),
         "export": Lazy("report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."),

@@ -1,4 +1,4 @@
-from .lockstep import StateDifference as StateDifference
-from .lockstep import first_difference as first_difference
+from .lockstep.pair import StateDifference as StateDifference
+from .lockstep.pair import first_difference as first_difference
 
 __all__: list[str]

@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import click
-import msgspec
+from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput, amount
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image
 from miro_sim.periods import Period
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.recording.compare import CompareRule, differences
-from mirotwin.recording.difference import Difference
 from mirotwin.recording.runner import report_faults
-from mirotwin.replay.annotated_image import annotated_of
-from mirotwin.replay.compare_options import CompareOptions
-from mirotwin.replay.differences import (
-    SHOWN,
-    differences_as_json,
-    print_differences,
-    print_firmwares,
-    print_frames,
-    print_json,
-    print_response,
-)
-from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
-from mirotwin.replay.lockstep import LOOK_TICKS
+from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
+from mirotwin.replay.lockstep.annotated_image import annotated_of
+from mirotwin.replay.options import CompareOptions, refuse_given
+from mirotwin.replay.text import SHOWN, difference_lines, difference_tables, frame_tables, response_table
 from mirotwin.rerun.job import Job, load_job, rerun_job
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
-from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom, plain_parameters
+from mirotwin.shell.json_text import print_json
+from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
@@ -44,34 +36,6 @@ from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_p
 from mirotwin.verify.cases.rerun import CaseVerdict, Rerun
 from mirotwin.verify.checks.expect import says_anything
 from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
-
-
-def replay_case(job: Job, quiet: bool) -> int:
-    """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
-    job.expectations_of_case()
-    end_tick = job.case.end_tick or None
-    with ProgressBar("replaying", end_tick, quiet) as bar:
-        again = rerun_job(job, end_tick, bar.to)
-    return _told(job.verdict_of_case(again.checks), debug_line(job.file, foreign_path(job.runs_on)), quiet)
-
-
-def replay_bare_case(path: str, firmware: str | None, check: str | None, quiet: bool) -> int:
-    """The same for a case of a bare processor. `check`: FILE.py:FUNCTION, for a case whose check is in a file."""
-    from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case  # loads the bare processor
-
-    image = load_case_firmware(path, firmware)
-    _, verdict = rerun_bare_case(path, image, check)
-    return _told(verdict, debug_line(path, firmware, check=check), quiet)
-
-
-def _told(verdict: CaseVerdict, again: str, quiet: bool) -> int:
-    """Says the verdict, and `again`, the command that stands at what failed; the exit code."""
-    for line in verdict.lines:
-        (show if verdict.code == DONE else complain)(line)
-    if verdict.failure is not None and not quiet:
-        show(again)
-    return verdict.code
-
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
 _OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
@@ -104,6 +68,20 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     ] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no lists of frames or differences.")] = False
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What is set in the scenario."""
+        return (*self.settings, *as_settings(self.expected))
+
+    @property
+    def expects(self) -> bool:
+        return any(".expect." in f".{key}" for key in self.keys)
+
+    @property
+    def shows(self) -> bool:
+        """Whether tables are printed."""
+        return not self.quiet and not self.compare.as_json
+
 
 @command_of(ReplayOptions)
 def replay(options: ReplayOptions) -> int:
@@ -135,139 +113,152 @@ def replay(options: ReplayOptions) -> int:
     """
     if not options.desk.port and (given := options.given("out", "force")):
         raise click.UsageError(f"{given[0]} needs --port.")
-    file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
+    file = file_in(options.file, (*RECORDINGS, *CASES))
     if is_bare_case(file):
-        _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
-        return replay_bare_case(file, options.firmware, options.check, options.quiet)
-    _refuse(file, "is for a case of a bare processor", options.given("check"))
-    settings = (*options.settings, *as_settings(options.expected))
-    if options.stack_from is not None and options.firmware is None:
-        raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job = load_job(file, options.firmware, settings, options.seed, options.stack_from)
-    if not job.recorded and not options.desk.port:
-        _refuse(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
-    images = load_images(options.lines_from, job.image)
-    checked_sources(options.sources)
-    desk = options.desk
-    decides = any(".expect." in f".{one}" for one in settings)
-    if decides and (desk.port or job.origin):
-        what = "is not for a robot at a port, of which only answers are known"
-        raise BadInput(file, "--expect", what, "leave it out: the answers are compared with the twin's")
-    if desk.port:
-        compare.of_answers(file)  # refuses before anything is sent
+        return _replay_bare_case(file, options)
+    job, images = _loaded(file, options)
+    if options.desk.port:
         from mirotwin.replay.replay_port import record_at_port  # loads pyserial
 
-        file = str(record_at_port(job, desk, options.out, options.force, options.quiet))
-        job = load_job(file, None)
+        options.compare.of_answers(file)  # refuses before anything is sent
+        job = load_job(f"{record_at_port(job, options.desk, options.out, options.force, options.quiet)}")
     if job.origin:
         from mirotwin.replay.replay_port import compare_with_twin
 
-        rule = compare.of_answers(file)
-        return compare_with_twin(job, rule, options.everything, options.quiet, compare.as_json)
-    if compare.kind == "answers":
+        rule = options.compare.of_answers(job.file)
+        return compare_with_twin(job, rule, options.everything, options.quiet, options.compare.as_json)
+    if options.compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
     if job.case.verdict:
-        _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
-        return replay_case(job, options.quiet)
-    judged = says_anything(job.scenario)
+        return _replay_case(job, options)
+    return _compare_with_recorded(job, images, options)
+
+
+def _replay_bare_case(file: str, options: ReplayOptions) -> int:
+    from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case  # loads the bare processor
+
+    refuse_given(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
+    image = load_case_firmware(file, options.firmware)
+    verdict = rerun_bare_case(file, image, options.check)[1]
+    return _report_case(verdict, debug_line(file, options.firmware, check=options.check), options.quiet)
+
+
+def _replay_case(job: Job, options: ReplayOptions) -> int:
+    """The exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
+    refuse_given(
+        job.file, "is not for a case, which ends where it failed", options.given("to_time", "as_json")
+    )
+    job.expectations_of_case()
+    end_tick = job.case.end_tick or None
+    with ProgressBar("replaying", end_tick, options.quiet) as bar:
+        again = rerun_job(job, end_tick, bar.to)
+    line = debug_line(job.file, foreign_path(job.runs_on))
+    return _report_case(job.verdict_of_case(again.checks), line, options.quiet)
+
+
+def _report_case(verdict: CaseVerdict, line: str, quiet: bool) -> int:
+    """`line`: the command that stands at what failed."""
+    for text in verdict.lines:
+        (show if verdict.code == DONE else complain)(text)
+    if verdict.failure is not None and not quiet:
+        show(line)
+    return verdict.code
+
+
+def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
+    """What is replayed, and the images of --lines-from. Raises BadInput for options that mean nothing there."""
+    refuse_given(file, "is for a case of a bare processor", options.given("check"))
+    if options.stack_from is not None and options.firmware is None:
+        raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
+    job = load_job(file, options.firmware, options.keys, options.seed, options.stack_from)
+    if not job.recorded and not options.desk.port:
+        refuse_given(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
+    images = load_images(options.lines_from, job.image)
+    checked_sources(options.sources)
+    if options.expects and (options.desk.port or job.origin):
+        what = "is not for a robot at a port, of which only answers are known"
+        raise BadInput(file, "--expect", what, "leave it out: the answers are compared with the twin's")
+    return job, images
+
+
+def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOptions) -> int:
+    """Replays it; a stream has nothing to be compared with."""
+    compare = options.compare
     if job.recorded:
         compare.check_reaches(job.file, job.recorded)
-    periods = _periods(job, compare.rule)
-    again = _rerun(job, compare.rule, periods, options.quiet or compare.as_json)
-    world, checks, replayed = again.world, again.checks, again.periods
-    rule = msgspec.structs.replace(compare.rule, digests=job.state == world.state.tables())
-    found = differences(job.recorded, replayed, rule)
-    apart = None
-    if found and job.image is not None and job.image.code != job.runs_on.code:
-        one, other = annotated_of(job.image, images, ()), annotated_of(job.runs_on, (), options.sources)
-        with plain_parameters(job.file, "replayed"):
-            apart = first_instruction(job.world_of, one, other, found[0].tick + LOOK_TICKS)
-
-    if not options.quiet and not compare.as_json:
-        print_frames(job, replayed, options.everything, compare.rule.to_tick)
-        if job.recorded and found:
-            print_differences(found, options.everything)
+    to_tick = compare.rule.to_tick
+    recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
+    again = _rerun(job, to_tick, not options.shows)
+    rule = replace(compare.rule, digests=job.state == again.world.state.tables())
+    found = compare_runs(
+        ComparedRun(recorded, job.image, [job.as_recorded().world_of]),
+        ComparedRun(again.periods, job.runs_on, [job.world_of]),
+        rule,
+        (
+            partial(annotated_of, images=images, sources=()),
+            partial(annotated_of, images=(), sources=options.sources),
+        ),
+    )
+    if options.shows:
+        tables = difference_tables(found, options.everything) if found.differences else ()
+        for table in (*frame_tables(job, again.periods, options.everything, to_tick), *tables):
+            show(table)
     if not job.recorded and not compare.as_json:
-        print_response(replayed)
-    failed = report_failures(checks)
-    if judged and not options.quiet and not compare.as_json:
-        show(expectations_text(checks.verdicts()))
-    faults = report_faults(world, again.tick)
-    differs = _verdict(job, compare, periods, replayed, found, apart)
-    if found and not options.quiet and not compare.as_json:
-        show(debug_line(file, options.firmware, found[0].tick))
-    code = (faults or failed) if decides else (differs or faults or failed)
+        show(response_table(again.periods))
+    failed = report_failures(again.checks)
+    if options.shows and says_anything(job.scenario):
+        show(expectations_text(again.checks.verdicts()))
+    faults = report_faults(again.world, again.tick)
+    differs = _report_difference(found, recorded, again.periods, compare)
+    if found.differences and options.shows:
+        show(debug_line(job.file, options.firmware, found.differences[0].tick))
+    code = (faults or failed) if options.expects else (differs or faults or failed)
     if compare.as_json:
-        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256}
-        document = {
-            "file": file,
-            "seed": job.seed,
-            "firmware": firmwares,
-            "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
-            **compare.rule_as_json(),
-            **differences_as_json(found, options.everything),
-            "instruction": None if apart is None else apart.as_json(),
-            "exit_code": code,
-        }
-        print_json(document)
+        print_json(_document(job, again, found, options) | {"exit_code": code})
     return code
 
 
-def _refuse(file: str, what: str, given: Sequence[str]) -> None:
-    """Raises BadInput for the first of the options that were given and mean nothing here."""
-    if given:
-        raise BadInput(file, given[0], what, "leave it out")
+def _document(job: Job, again: Rerun, found: RunDifference, options: ReplayOptions) -> dict[str, Any]:
+    return {
+        "file": job.file,
+        "seed": job.seed,
+        "firmware": {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256},
+        "periods": {"recorded": len(job.recorded), "replayed": len(again.periods)},
+        **options.compare.rule_as_json(),
+        **found.as_json(options.everything),
+    }
 
 
-def _periods(job: Job, rule: CompareRule) -> int | None:
-    """How many of the recorded control periods are replayed; None: nothing was recorded."""
-    if not job.recorded:
-        return None
-    first = job.recorded[0].index
-    there = first + len(job.recorded)
-    if rule.to_tick is None:
-        return there - first
-    return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
-
-
-def _rerun(job: Job, rule: CompareRule, periods: int | None, quiet: bool) -> Rerun:
-    """The first `periods` of it, as far as the scenario goes; a stream to where it ends, as `test` runs it.
+def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Rerun:
+    """All of it, or the control periods that begin before `to_tick`; a stream to that tick.
 
     Its checks end there, and its world with the control period, so that all frames are listed.
     """
-    if periods is None:
-        ends = (tick for tick in (rule.to_tick, job.case.end_tick) if tick)
-        until_tick = min(ends, default=job.scenario.periods * CONTROL_PERIOD_TICKS)
-    else:
-        until_tick = min(job.recorded[0].index + periods, job.scenario.periods) * CONTROL_PERIOD_TICKS
-    with ProgressBar("replaying", until_tick, quiet) as bar:
-        again = rerun_job(job, until_tick, bar.to, cut=rule.to_tick is not None)
+    end_tick = job.end_tick
+    if to_tick is not None and job.recorded:
+        end_tick = min(end_tick, -(-to_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS)
+    elif to_tick is not None:
+        end_tick = min(to_tick, job.case.end_tick or to_tick)
+    with ProgressBar("replaying", end_tick, quiet) as bar:
+        again = rerun_job(job, end_tick, bar.to, cut=to_tick is not None)
     if again.world.in_period and not again.world.stopped:
         again.world.run_to(again.world.period_end)
     return again
 
 
-def _verdict(
-    job: Job,
-    compare: CompareOptions,
-    periods: int | None,
-    replayed: Sequence[Period],
-    found: Sequence[Difference],
-    apart: FirmwareDifference | None,
+def _report_difference(
+    found: RunDifference, recorded: Sequence[Period], replayed: Sequence[Period], compare: CompareOptions
 ) -> int:
-    if not job.recorded:
+    if not recorded:
         return DONE
-    if found:
-        complain(f"the replay differs in control period {found[0].period}, {found[0]}")
-        if apart is not None:
-            print_firmwares(apart)
+    if found.differences:
+        for line in (*difference_lines(found, "the replay differs"), *found.notes):
+            complain(line)
         return exit_code("differs")
-    if periods is not None and len(replayed) < periods:
-        complain(f"the replay ended after {len(replayed)} of {periods} recorded control periods")
+    if len(replayed) < len(recorded):
+        complain(f"the replay ended after {len(replayed)} of {len(recorded)} recorded control periods")
         return exit_code("differs")
     if not compare.as_json:
-        how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
-        count = compare.rule.compared(replayed)
-        show(f"the robots' response equals the recorded one in all {amount(count, 'control period')}{how}")
+        show(f"the robots' response equals the recorded one in {compare.extent(replayed)}")
     return DONE

@@ -18,10 +18,12 @@ from mirotwin.desk.guard import DeskOptions, Guard
 from mirotwin.desk.robot_port import PORT, RobotPort
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.recorder import RunSource
-from mirotwin.replay.differences import differences_as_json, print_differences, print_json
+from mirotwin.replay.difference import RunDifference
+from mirotwin.replay.text import difference_tables
 from mirotwin.report.page.port_page import beside_twin
 from mirotwin.rerun.job import Job, sent_in
 from mirotwin.shell.console import show
+from mirotwin.shell.json_text import print_json
 from mirotwin.shell.outputs import RECORDING, OutputFolder
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
@@ -116,14 +118,16 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
     """Runs the twin with what was sent at the port, and compares its answers; the exit code."""
     comparison = beside_twin(job, quiet or as_json, rule)
     found = comparison.differences
+    difference = RunDifference(WORDS, found)
     count = sum(map(len, comparison.robots.values()))
     code = exit_code("differs" if found else "passed" if count else "not observable")
     if as_json:
         head = {"file": job.file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
         head["not_judged"] = comparison.not_judged
-        print_json(head | differences_as_json(found, everything, WORDS) | {"exit_code": code})
+        print_json(head | difference.as_json(everything) | {"exit_code": code})
     elif found and not quiet:
-        print_differences(found, everything, WORDS)
+        for table in difference_tables(difference, everything):
+            show(table)
     for slot in comparison.silent:
         complain(f"robot {slot} of the twin is not at the port: not compared")
     if comparison.not_judged:

@@ -251,6 +251,19 @@ class Job(msgspec.Struct, frozen=True):
     resumed: bytes = b""
     origin: str = ""
     firmware: bytes = b""
+    own: tuple[Scenario, int] | None = None
+
+    def as_recorded(self) -> Job:
+        """The job without other settings, seed or firmware."""
+        scenario, seed = self.own or (self.scenario, self.seed)
+        return msgspec.structs.replace(self, scenario=scenario, seed=seed, runs_on=self.image or self.runs_on)
+
+    @property
+    def end_tick(self) -> int:
+        """Where it is over: with what was recorded, where a case failed, or with its scenario."""
+        if not self.recorded:
+            return self.case.end_tick or self.scenario.end_tick
+        return min(self.recorded[-1].index + 1, self.scenario.periods) * CONTROL_PERIOD_TICKS
 
     @property
     def case_periods(self) -> int | None:
@@ -416,6 +429,7 @@ def _job_of_recording(
         resumed=source.resumed,
         origin=source.origin,
         firmware=source.firmware,
+        own=(parse_scenario(source.scenario_text, f"{path}: scenario.toml"), source.seed),
     )
 
 

@@ -48,10 +48,8 @@ def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
     Raises BadInput for a folder that is not there.
     """
     folders, own = [*map(Path, checked_sources(given)), image.path.parent], source_folder()
-    if (
-        own is not None and load_firmware(named=False).sha256 == image.sha256
-    ):  # another's files may have the same names
-        folders.append(own)
+    if own is not None and load_firmware(named=False).sha256 == image.sha256:
+        folders.insert(0, own)  # another firmware's files may have the same names
     return Sources(folders)
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import click
 import msgspec
 
 from miro_exact.bad_input import encodable
@@ -14,6 +15,10 @@ def json_bytes(document: Any, indent: int = -1) -> bytes:
     except UnicodeEncodeError:
         data = msgspec.json.encode(_encodable(msgspec.to_builtins(document)))
     return data if indent < 0 else msgspec.json.format(data, indent=indent)
+
+
+def print_json(document: Any) -> None:
+    click.echo(json_bytes(document, indent=2))
 
 
 def _encodable(value: Any) -> Any:

@@ -1,6 +1,5 @@
 """Replay without a world: scripts, the comparison of periods, and streams as scenarios."""
 
-import re
 from types import SimpleNamespace
 
 import msgspec
@@ -17,7 +16,7 @@ from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
-from mirotwin.replay.differences import frame_text, print_frames
+from mirotwin.replay.text import frame_text, frame_tables
 from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
@@ -164,7 +163,7 @@ def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place):
 
 
 @pytest.mark.parametrize("networks", [1, 2])
-def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(capsys, networks):
+def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(networks):
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
     sent = (
         Transmission(0, ">", team(3)),
@@ -173,7 +172,6 @@ def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(capsys,
     )
     recorded = [msgspec.structs.replace(PERIOD, wire=sent)]
     scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3)] * networks)
-    print_frames(SimpleNamespace(scenario=scenario, recorded=recorded), [], True, None)
-    lines = [re.split("  +", line.strip()) for line in capsys.readouterr().out.splitlines()[1:]]
+    (table,) = frame_tables(SimpleNamespace(scenario=scenario, recorded=recorded), [], True, None)
     network = "net0 " if networks > 1 else ""
-    assert [line[3] for line in lines] == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]
+    assert list(table.columns[3].cells) == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]

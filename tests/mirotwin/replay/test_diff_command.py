@@ -12,15 +12,18 @@ from intelhex import IntelHex
 from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.frames import encode
+from miro_protocol.stream import write
+from miro_protocol.transmission import Transmission
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import load
 from mirotwin.commands import main
 from mirotwin.recording.compare import KINDS, WITHIN_COUNTS, WITHIN_COUNTS_PER_SAMPLE, WITHIN_TICKS
 from mirotwin.recording.recorder import Recorder, source_of
-from tests.mirotwin.conftest import SHORT
+from tests.mirotwin.conftest import SHORT, hex_file
 from tests.mirotwin.replay.rig import STOP_AT, Planted
 from tests.mirotwin.replay.test_replay_command import rewritten
-from tests.mirotwin.verify.checks.rig import own_image
+from tests.mirotwin.verify.checks.rig import own_image, team
 
 
 @pytest.fixture(scope="module")
@@ -212,6 +215,75 @@ def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_pa
 
 def test_a_folder_without_a_recording_is_refused(mirotwin, finished, tmp_path):
     assert mirotwin.refuses("diff", finished, tmp_path) == f"{tmp_path}: is a folder; name a file in it"
+
+
+@pytest.fixture(scope="module")
+def quiet_for_a_while(tmp_path_factory):
+    """A stream after whose last frame the failsafe stops the robot."""
+    path = tmp_path_factory.mktemp("streams") / "stop.stream"
+    write(path, [Transmission(800_800 * seq, ">", encode(team(seq, 900, 700), 3)) for seq in range(1, 5)])
+    return path
+
+
+def test_two_images_are_run_and_compared_by_behaviour_state_and_instruction(
+    mirotwin, runs, quiet_for_a_while
+):
+    images = image_path(), runs / "patched.ihx"
+    code, out, err = mirotwin("diff", *images, "--on", quiet_for_a_while)
+    assert code == 4
+    assert [line.split()[0] for line in out.splitlines()[:3]] == ["made", "firmware", "firmware"]
+    first, state, changed = err.splitlines()[:3]
+    assert "the images differ in control period " in first
+    assert (
+        "/net0/robot1/lm629 left command: A LTRJ 1Fh 0400 at tick " in first or "/net0/robot0/lm629" in first
+    )
+    assert "their states differ from tick " in state
+    assert "the first changed instruction that is executed: " in changed
+    assert "failsafe.c:" in changed
+
+
+def test_images_that_do_the_same_are_the_same_however_they_were_built(mirotwin, runs):
+    """On a scenario without radio errors the failsafe never stops a robot: the changed constant has no effect."""
+    options = ("--set", "duration_s=0.5", "--set", "network.radio.bit_error_rate=0.0")
+    out = mirotwin.succeeds("diff", image_path(), runs / "patched.ihx", *options, "-q")
+    assert out == "on fig6, the images do the same in all 15 control periods\n"
+
+
+@pytest.mark.parametrize("on", ["short", "finished"])
+def test_images_run_a_scenario_or_the_bytes_of_a_recording(mirotwin, short, finished, runs, on):
+    given = {"short": short, "finished": finished}[on]
+    out = mirotwin.succeeds("diff", image_path(), image_path(), "--on", given, "--json")
+    document = json.loads(out)
+    assert (document["on"], document["seed"]) == (str(given), {"short": 0, "finished": 5}[on])
+    assert (document["periods"], document["count"], document["sources"]) == ({"a": 6, "b": 6}, 0, [])
+
+
+def test_an_image_that_faults_is_named_with_its_fault_and_has_fewer_periods(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "faulty.ihx", b"\xa5")
+    err = mirotwin.ends(4, "diff", image_path(), image, "--set", "duration_s=0.2", "-q")
+    assert "A has 6 control periods, B has 1" in err
+    assert "B: firmware fault: net0/robot0: firmware executed the undefined opcode A5 at 0x0000" in err
+
+
+def test_an_image_and_a_recording_are_compared_by_replay(mirotwin, finished, tmp_path):
+    image = hex_file(tmp_path / "idle.ihx", b"\x80\xfe")
+    for pair in ((image, finished), (finished, image)):
+        err = mirotwin.refuses("diff", *pair)
+        assert (
+            f"{image}: is an image, and {finished / 'run.mcap'} is none; give two, or use `mirotwin replay "
+            in err
+        )
+
+
+@pytest.mark.parametrize("options", [("--seed", "3"), ("--set", "duration_s=1"), ("--on", "fig7")])
+def test_how_images_run_is_no_matter_to_recordings(mirotwin, finished, options):
+    err = mirotwin.refuses("diff", finished, finished, *options)
+    assert f"{options[0]}: is for two images, and a recording has its own; leave it out" in err
+
+
+def test_answers_are_compared_with_a_twin_only(mirotwin, finished):
+    err = mirotwin.refuses("diff", finished, finished, "--compare", "answers")
+    assert "--compare answers: is for robots at a port, beside their twin" in err
 
 
 PAGE = (Path(__file__).parents[3] / "mirotwin/replay/README.md").read_text(encoding="utf-8")

@@ -15,9 +15,9 @@ from miro_sim.scenario.file import parse
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
 from mirotwin.replay import first_difference
-from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
-from mirotwin.replay.firmwares import first_instruction, moved
-from mirotwin.replay.state_fields import extents, name_of_byte
+from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, changed_instructions, same_layout
+from mirotwin.replay.lockstep.fields import extents, name_of_byte
+from mirotwin.replay.lockstep.firmwares import first_instruction, moved
 from tests.mirotwin.replay.rig import STOP_AT, TEXT, periods, planted_world, scenario, with_byte, world
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 from tests.mutants.draw import SOURCE
@@ -288,3 +288,10 @@ def test_code_that_only_moved_counts_as_the_same(images):
     assert set(map_.places)
     assert {own_image().symbols.name_at(at) for at in map_.places} == set(map_.changed)
     assert [name for name in map_.changed if not name.startswith("_telemetry")] == []
+
+
+def test_where_one_image_has_no_symbols_dead_bytes_of_its_stack_are_no_effect():
+    patched = with_byte(own_image(), STOP_AT, 125)
+    found = apart(replace(patched, symbols=Symbols({})))
+    assert found.effect.one.tick > found.changed.one.tick
+    assert found.effect.one.symbol.startswith("_failsafe_tick+")

@@ -382,3 +382,17 @@ def test_the_json_of_a_stream_says_that_nothing_was_recorded(mirotwin, tmp_path)
     assert (code, document["exit_code"], document["seed"]) == (0, 0, 9)
     assert document["periods"] == {"recorded": 0, "replayed": 3}
     assert (document["first"], document["instruction"]) == (None, None)
+
+
+def test_a_replay_names_the_first_state_that_differs_as_diff_does(mirotwin, finished):
+    code, out, err = mirotwin("replay", finished, "--seed", 6, "--json")
+    document = json.loads(out)
+    assert code == 4
+    assert document["state"]["tick"] <= document["first"]["tick"]
+    assert f"their states differ from tick {document['state']['tick']} " in err
+
+
+def test_what_was_changed_in_a_recording_is_in_no_state(mirotwin, finished, tmp_path):
+    path = rewritten(finished / "run.mcap", tmp_path / "shifted.mcap", shifted)
+    err = mirotwin.ends(4, "replay", path, "-q")
+    assert "run again, their states do not differ up to the end of control period 0: what made the" in err

@@ -12,13 +12,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from mirotwin.replay.state_fields import FieldDifference, Record, differing
+from mirotwin.replay.lockstep.fields import FieldDifference, Record, differing
 
 if TYPE_CHECKING:
     from miro_sim.world.world import Mark, World
 
 LOOK_TICKS = 24_000
-STEPS_TICKS = (1_000, 40, 1)
+STEPS_TICKS = (LOOK_TICKS, 1_000, 40, 1)
 """Each within one of the step before."""
 NAMED = 3
 

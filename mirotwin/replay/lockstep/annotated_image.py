@@ -13,7 +13,7 @@ from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
-from mirotwin.replay.state_fields import Record
+from mirotwin.replay.lockstep.fields import Record
 from mirotwin.shell.debug_files import debugged_image
 
 

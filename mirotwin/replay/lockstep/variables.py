@@ -14,9 +14,9 @@ import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.inspect.watcher import Watcher, attach, detach
-from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation
-from mirotwin.replay.lockstep import WorldPair
-from mirotwin.replay.state_fields import Record, extents
+from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, CodeLocation
+from mirotwin.replay.lockstep.fields import Record, extents
+from mirotwin.replay.lockstep.pair import WorldPair
 
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu

@@ -18,10 +18,10 @@ import msgspec
 from miro_robot.image import Image
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from miro_sim.world.world import World
-from mirotwin.replay.annotated_image import AnnotatedImage, same_layout
-from mirotwin.replay.builds import Builds, VariableDifference
-from mirotwin.replay.instructions import InstructionDifference, Stepper, first_reached
-from mirotwin.replay.state_fields import Record
+from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, same_layout
+from mirotwin.replay.lockstep.fields import Record
+from mirotwin.replay.lockstep.instructions import InstructionDifference, Stepper, first_reached
+from mirotwin.replay.lockstep.variables import Builds, VariableDifference
 
 _OFFSET = re.compile(r"\+(0x[0-9a-f]+|\d+|[0-9A-F]+h)")
 _ADDRESS = re.compile(r"\b([0-9A-F]{4,5})h")

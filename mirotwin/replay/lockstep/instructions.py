@@ -17,9 +17,9 @@ from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
-from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
-from mirotwin.replay.lockstep import LOOK_TICKS, WorldPair
-from mirotwin.replay.state_fields import STACK, Record, Value, item_differences, name_of_byte
+from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
+from mirotwin.replay.lockstep.fields import STACK, Record, Value, item_differences, name_of_byte
+from mirotwin.replay.lockstep.pair import LOOK_TICKS, WorldPair
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -77,14 +77,13 @@ class ExecutedInstruction(NamedTuple):
 class LiveState:
     """The state of a processor without what lies above its stack pointer: nobody reads that before it is written.
 
-    `stack`: where the stack begins, by the image's symbols; None: not known, and all of RAM counts.
+    `stack`: where the stack begins; None: not known, and all of RAM counts.
     """
 
-    def __init__(self, cpu: Cpu, image: Image) -> None:
+    def __init__(self, cpu: Cpu, stack: int | None) -> None:
         self.cpu = cpu
         self.flat = Flat(cpu)
-        symbol = image.symbols.names.get(STACK)
-        self.stack = None if symbol is None else symbol.address
+        self.stack = stack
         assert self.flat.fields[0].path == "iram"
 
     def save(self) -> bytes:
@@ -99,9 +98,12 @@ class Processors(WorldPair):
 
     def __init__(self, one: World, other: World) -> None:
         super().__init__(one, other)
+        # One layout: where one image has no symbols, its stack begins where that of the other does.
+        stacks = (image.symbols.names.get(STACK) for image in (one.image, other.image))
+        self.stack = next((symbol.address for symbol in stacks if symbol is not None), None)
         both = zip(one.robots, other.robots, strict=True)
         self.live = [
-            (LiveState(a.board.cpu, one.image), LiveState(b.board.cpu, other.image)) for a, b in both
+            (LiveState(a.board.cpu, self.stack), LiveState(b.board.cpu, self.stack)) for a, b in both
         ]
 
     def differ(self) -> bool:
@@ -111,9 +113,9 @@ class Processors(WorldPair):
 class InstructionLog(Watcher):
     """Keeps what a robot's processor does, until `detach`."""
 
-    def __init__(self, robot: Robot, image: Image) -> None:
+    def __init__(self, robot: Robot, stack: int | None) -> None:
         self.robot = robot
-        self.live = LiveState(robot.board.cpu, image)
+        self.live = LiveState(robot.board.cpu, stack)
         self.steps: list[ExecutedInstruction] = []
         attach(robot.board.cpu, self)
 
@@ -166,9 +168,9 @@ class Stepper:
 
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
-        one, other = self.pair.one, self.pair.other
+        one, other, stack = self.pair.one, self.pair.other, self.pair.stack
         both = zip(one.robots, other.robots, strict=True)
-        pairs = [(InstructionLog(a, one.image), InstructionLog(b, other.image)) for a, b in both]
+        pairs = [(InstructionLog(a, stack), InstructionLog(b, stack)) for a, b in both]
         try:
             while True:
                 self.pair.run_to(tick)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import click
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_sim.periods import Period
 from mirotwin.desk.compare import ANSWERS
@@ -31,6 +31,12 @@ _APPLIES = {
     "within_counts_per_sample": ("wheels",),
 }
 """A tolerance, and the comparisons that have it."""
+
+
+def refuse_given(file: str, what: str, given: Sequence[str]) -> None:
+    """Raises BadInput for the first of the options that were given and mean nothing here."""
+    if given:
+        raise BadInput(file, given[0], what, "leave it out")
 
 
 class CompareOptions(Options, frozen=True, kw_only=True):
@@ -122,14 +128,16 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             raise BadInput(file, option, "is not for what was recorded at a port", remedy)
         return self.rule if self.kind == "answers" else ANSWERS
 
-    def described(self) -> str:
-        """The comparison in words."""
+    def extent(self, periods: Sequence[Period]) -> str:
+        """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
         rule = self.rule
+        said = f"all {amount(rule.compared(periods), 'control period')}"
         if rule.kind in _APPLIES["within_ms"]:
-            return f"{rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms"
+            return f"{said} ({rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms)"
         if rule.kind == "wheels":
-            return f"wheels, within {rule.within_counts} counts and {rule.within_counts_per_sample:g} counts per sample"
-        return rule.kind
+            per_sample = f"{rule.within_counts_per_sample:g} counts per sample"
+            return f"{said} (wheels, within {rule.within_counts} counts and {per_sample})"
+        return said
 
     def rule_as_json(self) -> dict[str, Any]:
         rule = self.rule

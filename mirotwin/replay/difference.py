@@ -1,0 +1,166 @@
+"""Where two runs differ first: control period, tick, fields of the state, and with two firmwares the instruction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image
+from miro_sim.periods import Period
+from mirotwin.recording.compare import CompareRule, differences
+from mirotwin.recording.difference import DIGEST, WORDS, Difference, first_per_channel
+from mirotwin.replay.lockstep.annotated_image import AnnotatedImage
+from mirotwin.replay.lockstep.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.lockstep.pair import LOOK_TICKS, StateDifference, first_difference
+from mirotwin.shell.options import plain_parameters
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+Way = Callable[[Image], "World"]
+"""Makes a world that repeats a run from its start, on this image."""
+Annotate = Callable[[Image], AnnotatedImage]
+
+
+class ComparedRun(msgspec.Struct, frozen=True):
+    """One of two runs. `periods`: what it did; `image`: what it ran on, None where what was recorded is no image.
+
+    `ways`: how it may be repeated. `recorded`: a way repeats it only if it gives the digests of `periods` again.
+    """
+
+    periods: Sequence[Period]
+    image: Image | None
+    ways: Sequence[Way]
+    recorded: bool = False
+
+    def again(self, way: Way, image: Image, period: int) -> World | None:
+        """Its world at the start of control period `period`, None where the way does not repeat it.
+
+        A run that was recorded beside a controller, with input put in, is repeated by no controller.
+        """
+        try:
+            world = way(image)
+            world.run_to(period * CONTROL_PERIOD_TICKS)
+        except BadInput:
+            raise
+        except ValueError:  # what no host can have sent, and no caller can have done
+            return None
+        before = self.periods[:period] if self.recorded else ()
+        same = not before or before[-1].digest == world.digest
+        return world if same and world.index == period else None
+
+
+class RunDifference(msgspec.Struct, frozen=True):
+    """Where two runs, called `names`, differ. `differences`: of what they did, in the order of time. `state` and
+    `instruction` were found by repeating both; `notes`: what could not be done, and why.
+    """
+
+    names: tuple[str, str] = WORDS
+    differences: Sequence[Difference] = ()
+    state: StateDifference | None = None
+    instruction: FirmwareDifference | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def period(self) -> int:
+        """The first control period that differs."""
+        return min(each.period for each in self.differences)
+
+    @property
+    def seen_tick(self) -> int:
+        """When something differs that is more than a digest: dead bytes of a stack are enough for that."""
+        seen = [each.tick for each in self.differences if each.channel != DIGEST]
+        return (seen or [self.differences[0].tick])[0]
+
+    def as_json(self, everything: bool) -> dict[str, Any]:
+        """`channels`: the first difference of each; `differences` only if all are wanted."""
+        keys = self.names[0].lower(), self.names[1].lower()
+        all_of_them = [each.as_json(keys) for each in self.differences]
+        channels = first_per_channel(self.differences)
+        return {
+            "count": len(all_of_them),
+            "first": all_of_them[0] if all_of_them else None,
+            "channels": [{**first.as_json(keys), "count": count} for first, count in channels],
+            **({"differences": all_of_them} if everything else {}),
+            "period": self.period if all_of_them else None,
+            "state": self.state and self.state.as_json(),
+            "instruction": self.instruction and self.instruction.as_json(),
+            "notes": self.notes,
+        }
+
+
+_OTHER_DIGESTS = (
+    "no tick within the control period: run again, {} not give the recorded digests up to there (another version of"
+    " this program recorded, or input was put in beside a controller)"
+)
+_NOT_RECORDED = (
+    "run again, their states do not differ up to the end of control period {}: what made the difference was not"
+    " recorded (another version of this program, or values that were changed)"
+)
+
+
+def compare_runs(
+    one: ComparedRun,
+    other: ComparedRun,
+    rule: CompareRule,
+    annotate: tuple[Annotate, Annotate],
+    names: tuple[str, str] = WORDS,
+    only_firmware: bool = True,
+) -> RunDifference:
+    """Compares what two runs did, and where that differs repeats both for tick, fields and instruction.
+
+    `annotate`: finds the debug files of their images. `only_firmware`: apart from that they were made alike, so that
+    its first changed instruction is looked for.
+    """
+    found = RunDifference(names, differences(one.periods, other.periods, rule))
+    if not found.differences:
+        return found
+    if one.image is None or other.image is None:
+        return replace(found, notes=("they cannot be run again: what was recorded is no firmware image",))
+    try:
+        with plain_parameters("the run", "repeated"):
+            return _repeated(found, one, other, annotate if only_firmware else None)
+    except BadInput as error:
+        return replace(found, notes=(f"they cannot be run again: {error}",))
+
+
+def _repeated(
+    found: RunDifference, one: ComparedRun, other: ComparedRun, annotate: tuple[Annotate, Annotate] | None
+) -> RunDifference:
+    """`annotate` None: no instruction is looked for."""
+    assert one.image is not None
+    assert other.image is not None
+    first, unrepeated = _first_period(one, other, found.period), set(found.names)
+    for way, other_way in zip(one.ways, other.ways, strict=True):
+        world, other_world = one.again(way, one.image, first), other.again(other_way, other.image, first)
+        if world is not None and other_world is not None:
+            break
+        repeated = found.names[0] if world is not None else found.names[1] if other_world is not None else ""
+        unrepeated.discard(repeated)
+    else:
+        whose = f"{unrepeated.pop()} does" if len(unrepeated) == 1 else "they do"
+        return replace(found, notes=(_OTHER_DIGESTS.format(whose),))
+    end_tick = (max(first, found.period) + 1) * CONTROL_PERIOD_TICKS
+    state = first_difference(world, other_world, end_tick, CONTROL_PERIOD_TICKS)
+    if state is None:
+        return replace(found, notes=(_NOT_RECORDED.format(found.period),))
+    instruction = None
+    if annotate is not None and one.image.code != other.image.code:
+        images = annotate[0](one.image), annotate[1](other.image)
+        instruction = first_instruction(other_way, *images, found.seen_tick + LOOK_TICKS)
+    return replace(found, state=state, instruction=instruction)
+
+
+def _first_period(one: ComparedRun, other: ComparedRun, seen: int) -> int:
+    """Up to where nobody need look: the states differ first in that control period, by the recorded digests."""
+    if not (one.recorded and other.recorded):
+        return 0
+    for here, there in zip(one.periods, other.periods, strict=False):
+        if here.digest != there.digest:
+            return here.index
+    return max(0, seen - 1)

@@ -1,0 +1,1 @@
+"""Two worlds run beside each other: the first tick, field, variable and instruction in which they differ."""

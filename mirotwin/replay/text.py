@@ -1,0 +1,152 @@
+"""What `replay` and `diff` say of two runs: lines and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich.table import Table
+
+from miro_exact.bad_input import amount
+from miro_exact.clock import seconds
+from miro_protocol.events import Damaged
+from miro_protocol.frames import TeamFrame, TelemetryFrame
+from miro_protocol.transmission import DOWN
+from miro_sim.periods import Period
+from mirotwin.recording.capture.recorded import transmissions_of
+from mirotwin.recording.capture.render import SHOWN_BYTES, described
+from mirotwin.recording.capture.rows import DecodedRow, rows
+from mirotwin.recording.difference import first_per_channel, shown
+from mirotwin.replay.difference import RunDifference
+from mirotwin.replay.lockstep.firmwares import FirmwareDifference
+from mirotwin.replay.lockstep.instructions import InstructionDifference
+from mirotwin.replay.lockstep.variables import VariableDifference
+from mirotwin.rerun.job import Job
+from mirotwin.shell.console import plain_table
+
+LISTED = 5
+"""Variables and registers that are named in a line."""
+Names = tuple[str, str]
+
+
+def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
+    """Where `subject` differs first, and what was found by repeating both runs; the notes are not in it."""
+    yield f"{subject} in control period {found.period}, {found.differences[0].said(found.names)}"
+    if found.state is not None:
+        yield f"their states differ from {found.state} on"
+    if found.instruction is not None:
+        yield from _firmware_lines(found.instruction, found.names)
+
+
+def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table | str]:
+    """The first difference of each channel, or all of them."""
+    listed = first_per_channel(found.differences)
+    if everything:
+        listed = [(each, 1) for each in found.differences]
+    table = plain_table("period", "tick", "t [s]", justify="right")
+    table.add_column("channel", no_wrap=True)
+    for name in found.names:
+        table.add_column(name)
+    if not everything:
+        table.add_column("in all", justify="right")
+    for each, count in listed:
+        place = (str(each.period), str(each.tick), f"{seconds(each.tick):.6f}", each.topic)
+        table.add_row(*place, *each.values(), *([] if everything else [str(count)]))
+    yield table
+    if len(listed) < len(found.differences):
+        yield f"{len(found.differences)} differences in {amount(len(listed), 'channel')}; --all lists them"
+
+
+def _firmware_lines(found: FirmwareDifference, names: Names) -> Iterator[str]:
+    for each in (found.changed, found.mapped):
+        if each is not None:
+            yield from _instruction_lines("the first changed instruction that is executed", each, names)
+    if found.effect is not None and found.effect != found.changed:
+        yield from _instruction_lines("the states differ for good from here on", found.effect, names)
+    if found.effect is not None and found.effect.parted is not None:
+        yield f"they go on at different places after {found.effect.parted}"
+    for variable in found.variables[:LISTED]:
+        yield from _variable_lines(variable, names)
+    if len(found.variables) > LISTED:
+        yield f"{len(found.variables) - LISTED} more variables differ; --json lists them"
+    yield from found.notes
+
+
+def _instruction_lines(head: str, found: InstructionDifference, names: Names) -> Iterator[str]:
+    yield f"{head}: net{found.network}/robot{found.slot}: {names[0]} {found.one}"
+    if (found.one.pc, found.one.text) != (found.other.pc, found.other.text):
+        yield f"  {names[1]} {found.other}"
+    values = [
+        f"{each.name}: {names[0]} {shown(each.one)}, {names[1]} {shown(each.other)}" for each in found.values
+    ]
+    if values:
+        more = f"; {len(values) - LISTED} more" if len(values) > LISTED else ""
+        yield f"  after it {'; '.join(values[:LISTED])}{more}"
+
+
+def _variable_lines(found: VariableDifference, names: Names) -> Iterator[str]:
+    place = f"net{found.network}/robot{found.slot}: {found.name}"
+    since = f"tick {found.tick} ({seconds(found.tick):.6f} s)"
+    yield f"from {since} on {place} differs: {names[0]} {found.one}, {names[1]} {found.other}"
+    for name, writer in zip(names, found.writers, strict=True):
+        if writer is not None:
+            yield f"  {name}: written at {writer}"
+
+
+SHOWN = 20
+"""Frames in the list unless all are asked for."""
+
+
+def frame_tables(
+    job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None
+) -> Iterator[Table | str]:
+    """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
+    robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
+    found = sorted(
+        rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
+        key=lambda row: row.event.start_tick,
+    )
+    if to_tick is not None:
+        found = [row for row in found if row.event.start_tick < to_tick]
+    listed = found if everything else found[:SHOWN]
+    table = plain_table("tick", "t [s]", justify="right")
+    table.add_column("")
+    table.add_column("from")
+    table.add_column("frame")
+    for row in listed:
+        sender = "host" if row.direction == DOWN else "robot ?"
+        if isinstance(row.message, TelemetryFrame):
+            sender = f"robot {row.message.slot}"
+        if len(robots) > 1:
+            sender = f"net{row.network} {sender}"
+        tick = row.event.start_tick
+        table.add_row(str(tick), f"{seconds(tick):.4f}", row.direction, sender, frame_text(row))
+    yield table
+    if len(listed) < len(found):
+        yield f"{len(found) - len(listed)} more of {len(found)} frames; --all lists them"
+
+
+def response_table(replayed: Sequence[Period]) -> Table:
+    """What the robots made of a stream: there is no recording to compare with."""
+    names = ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]")
+    table = plain_table(*names, justify="right")
+    for index, robot in enumerate(replayed[-1].robots):
+        seen = [period.robots[index] for period in replayed]
+        commands = sum(len(one.left.commands) + len(one.right.commands) for one in seen)
+        counters = [
+            str(count) if count is not None else "?"
+            for count in (robot.accepted, robot.rejected, robot.stale)
+        ]
+        positions = (str(robot.left.real_position), str(robot.right.real_position))
+        table.add_row(f"{robot.slot}", *counters, str(commands), *positions)
+    return table
+
+
+def frame_text(row: DecodedRow) -> str:
+    """What a frame or a damaged run says."""
+    text = described(row)
+    if isinstance(row.event, Damaged):
+        more = " .." if len(row.event.data) > SHOWN_BYTES else ""
+        return f"{text}: {row.event.data[:SHOWN_BYTES].hex(' ')}{more}"
+    if isinstance(row.message, TeamFrame):
+        return f"{text}  {' '.join(f'{left:+d}/{right:+d}' for left, right in row.message.velocities)}"
+    return text if row.message is not None else f"frame with {text}"
