@@ -16,7 +16,7 @@ from miro_sim.periods import Axis
 from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
-from mirotwin.replay.text import frame_text, frame_tables
+from mirotwin.replay.text import frame_tables, frame_text
 from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
