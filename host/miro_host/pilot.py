@@ -83,7 +83,6 @@ class Pilot:
         wheels: Wheels | None = None,
         *,
         estimator: Estimator[Any] | None = None,
-        period_s: float = PERIOD_S,
         reference_lead_s: float = 0.0,
         integrator: Integrator | None = None,
         dead_s: float = DEAD_S,
@@ -97,7 +96,7 @@ class Pilot:
         self.units_per_m_s = self.wheels.units_per_m_s
         self.reference_lead_s = reference_lead_s
         self.dead_s = dead_s
-        self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
+        self.integrator = Integrator(law.parameters, PERIOD_S) if integrator is None else integrator
         self.command = STANDSTILL
         nothing = [0.0] * (len(law.INNER) + len(self.estimator.INNER))
         self.numbers = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, *nothing]

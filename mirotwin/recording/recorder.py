@@ -22,7 +22,7 @@ from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.plugins import plugins_used
 from mirotwin.recording import channels
 from mirotwin.recording.channels import ControlMessage, FaultMessage, ImageMessage, TheoryMessage
-from mirotwin.recording.rows import Message, Rows
+from mirotwin.recording.rows import Message, MessageWriter
 from mirotwin.recording.writer import McapWriter
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Recorder:
         self._waiting: list[Period | Message] = []
         self._flushed_s = -FLUSH_S  # never
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
-        self._rows = Rows(self._writer.chunk, self._add_channel)
+        self._rows = MessageWriter(self._writer.chunk, self._add_channel)
         self._writer.add_metadata(
             METADATA,
             {

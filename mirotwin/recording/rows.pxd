@@ -23,7 +23,7 @@ cdef void _put_head(unsigned char *out, Py_ssize_t begin, Py_ssize_t size, long 
 cdef void _put(unsigned char *out, Py_ssize_t place, unsigned long long value) noexcept
 
 
-cdef class Rows:
+cdef class MessageWriter:
     cdef Chunk chunk
     cdef object add_channel
     cdef readonly dict channels

@@ -116,7 +116,7 @@ def _put(out: bytearray, place: int, value: int) -> None:
     out[place + 7] = value >> 56 & 0xFF
 
 
-class Rows:
+class MessageWriter:
     """Writes messages into a chunk.
 
     `add_channel` makes a channel of a topic, from its first message and the names of a law's inner values.

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from miro_host.eye.grabber import Pixels
 from miro_host.eye.lens import Lens
-from miro_host.eye.pitch_marks import Mark
+from miro_host.eye.pitch_marks import PitchMark
 
 REACH_PX = 11
 """How far from the expected place a band may be."""
@@ -41,7 +41,7 @@ class FloorMark(NamedTuple):
     across_v: float
 
 
-def expected(lens: Lens, mark: Mark) -> FloorMark:
+def expected(lens: Lens, mark: PitchMark) -> FloorMark:
     """Where a camera draws a mark: half-way between foot and edge of a wall. Raises ValueError as `Lens.pixel` does."""
     u, v = _middle(lens, mark, 0.0)
     ahead_u, ahead_v = _middle(lens, mark, _STEP_M)
@@ -50,7 +50,7 @@ def expected(lens: Lens, mark: Mark) -> FloorMark:
     return FloorMark(u, v, 0.0 - along_v / length, along_u / length)
 
 
-def _middle(lens: Lens, mark: Mark, ahead_m: float) -> tuple[float, float]:
+def _middle(lens: Lens, mark: PitchMark, ahead_m: float) -> tuple[float, float]:
     x_m, y_m = mark.x_m + ahead_m * mark.along_x, mark.y_m + ahead_m * mark.along_y
     u, v = lens.pixel(x_m, y_m, 0.0)
     if mark.height_m == 0.0:

@@ -30,7 +30,7 @@ from miro_host.eye.grabber import Pixels
 from miro_host.eye.least_squares import product
 from miro_host.eye.lens import Lens
 from miro_host.eye.mark_finder import expected, find
-from miro_host.eye.pitch_marks import MARKS, Mark
+from miro_host.eye.pitch_marks import MARKS, PitchMark
 from miro_host.eye.track import Track
 
 LEARNT = ("centre_u_px", "centre_v_px", "focal_px", "tilt_x_rad", "tilt_y_rad", "turn_rad", "k1")
@@ -103,7 +103,7 @@ class SelfCalibration:
         """Standard deviations of the parameters, by name."""
         return {name: math.sqrt(self.covariance[index * (_SIZE + 1)]) for index, name in enumerate(LEARNT)}
 
-    def _take(self, frame: Pixels, mark: Mark) -> None:
+    def _take(self, frame: Pixels, mark: PitchMark) -> None:
         try:
             band = expected(Lens(changed(self.begun.camera, self.changes)), mark)
             slopes = slopes_of(self.begun.camera, mark)
@@ -147,7 +147,7 @@ def changed(camera: CameraParameters, changes: Sequence[float]) -> CameraParamet
 
 
 @lru_cache(maxsize=4096)
-def slopes_of(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
+def slopes_of(camera: CameraParameters, mark: PitchMark) -> tuple[float, ...]:
     """By how much the mark moves across its band with each of `LEARNT`, in pixels."""
     here = expected(Lens(camera), mark)
     found = []
@@ -161,5 +161,5 @@ def slopes_of(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _hides(robot: Track, mark: Mark) -> bool:
+def _hides(robot: Track, mark: PitchMark) -> bool:
     return robot.seen > 0 and abs(robot.x_m - mark.x_m) < NEAR_M and abs(robot.y_m - mark.y_m) < NEAR_M

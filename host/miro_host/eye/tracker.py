@@ -102,13 +102,12 @@ class Tracker:
         team: str,
         robots: Sequence[int],
         pattern: PatternName,
-        calibration: Calibration,
+        calibration: Calibration | SelfCalibration,
         colours: ColourClasses,
         centroid: CentroidKind = "weighted",
         window_px: int = 32,
-        self_calibrating: bool = False,
     ) -> None:
-        """`team`: a colour of `patterns.TEAMS`; `robots`: numbers in `patterns.IDENTITIES`.
+        """`team`: a colour of `patterns.TEAMS`; `robots`: numbers in `patterns.IDENTITIES`; a SelfCalibration learns.
 
         Raises ValueError for what is not one of these, and EyeError for a colour without a class.
         """
@@ -122,8 +121,8 @@ class Tracker:
         self.kinds = [CLASS_OF[IDENTITIES[robot]] for robot in robots]
         self.table = colours.table
         self.regions = Regions(self.table)
-        self.learning = SelfCalibration(calibration) if self_calibrating else None
-        self._believe(calibration)
+        self.learning = calibration if isinstance(calibration, SelfCalibration) else None
+        self._believe(calibration.begun if isinstance(calibration, SelfCalibration) else calibration)
         chroma = colours.chroma(team)
         floor = None if colours.floor is None else colours.floor.chroma()
         self.weighings = [Weighing(chroma, colours.chroma(IDENTITIES[robot]), floor) for robot in robots]

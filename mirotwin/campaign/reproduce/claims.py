@@ -20,7 +20,7 @@ from mirotwin.campaign.reproduce.plan import (
     PAPER,
     RETUNED,
     STARTS,
-    Group,
+    RunGroup,
 )
 from mirotwin.campaign.reproduce.rows import RunRow, Table, middle, never_settled, settled
 
@@ -50,7 +50,7 @@ def rows_of(
 ) -> Sequence[RunRow]:
     """The rows of one group; none, if it was not run."""
     start = next(start for start in STARTS if start.figure == figure)
-    return table.get(Group(start, controller, camera, disturbance).label, ())
+    return table.get(RunGroup(start, controller, camera, disturbance).label, ())
 
 
 def _converges(rows: Sequence[RunRow]) -> str:

@@ -88,7 +88,7 @@ NOISE = "network.robot.estimator={kind = 'ekf', position_noise_m = 0.0081, headi
 """What the filter has to know of white noise of 2.40 cm and 4.83 degrees (three standard deviations)."""
 
 
-class Group(msgspec.Struct, frozen=True):
+class RunGroup(msgspec.Struct, frozen=True):
     """One controller from one start under one camera and one disturbance (empty: the scenario's)."""
 
     start: Start
@@ -128,14 +128,14 @@ class Group(msgspec.Struct, frozen=True):
 
 
 GROUPS = (
-    *(Group(start, controller) for start in STARTS for controller in CONTROLLERS),
+    *(RunGroup(start, controller) for start in STARTS for controller in CONTROLLERS),
     *(
-        Group(start, controller, camera)
+        RunGroup(start, controller, camera)
         for start in STARTS[:3]
         for controller in (PAPER, IMPROVED)
         for camera in CAMERAS
     ),
-    *(Group(start, PAPER, "", disturbance) for start in STARTS[:3] for disturbance in DISTURBANCES),
+    *(RunGroup(start, PAPER, "", disturbance) for start in STARTS[:3] for disturbance in DISTURBANCES),
 )
 
 

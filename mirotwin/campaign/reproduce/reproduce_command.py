@@ -23,7 +23,7 @@ from mirotwin.campaign.reproduce.plan import (
     PAPER,
     RETUNED,
     STARTS,
-    Group,
+    RunGroup,
     Start,
     plan_of,
     recorded,
@@ -128,7 +128,7 @@ def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
         LEARNING: "body_frame, ekf, self_calibration",
     }
     shown = (PAPER, LEARNING) if start.figure < 9 else (ILLUSTRATIVE, RETUNED, PAPER, LEARNING)
-    groups = {controller: Group(start, controller) for controller in shown}
+    groups = {controller: RunGroup(start, controller) for controller in shown}
     tracks = {
         f"{names[controller]} (seed {seeds[group.label]})": track_of(folder.part(group.recording), 1)
         for controller, group in groups.items()

@@ -61,14 +61,13 @@ def pilot_for(robot: sc.RobotSpec, reference: Trajectory, scenario: sc.Scenario,
     assert isinstance(controller, LawParameters)
     estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator(), chosen.estimator))
     law = _made("law", controller.name(), lambda: _remembering(controller.law(), controller.law))
-    host, period_s = scenario.host, seconds(CONTROL_PERIOD_TICKS)
+    host = scenario.host
     return Pilot(
         reference,
         law,
         Wheels(word_bits=host.word_bits),
         estimator=estimator,
-        period_s=period_s,
-        integrator=integrator_of(host.integration, controller, period_s),
+        integrator=integrator_of(host.integration, controller, seconds(CONTROL_PERIOD_TICKS)),
         dead_s=dead_s(scenario, scenario.networks[network]),
     )
 

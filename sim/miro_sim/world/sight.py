@@ -23,6 +23,7 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.grabber import Grabber, Sightings
 from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import PATTERNS, ROBOT_HEIGHT_M, TEAMS, PatternName
+from miro_host.eye.self_calibration import SelfCalibration
 from miro_host.eye.top import Top
 from miro_host.eye.track import Sighting
 from miro_host.eye.tracker import Tracker
@@ -239,11 +240,10 @@ class PixelSight(SeeingSight):
             TEAMS[network],
             [body.slot for body in bodies],
             camera.pattern,
-            calibration,
+            SelfCalibration(calibration) if camera.self_calibration == "lines" else calibration,
             colours_of(camera.lens, camera.picture, camera.pattern, camera.ball is not None),
             camera.centroid,
             camera.window_px,
-            camera.self_calibration == "lines",
         )
 
     def expose(self, tick: int) -> Sequence[Posture | None]:

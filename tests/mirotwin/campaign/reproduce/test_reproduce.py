@@ -23,7 +23,7 @@ from mirotwin.campaign.reproduce.plan import (
     PAPER,
     RETUNED,
     STARTS,
-    Group,
+    RunGroup,
     plan_of,
     recorded,
 )
@@ -70,7 +70,7 @@ def key(label):
 
 
 def noisy(figure, disturbance):
-    suffix = Group(STARTS[0], PAPER, "", disturbance).label.removeprefix("fig6-")
+    suffix = RunGroup(STARTS[0], PAPER, "", disturbance).label.removeprefix("fig6-")
     return key(f"fig{figure}-{suffix}")
 
 
@@ -183,7 +183,7 @@ def test_each_disturbance_of_the_paper_drives_the_papers_law_from_figs_6_to_8_an
     ]
     for group in groups:
         scenario, settings = group.scenario()
-        plain = Group(group.start, PAPER).scenario()[1]
+        plain = RunGroup(group.start, PAPER).scenario()[1]
         assert load(scenario, settings).scenario != load(scenario, plain).scenario
         assert set(group.recording) <= set(string.ascii_lowercase + string.digits + "-.")
     text = page(table(), "0 to 19", "reproduction")
@@ -200,11 +200,11 @@ def test_each_controller_runs_from_each_start_with_the_gains_of_its_path():
     }
     for start in STARTS:
         for controller in (PAPER, *EPSILONS, IMPROVED):
-            scenario, settings = Group(start, controller).scenario()
+            scenario, settings = RunGroup(start, controller).scenario()
             path = "line" if start.path == "straight line" else "curve"
             assert scenario in names[path, controller in EPSILONS]
             assert f"network.robot.start_error_x_cm={start.x_cm}" in settings
-    assert Group(STARTS[0], RETUNED).label == "fig6-epsilon-retuned"
+    assert RunGroup(STARTS[0], RETUNED).label == "fig6-epsilon-retuned"
     assert len({group.label for group in GROUPS}) == len(GROUPS)
 
 
@@ -218,7 +218,7 @@ def test_of_each_group_the_run_with_the_median_error_is_recorded():
     assert middle_seeds(table) == {"fig6-paper": 6}
     (job,) = recorded(plan, middle_seeds(table), lambda name: f"out/{name}")
     assert (job.origin, job.seed, job.recording) == ("fig6", 6, "out/fig6-paper.mcap")
-    assert job.settings == Group(STARTS[0], PAPER).scenario()[1]
+    assert job.settings == RunGroup(STARTS[0], PAPER).scenario()[1]
     assert "tracks_within_cm" in job.text
 
 
@@ -254,13 +254,13 @@ def test_seeds_that_are_none_are_refused(seeds):
 @pytest.fixture
 def few(monkeypatch):
     """Some of the groups, and runs that last until robots settle."""
-    whole = Group.scenario
+    whole = RunGroup.scenario
 
     def short(group):
         name, settings = whole(group)
         return name, (*settings, "duration_s=2.5")
 
-    monkeypatch.setattr(Group, "scenario", short)
+    monkeypatch.setattr(RunGroup, "scenario", short)
     groups = tuple(
         group
         for group in GROUPS
