@@ -62,12 +62,14 @@ def _take(layout: struct.Struct, data: bytes, at: int) -> tuple[Any, ...]:
 
 def out_of_range(value: Any, low: Any, high: Any) -> str:
     """What is wrong with a value that is not from `low` to `high`."""
+    # NaN alone is not equal to itself.
     return "is NaN" if value != value else f"is {value}, not from {low} to {high}"
 
 
 def _checked(values: Iterable[Any], bounds: Bounds) -> None:
     low, high = bounds
     for value in values:
+        # Written so that NaN, for which each comparison is false, is refused too.
         if not low <= value <= high:
             raise ValueError(out_of_range(value, low, high))
 
@@ -75,6 +77,7 @@ def _checked(values: Iterable[Any], bounds: Bounds) -> None:
 def _bounds(code: str, low: Any, high: Any) -> Bounds | None:
     """None where every value of the type will do; of a real number NaN never will."""
     if low is None:
+        # Infinities pass, NaN does not: a digest of NaN would hide what made it.
         return (-INFINITY, INFINITY) if code == "d" else None
     return (low, high)
 
@@ -84,15 +87,18 @@ class Number(Kind):
 
     def __init__(self, form: str, low: Any = None, high: Any = None) -> None:
         self.form = form
+        # Not form[-1]: compiled code does not index from the end.
         self.code = form[len(form) - 1]
         self.count = int(form[: len(form) - 1]) if form[: len(form) - 1] else 0  # 0: no array
         self.bounds = _bounds(self.code, low, high)
+        # "<": standard sizes without padding, the same bytes on every machine.
         self.layout = struct.Struct(f"<{form}")
         self.is_real = self.code == "d"
         self.packed = NUMBER, self.code, self.count, None
 
     def write(self, part: Any, name: str, value: Any) -> None:
         if self.count:
+            # Item by item: others hold the array, and an array of C cannot be replaced.
             array = getattr(part, name)
             for index in range(self.count):
                 array[index] = value[index]
@@ -146,6 +152,7 @@ class Items(Kind):
 
     def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
         (count,) = _take(_COUNT, data, at)
+        # Before `count` is believed: four damaged bytes must not ask for gigabytes.
         if count > self.room:
             raise ValueError(f"has {count} items, not at most {self.room}")
         if not count:
@@ -195,6 +202,7 @@ class Octets(Kind):
 
     def write(self, part: Any, name: str, value: bytes) -> None:
         if isinstance(kept := getattr(part, name), bytearray):
+            # In place, because others hold it.
             kept[:] = value
         else:
             setattr(part, name, value)
@@ -204,6 +212,7 @@ class Octets(Kind):
 
     def decode(self, data: bytes, at: int) -> tuple[bytes, int]:
         (length,) = _take(_COUNT, data, at)
+        # The room first: a length that is too large is named as that, not as an early end.
         if length > self.room:
             raise ValueError(f"has {length} bytes, not at most {self.room}")
         if at + 4 + length > len(data):
@@ -237,6 +246,7 @@ class Row(Kind):
     def encode(self, value: Any) -> bytes:
         cells = value if self.split is None else self.split(value)
         for index in self.reals:
+            # NaN: it alone is not equal to itself.
             if cells[index] != cells[index]:
                 raise ValueError("holds NaN")
         if self.layout is not None:
@@ -279,6 +289,7 @@ class Rows(Kind):
 
     def write(self, part: Any, name: str, value: list[Any]) -> None:
         rows = getattr(part, name)
+        # A tuple cannot change; a list or deque stays the object that others hold.
         if isinstance(rows, tuple):
             setattr(part, name, tuple(value))
         else:

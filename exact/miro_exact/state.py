@@ -133,6 +133,7 @@ class One:
         self.value: Any = None
         self.sibling: One | None = None
         if isinstance(before, One) and isinstance(before.field.kind, Queue) and isinstance(field.kind, Queue):
+            # Two arrays share one `end`: of two lengths in bytes the second would cut or stretch the first.
             if before.field.part is field.part and before.field.kind.end == field.kind.end:
                 self.sibling = before
 
@@ -169,6 +170,7 @@ class Flat:
             raise TypeError(f"{type(root).__name__} declares no state")
         blocks = _blocks(self._pieces)
         self._blocks = [block for block, _ in blocks]
+        # All fields before any `after_load`: it may look at any part.
         self._steps = [*(block.put for block in self._blocks), *self._after]
         self._packed = _together(self._blocks)
         self._hashed = _together([block for block, counts in blocks if counts])
@@ -180,6 +182,7 @@ class Flat:
 
     def save(self) -> bytes:
         """The state as it is. Raises DomainError with the field's name for NaN."""
+        # All before the first byte is packed: settling one part may move fields of another.
         for settle in self._before:
             settle()
         return b"".join([block.pack() for block in self._packed])
@@ -202,11 +205,13 @@ class Flat:
             before = self.save()
         except DomainError:  # it holds NaN, and can only be left
             before = b""
+        # From here on the blocks may hold other bytes; they are good only at the end.
         self._accepted = None
         self._check(data)
         try:
             self._put()
         except Exception:
+            # `after_load` refuses what has been written already: what was there is put back.
             if before:
                 self._check(before)
                 self._put()
@@ -234,6 +239,7 @@ class Flat:
         at = 0
         for block in self._blocks:
             at = block.check(data, at)
+        # Checked after the last block: what is too long would be read as far as it goes.
         if at != len(data):
             raise ValueError(f"the state has {len(data)} bytes, not {at}")
 
@@ -243,6 +249,7 @@ class Flat:
 
     def _walk(self, part: Any, prefix: str, counts: bool) -> None:
         if hasattr(part, "before_save"):
+            # Before those of its parts: a CPU settles its peripherals.
             self._before.append(part.before_save)
         for entry in _entries(part):
             if isinstance(entry, Group):
@@ -254,6 +261,7 @@ class Flat:
             elif (child := getattr(part, entry.name)) is not None:
                 self._walk(child, f"{prefix}{entry.name}.", counts and entry.counts)
         if hasattr(part, "after_load"):
+            # After those of its parts: what it caches may come from what they cache.
             self._after.append(part.after_load)
 
 
@@ -275,6 +283,7 @@ def _own_entries(cls: type, part: Any) -> Iterator[Group | Below]:
     places, declared = _places(cls, part), cls.__dict__.get("STATE", {})
     apart = cls.__dict__.get("NOT_HASHED", ())
     sorts = [(_sort(name, kind, places), name not in apart, name) for name, kind in declared.items()]
+    # Neighbours only: the order of the bytes is that of the tables, whatever is compiled.
     for (sort, counts), group in groupby(sorts, itemgetter(0, 1)):
         names = [name for _, _, name in group]
         if sort == "below":
@@ -311,6 +320,7 @@ def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[i
         assert isinstance(kind, (Number, Queue))
         address, c_type, size = places[name]
         count = kind.room if isinstance(kind, Queue) else max(kind.count, 1)
+        # Fields are copied by address: a width that is wrong would take a neighbour's bytes along.
         fits = CODES.get(c_type) == kind.code and size == count * calcsize(f"<{kind.code}")
         if not fits or (kind.bounds and kind.code not in "iqBd"):
             what = f"{c_type} of {size} bytes is declared as {count} {kind.code}"
@@ -341,6 +351,7 @@ def _blocks(pieces: list[Piece]) -> list[tuple[Any, bool]]:
             )
             continue
         for (field,) in map(Piece.fields, group):
+            # Not found[-1]: compiled code does not index from the end.
             found.append((One(field, found[len(found) - 1][0] if found else None), counts))
     return found
 

@@ -193,6 +193,7 @@ class Board(Bus):
             if stopped:
                 self.sync(min(horizon, cpu.cycles * CYCLE_TICKS))
             else:
+                # The CPU waits short of `due`: HI may change there, and its pins have to show that to the next cycle.
                 self.sync(due if cpu.cycles < until_cycle else horizon)
             if stopped == REPLAN:
                 stopped = 0
@@ -211,6 +212,7 @@ class Board(Bus):
             if stopped != BREAKPOINT:
                 return stopped
             self.log.note(REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
+            # Past the marked instruction, at which the next run would end at once.
             stopped = self.run(cpu.cycles * CYCLE_TICKS + 1)
             if stopped or cpu.cycles * CYCLE_TICKS >= until_tick:
                 return stopped
@@ -224,6 +226,7 @@ class Board(Bus):
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
         while True:
+            # Whole PWM pulses in one go. A probe wants to see each edge, so with one they are made one by one.
             if self.probe is None and self.plant.run_pulses(tick):
                 self.bridge_enable[0] = self.left.pwm
                 self.bridge_enable[1] = self.right.pwm
@@ -285,6 +288,7 @@ class Board(Bus):
             self.forced = 1
             self.cpu.hold()
             for address in range(256):
+                # Zeros are chosen, so that a run repeats: silicon has anything there (C7).
                 self.cpu.poke_iram(address, 0)
         tick = self.cpu.cycles * CYCLE_TICKS
         self.sync(tick)
@@ -303,6 +307,7 @@ class Board(Bus):
     def _set_bridge(self, tick: int, side: int, chip: Lm629) -> None:
         self.bridge_enable[side] = chip.pwm
         self.bridge_sign[side] = chip.sign
+        # The chip's sign is 1 for negative torque (SNVS781, PWM SIGN).
         self.plant.set_bridge(tick, side, chip.pwm, 1 - chip.sign)
 
     def _drive_interrupts(self, tick: int) -> None:
@@ -368,6 +373,7 @@ class Board(Bus):
             self._put_address(address, start)
             self._set_pins(0, value, start + _DATA)
             self._set_pins(3, self.bank[3] & (0xFF ^ _WR), start + _STROBE)
+            # /WR rises on the tick on which the latches take their bytes: chips are driven once, with both.
             self.bank[3] |= _WR
             changed = True
         for index in range(self.latches):
@@ -379,6 +385,7 @@ class Board(Bus):
             self._drive_chips(tick)
         if self.on_movx_bus:
             self._set_pins(0, 0xFF, start + _DATA_ENDS)
+            # No sheet says when P2 shows its latch again: two ticks after the strobe (X2).
             self._set_pins(2, page, start + _PAGE_ENDS)
 
     def movx_read(self, address: int, tick: int) -> int:
@@ -422,6 +429,7 @@ class Board(Bus):
     def _drive_chips(self, tick: int) -> None:
         """Puts the present levels on both chips' pins, then what they answer on the bus."""
         data = self.bank[self.data_bank]
+        # Without supply the chips stand, though the ports of the held CPU, /RST among them, are high.
         pins = self._pins() if self.powered else self._pins() & ~_BOTH_RST
         left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
         at_left = self._strobes(left) | self.left.port.writing | self.left.port.reading
@@ -443,11 +451,13 @@ class Board(Bus):
         self.strobed = self.left.port.writing | self.left.port.reading
         self.strobed |= self.right.port.writing | self.right.port.reading
         due = min(self._next_interrupt(self.left), self._next_interrupt(self.right))
+        # The CPU runs up to the horizon without looking: it has to be told that something may come before.
         if due < self.horizon:  # a reset has begun to end, or a mask has gone
             self.horizon = due
             self.cpu.replan()
         levels = self.left.port.drive if self.left.port.reading else 0xFF
         if self.right.port.reading:
+            # Both drive: a low wins, and the fault is `_watch_bus`'s.
             levels &= self.right.port.drive
         self._watch_bus(self.left.port.reading & self.right.port.reading, tick)
         if levels != self.bus_levels:
@@ -467,6 +477,7 @@ class Board(Bus):
         if busy_writes != self.busy_writes:
             self.busy_writes = busy_writes
             self.fault(FaultKind.LM629_BUSY, self.cpu.at, tick)
+        # Where it begins: one fault, not one for each edge while it lasts.
         if both_drive and not self.contention:
             self.fault(FaultKind.BUS_CONTENTION, self.cpu.at, tick)
         self.contention = both_drive
@@ -498,6 +509,7 @@ class Board(Bus):
         self._note(kind, pc, tick, self.cpu.stack_said() if kind in STACK_FAULTS else "")
 
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
+        # RST and the supply move pins as no firmware would: not its fault.
         if not self.forced:
             self.fault_count += 1
             self.log.note(FAULT, tick, kind, pc)
@@ -515,6 +527,7 @@ class Board(Bus):
         self.left.check_times(earliest_tick)
         self.right.check_times(earliest_tick)
         latest_tick = earliest_tick + 2 * _BEHIND_TICKS + SAMPLE_TICKS
+        # A plant far behind would take ages to catch up, and one far ahead would not move.
         next_tick = self.plant.next_tick
         if next_tick < earliest_tick or latest_tick < next_tick < NEVER_TICK:
             raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")

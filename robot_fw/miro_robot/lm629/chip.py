@@ -164,11 +164,13 @@ class Lm629:
         self.reset_level = level
         if level == 0:
             self.reset_tick = tick
+            # By the pin alone: a RESET command keeps the error threshold (SNVS781, RESET).
             self.threshold = 0x7FFF
             self.encoder.settle(tick)
             self._enter_reset(_HELD, _HARDWARE_RESET, NEVER_TICK)
         elif tick - self.reset_tick >= self.options.reset_pulse_clocks * LM629_CLOCK_TICKS:
             self.mode = _RESETTING
+            # Reset clocks are counted from the next edge of the chip's own clock, every fourth tick.
             self.next_tick = (tick + 3 & -4) + self.reset_ticks
 
     def _enter_reset(self, mode: int, lock: int, until_tick: int) -> None:
@@ -237,6 +239,7 @@ class Lm629:
                 self.next_tick = self.period_tick + _PWM_TICKS
             else:
                 self._period(now)
+        # Last: a flag that a sample on this very tick raises keeps HI high (I4).
         if self.hi_falls_tick <= tick:
             self.hi = 0
             self.hi_falls_tick = NEVER_TICK
@@ -276,6 +279,7 @@ class Lm629:
         if self.pwm_magnitude == 0 or self.pulses == 0:
             self.next_tick = self.sample_tick
         elif self.pulse_late:
+            # A step of the magnitude is 4 clocks of 4 ticks.
             self.next_tick = now + _PWM_TICKS - 16 * self.pwm_magnitude
         else:
             self.pwm = 1
@@ -283,6 +287,7 @@ class Lm629:
 
     def _sample(self, now: int) -> None:
         """One sample; its order is chosen (README.md, "Inside a sample")."""
+        # First, so that STT, error and breakpoint all count from the positions of this sample.
         flags = self._latch_position(now)
         if self.start_taken:
             flags |= self._start()
@@ -293,6 +298,7 @@ class Lm629:
             flags |= self._step_profile()
             error = signed_31((self.trajectory.position >> 16) - self.real_position)
             flags |= self._check_error(error, now)
+            # Asked again: LPES turns the motor off in the very sample that finds the error.
             if not self.signals.word & _MOTOR_OFF:
                 drive = self.pid.step(error)
         if self.signals.word & _MOTOR_OFF:
@@ -313,6 +319,7 @@ class Lm629:
         self.encoder.settle(now)
         flags = 0
         if self.encoder.caught:
+            # Counts up to the pulse, added to the position of the sample before: it moves on below.
             self.index_position = signed_31(self.real_position + self.encoder.caught_counts)
             self.encoder.caught = 0
             self.signals.word &= ~_ACQUIRE_INDEX
@@ -321,6 +328,7 @@ class Lm629:
         moved = self.real_position + self.encoder.counts
         self.real_position = signed_31(moved)
         self.encoder.counts = 0
+        # Positions are a circle of 2^31 counts (SNVS781): the flag says that this sample passed its border.
         if self.real_position != moved:
             flags |= _WRAP_AROUND
         return flags
@@ -341,6 +349,7 @@ class Lm629:
         profile.forward = 1 if control & _FORWARD else 0
         self.start_taken = 0
         self._show_start(control)
+        # Of several stops "motor off" wins, then the abrupt one (T3).
         if control & _TURN_OFF:
             self.signals.word |= _MOTOR_OFF
             return _TRAJECTORY_COMPLETE
@@ -395,6 +404,7 @@ class Lm629:
 
     def _check_error(self, error: int, now: int) -> int:
         """Excessive position error; with LPES it turns the motor off."""
+        # The filter's error has 16 bits; whether the threshold sees more is a choice (F5).
         if not self.error_full:
             error = max(-32768, min(error, 32767))
         before = self.excessive
@@ -412,6 +422,7 @@ class Lm629:
     def _put_out(self, drive: int) -> None:
         """16 bits to sign and 7-bit magnitude (O1, O2); a motor that is off gets none (O4)."""
         top = drive >> 8 if drive >= 0 or self.rounds_down else -(-drive >> 8)
+        # -32768 shifted by 8 is -128, one more than the seven bits of the magnitude hold (O1).
         self.pwm_magnitude = min(127, -top if top < 0 else top)
         if not self.signals.word & _MOTOR_OFF:
             self.sign = self.negative if top < 0 else 1 - self.negative
@@ -453,6 +464,7 @@ class Lm629:
 
     def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
         """Levels of /CS, /RD, /WR, PS and D7..D0 from `tick` on."""
+        # What the chip does by itself up to this tick comes before what the host does on it.
         if self.next_tick <= tick or self.hi_falls_tick <= tick:
             self.advance(tick)
         outcome = self.port.pins(tick, cs, rd, wr, ps, data, self.signals.word & 0xFE)
@@ -518,6 +530,7 @@ class Lm629:
             self.real_position = 0
         elif opcode == _RESET:
             self.encoder.settle(tick)
+            # After the encoder was settled: an index caught before the command ends the SIP (R6).
             self._enter_reset(_RESETTING, _SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
         elif opcode == _PORT12 and self.options.port12_clears:
             self.signals.word &= ~_OUTPUT_8_BIT
@@ -536,6 +549,7 @@ class Lm629:
         An order that waits for its sample decides whether there is one, else the flags.
         """
         control = self.trajectory_buffer.control
+        # The order that waits will have been done before this one: what it leaves is what counts (T2).
         if self.start_taken:
             resting = self.start_taken & _STOPS_AT_ONCE
         else:
@@ -597,6 +611,7 @@ class Lm629:
     def _trajectory_word(self, word: int) -> None:
         buffer: TrajectoryBuffer = self.trajectory_buffer
         profile = self.trajectory
+        # The first word after LTRJ says which parameters follow (SNVS781, trajectory control word).
         if self.port.recorded == 2:
             self.port.expect(buffer.begin(word))
             if self.options.unsent == "working":

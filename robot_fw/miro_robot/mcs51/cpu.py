@@ -81,6 +81,7 @@ class Cpu(Chip):
             (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else NEVER_TICK
         )
         self.peripherals.look_again()  # more may have been put on RXD since the last run
+        # What was due was planned before the caller changed pins or wires: the first boundary plans again.
         self.next_event = 0
 
     def end_run(self) -> None:
@@ -94,10 +95,12 @@ class Cpu(Chip):
     def boundary(self) -> int:
         """Between two instructions, when `cycles` reached `limit`; 1 ends the run."""
         now = self.cycles
+        # Before the end of the run is looked for: a fault found here may be what ends it.
         if now >= self.next_mark:
             self._watch_main_loop(now)
         if self.stop or now >= self.until:
             return 1
+        # The listener has to read first: another edge would pass what the ring may hold (line.py).
         if self.txd.full:
             self.stop = _WIRE_FULL
             return 1
@@ -120,6 +123,7 @@ class Cpu(Chip):
         peripherals = self.peripherals
         peripherals.sync(now)
         blocked = self.blocked == now or self.powered_down != 0
+        # Polled before marks are: an LCALL takes the place of the instruction, so a mark on that is not reached.
         source = -1 if blocked else peripherals.interrupts.choose(now)
         if source < 0:
             self._note_end(now)
@@ -170,6 +174,7 @@ class Cpu(Chip):
 
     def _enter(self, source: int) -> None:
         """The hardware LCALL: two cycles, and the end of idle mode."""
+        # Asked before this interrupt counts as in service, else the main level that it interrupts is not seen.
         if not self._taken_over():
             self.marks = 0
         self.idle = 0
@@ -179,7 +184,9 @@ class Cpu(Chip):
         self.start = self.cycles
         self.at = self.pc
         self.cycles += 2
+        # in_service is 1 (low), 2 (high) or 3 (high over low): shifted by a bit it is the level just entered.
         self.interrupt_returns[self.peripherals.interrupts.in_service >> 1] = self.sp << 16 | self.pc
+        # Vectors 03h, 0Bh, 13h, 1Bh, 23h, 2Bh: eight bytes apart, in polling order (4316E section 2.16).
         self.pc = self.call(self.pc, 8 * source + 3)
         self._expect(self.cycles)
 
@@ -257,6 +264,7 @@ class Cpu(Chip):
             elif row == 0x08:  # INC Rn
                 iram[self.bank + (rom[at] & 7)] = (iram[self.bank + (rom[at] & 7)] + 1) & 0xFF
             elif row == 0x10:  # JBC bit,rel
+                # JBC reads the latch: it is in the list of read-modify-write instructions (4316E section 2.5).
                 if self.latched_bit(rom[at + 1]):
                     self.write_bit(rom[at + 1], 0)
                     pc = self.branch(pc, rom[at + 2])
@@ -413,6 +421,7 @@ class Cpu(Chip):
                 value = self.a * self.b
                 self.a = value & 0xFF
                 self.b = value >> 8
+                # MUL always clears CY; OV tells that the product needs B (4316E, MUL).
                 self.cy = 0
                 self.ov = 1 if value > 0xFF else 0
             elif row == 0xA5:  # undefined: runs as NOP (C2)
@@ -489,6 +498,7 @@ class Cpu(Chip):
             elif row == 0xE0:  # MOVX A,@DPTR
                 self.a = self.movx_read(self.dptr)
             elif row == 0xE2:  # MOVX A,@Ri
+                # With @Ri the pins of P2 keep showing its latch, so that is the page (4316E section 2.6).
                 self.a = self.movx_read(self.read_latch(_P2) << 8 | iram[self.bank + (rom[at] & 1)])
             elif row == 0xE4:  # CLR A
                 self.a = 0
@@ -635,6 +645,7 @@ class Cpu(Chip):
         self.sp = (self.sp + 1) & 0xFF
         if self.sp > self.highest_sp:
             self.highest_sp = self.sp
+        # Equal, not beyond: one fault for a stack that overflows, not one for each byte that follows.
         if self.sp == self.stack_end:
             self.fault(_STACK_OVERFLOW)
 
@@ -659,6 +670,7 @@ class Cpu(Chip):
             self.highest_sp = value
         if self.stack_floor <= before < end:  # else it has not been set up yet, or was outside already
             round_the_top = value < before - 0x80 and self.rom[self.at] != _MOV_DATA
+            # A step down of more than half of RAM is a sum that went round FFh; a smaller one frees locals.
             if round_the_top or value >= end:
                 self.fault(_STACK_OVERFLOW)
             elif value < self.stack_floor:
@@ -670,12 +682,14 @@ class Cpu(Chip):
         a = self.a
         total = a + operand + carry
         self.ac = ((a ^ operand ^ total) >> 4) & 1
+        # Signed overflow: both operands have the sign that the sum lacks.
         self.ov = (((a ^ total) & (operand ^ total)) >> 7) & 1
         self.cy = total >> 8
         self.a = total & 0xFF
 
     def subtract(self, operand: int) -> None:
         a = self.a
+        # Nine bits of two's complement: the ninth is the borrow.
         total = (a - operand - self.cy) & 0x1FF
         self.ac = ((a ^ operand ^ total) >> 4) & 1
         self.ov = (((a ^ operand) & (a ^ total)) >> 7) & 1
@@ -702,6 +716,7 @@ class Cpu(Chip):
             value += 0x06
         if self.cy or value > 0x9F:  # also when the first step carried
             value += 0x60
+        # DA sets CY and never clears it, so that a carry of the addition before it stays (4316E, DA).
         if value > 0xFF:
             self.cy = 1
         self.a = value & 0xFF
@@ -730,8 +745,10 @@ class Cpu(Chip):
         """A branch goes to `target`. The index is that of AFL: this place, and the one before shifted by a bit."""
         place = (self.at * _SPREAD_FROM + target * _SPREAD_TO) >> 3
         index = (place ^ self.edge_before) & self.edge_mask
+        # Shifted, so that A to B and B to A are two edges, and tight loops are not all one (AFL).
         self.edge_before = (place & self.edge_mask) >> 1
         count = self.edges[index] + 1
+        # 255 is followed by 1: an edge that was passed 256 times must not look like one that never was.
         self.edges[index] = (count & 0xFF) + (count >> 8)
 
     def enter_edges(self) -> None:

@@ -60,6 +60,7 @@ class Line:
         No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before
         the last edge.
         """
+        # Two writes to a pin on one tick are one level: what was there for no time is no edge.
         if self._end > self._first and tick <= self._ticks[(self._end - 1) & self._mask]:
             self._change_last(tick, level)
         elif level != self._last_level():
@@ -68,6 +69,7 @@ class Line:
             self._ticks[self._end & self._mask] = tick
             self._end += 1
             if self._end - self._heard > _WAITING:
+                # Nobody waits for an unread line, and the CPU must not stop for it.
                 self.full = not self.unread
 
     def _change_last(self, tick: int, level: int) -> None:
@@ -96,6 +98,7 @@ class Line:
         old, old_mask = self._ticks, self._mask
         self._ticks = array("q", bytes(8 * size))
         self._mask = size - 1
+        # Edges keep their serial numbers, so cursors stay valid; only their places change.
         for serial in range(self._first, self._end):
             self._ticks[serial & self._mask] = old[serial & old_mask]
 
@@ -127,6 +130,7 @@ class Line:
         edge = self._ticks[cursor & self._mask] if cursor < self._end else NEVER_TICK
         levels = 0
         taken = 0
+        # A bit whose level changes between its votes is left to the caller, which takes them one by one.
         while taken < most and tick + width < edge and tick + width < end:
             levels |= level << taken
             taken += 1
@@ -141,6 +145,7 @@ class Line:
     def forget(self, tick: int) -> None:
         """Drops the edges that no query at `tick` or later needs."""
         self._seek(tick)
+        # Each edge that is dropped has toggled the level.
         self._before ^= (self._cursor - self._first) & 1
         self._first = self._cursor
         if self._heard < self._first:
@@ -175,6 +180,7 @@ class Line:
         cursor = self._cursor
         while cursor < self._end and self._ticks[cursor & self._mask] <= tick:
             cursor += 1
+        # Back as well: the receiver has looked ahead for the next start bit, or at a bit that is not over.
         while cursor > self._first and self._ticks[(cursor - 1) & self._mask] > tick:
             cursor -= 1
         self._cursor = cursor
@@ -188,6 +194,7 @@ class Line:
     def ticks(self, ticks: list[int]) -> None:
         """All edges count as unread, until the listener calls `hear`."""
         size = _SIZE
+        # A power of two, because places are serial numbers under a mask.
         while size < len(ticks):
             size *= 2
         if size != self._mask + 1:
@@ -199,6 +206,7 @@ class Line:
             self._end += 1
         self._cursor = 0
         self._heard = 0
+        # Nothing was read yet, but `full` has to be known before the CPU goes on.
         self.hear(0)
 
     def __repr__(self) -> str:

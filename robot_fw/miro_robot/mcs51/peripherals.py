@@ -80,6 +80,7 @@ class Peripherals:
 
     def clear(self, cycle: int) -> None:
         """Reset: all registers but the port latches, which `Cpu` writes."""
+        # First what was due before the reset; nothing is, if the oscillator stood.
         self.settle(cycle)
         self.frozen = 0
         self.now = cycle
@@ -119,6 +120,7 @@ class Peripherals:
     def _catch_up(self, cycle: int) -> None:
         """Something is due below `cycle`, or may be: first of all what pins did, in their own cycles."""
         if self.ports.next_cycle < cycle:
+            # Not those of `cycle`: its pins are sampled when the core gets there.
             self.apply_pushes(cycle - 1)
             self.now = cycle
         if self.pulsed:
@@ -163,6 +165,7 @@ class Peripherals:
         pulse2 = self.timer2.next_pin_overflow()
         self.timers.sync(cycle)
         self.timer2.sync(cycle)
+        # A counter is known one fall ahead, so there is at most one overflow of each timer here.
         first, second = min(pulse1, pulse2), max(pulse1, pulse2)
         if first < cycle:
             self._pulse(first == pulse1, first == pulse2, first)
@@ -173,6 +176,7 @@ class Peripherals:
 
     def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
         """One overflow of timer 1 and/or timer 2 in `cycle`."""
+        # SMOD = 0 halves timer 1: every second overflow since the reset is a tick (U1).
         halved = timer1 and not self.smod and self.timers.overflows1 & 1
         ticks1 = 1 if timer1 and not halved else 0
         rx = timer2 if self.timer2.control & _RCLK else ticks1
@@ -189,6 +193,7 @@ class Peripherals:
             return event
         sources = self.interrupts.open()
         if sources & _BOTH_TIMERS:
+            # Latched at S5P2 of its cycle, polled in the next, LCALL in the one after: + 2 (4316E section 2.16).
             event = min(event, self.timers.next_flag(sources) + 2)
         if sources & _TIMER2:
             event = min(event, self.timer2.next_flag() + 2)
@@ -196,6 +201,7 @@ class Peripherals:
             if self.serial_wait < 0:
                 self.settle(self.now)
             if self.serial_wait < STOPPED_TICK:
+                # S5P2 is tick 9 of a cycle: (tick + 2) // 12 is the first cycle whose S5P2 sees a flag of that tick.
                 event = min(event, (self.serial_wait + 2) // 12 + 2)
         return event
 
@@ -219,6 +225,7 @@ class Peripherals:
         mode = self.uart.mode()
         self._note_clocks(mode)
         if mode == 0:
+            # Mode 0 shifts a bit a machine cycle and needs no 16x clock (shift.py).
             self.uart.set_clock(NEVER_TICK, 0, NEVER_TICK, 0)
             return
         next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle (U8)
@@ -227,8 +234,10 @@ class Peripherals:
         period2 = period1
         if mode != 2:
             next1 = self._timer1_tick()
+            # Timer 1 counts machine cycles, and SMOD = 0 drops every second overflow (4316E section 2.13).
             period1 = 12 * self.timers.span(1) * (1 if self.smod else 2)
             next2 = self.timer2.next_overflow_tick()
+            # As a baud rate generator timer 2 counts fosc / 2, not machine cycles (4316E section 2.12).
             period2 = 2 * self.timer2.span()
         rx2 = self.timer2.control & _RCLK
         tx2 = self.timer2.control & _TCLK
@@ -277,6 +286,7 @@ class Peripherals:
         changed3 = p3 ^ self.p3
         self.p1 = p1
         self.p3 = p3
+        # T2, T2EX; INT0, INT1, T0, T1. RXD is not among them: the serial port reads its wire between cycles too.
         if not self.frozen and (changed1 & 0x03 or changed3 & 0x3C):
             self._inputs_changed(changed1, changed3, cycle)
 
@@ -289,6 +299,7 @@ class Peripherals:
                 self.external.sample(number, (p3 >> (2 + number)) & 1, cycle)
                 self.settle(cycle + 1)
                 self.timers.set_gates(self.external.levels)  # a gate acts on the cycle after the sample
+            # Counter inputs count falls only (4316E section 2.9).
             if (changed3 >> (4 + number)) & 1 and not (p3 >> (4 + number)) & 1:
                 self.timers.fall(number, cycle)
         if changed1 & 1 and not p1 & 1:
@@ -306,6 +317,7 @@ class Peripherals:
             self.p3_reads += 1
             self.settle(cycle + 1)
             rxd = self.uart.level(tick) & self.shift.data.level_at(tick)
+            # An alternate output is ANDed with the latch, so a 0 there blocks it (4316E section 2.5).
             levels &= 0xFC | rxd | (self.uart.tx_level << 1)
         elif port == 1 and self.timer2.drives_pin():
             self.settle(cycle + 1)
@@ -316,6 +328,7 @@ class Peripherals:
 
     def read(self, address: int, cycle: int) -> int:
         """A register (port: its latch) with everything below `cycle` done."""
+        # 80h, 90h, A0h, B0h: the four ports.
         if address & 0xCF == 0x80:
             return self.ports.latches[(address - _P0) >> 4]
         self.sync(cycle)
@@ -370,6 +383,7 @@ class Peripherals:
             self.uart.write_scon(value, cycle)
             return sooner
         if address == _IE:
+            # Bit 6 of IE, and bits 7 and 6 of IP, do not exist and read 0 (C5).
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F

@@ -83,6 +83,7 @@ class Timers:
         self.on_pins = self.counts_pin(0) | self.counts_pin(1) << 1
         for part in range(3):
             mode = 2 if part == 2 else self.mode(part)
+            # Mode 0 is the timer of the 8048: TH, and five bits of TL (4316E section 2.9).
             self.top[part] = 0x2000 if mode == 0 else 0x10000 if mode == 1 else 0x100
         self._note_gates()
 
@@ -92,8 +93,10 @@ class Timers:
         stands = self.mode(1) == 3
         open0 = not self.tmod & 0x08 or self.gates & 1
         open1 = not self.tmod & 0x80 or self.gates & 2
+        # While timer 0 is split, TR1 and TF1 are TH0's: timer 1 runs unless it is in mode 3 itself (section 2.10).
         self.counts_always = 2 if split and not stands else 0
         self.counts_by_tr0 = 1 if open0 else 0
+        # TH0 has no gate and no pin: it counts machine cycles while TR1 is set.
         self.counts_by_tr1 = 4 if split else 2 if open1 and not stands else 0
         self._note_counting()
 
@@ -114,6 +117,7 @@ class Timers:
                 if steady >> part & 1:
                     self._begin(part)
                 else:
+                    # It stops: from here on only TL and TH know its count.
                     self._put(part, self.synced - self.start[part])
         self.steady = steady
 
@@ -164,6 +168,7 @@ class Timers:
     def next_overflow(self, part: int) -> int:
         """Cycle of the next overflow if nothing changes, or NEVER_TICK. A counter is known one edge ahead only."""
         if self.steady >> part & 1:
+            # The count is top - 1 when that cycle begins, and passes the top in it.
             return self.start[part] + self.top[part] - 1
         if self.counting >> part & 1 and self.top[part] - self.value(part) == 1:
             return self.edge_cycle[part] if self.edge_cycle[part] >= self.synced else NEVER_TICK
@@ -205,6 +210,7 @@ class Timers:
             self.tl[timer] = value
         if self.steady >> timer & 1:
             self._begin(timer)
+        # TH0 is split off timer 0, so a write to TH0 moves it too.
         if self.mode(0) == 3:
             if timer == 0 and self.steady & 4:
                 self._begin(2)
@@ -227,6 +233,7 @@ class Timers:
         if changed & (_TF0 | _TF1):
             started |= changed & (_TF0 | _TF1)
             for timer in range(2):
+                # A TF that software sets interrupts as one that hardware sets (I2).
                 self.interrupts.follow(1 + 2 * timer, value & (_TF0 << (2 * timer)), cycle)
         if self.mode(0) == 3:
             return _TIMER0 | _TIMER1
@@ -256,12 +263,15 @@ class Timers:
         beyond = cycle - self.start[part] - self.top[part]
         if beyond >= 0:
             span = self.span(part)
+            # Several at once: nobody looks at a timer whose flag is up or ignored.
             overflows = beyond // span + 1
             self.start[part] += overflows * span
+            # The flag goes up with the first of them.
             self._overflowed(part, overflows, cycle - 1 - beyond)
 
     def _pass_fall(self, part: int, cycle: int) -> None:
         fall = self.edge_cycle[part]
+        # An older fall was counted; one that came while the timer stood never counts.
         if self.synced <= fall < cycle:
             count = self.value(part) + 1
             if count == self.top[part]:
@@ -291,6 +301,7 @@ class Timers:
         self.interrupts.ask(1 + 2 * timer, cycle)
 
     def after_load(self) -> None:
+        # Bits 3 to 0 of TCON are kept in `ExternalInterrupts`; two copies could disagree.
         if self.control & 0x0F:
             raise ValueError(f"TCON.3:0 is {self.control & 0x0F}, which belongs to the external interrupts")
         self._set_mode(self.tmod)

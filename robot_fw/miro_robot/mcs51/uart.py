@@ -148,6 +148,7 @@ class Uart:
             self.abort(12 * cycle)
         switched_on = value & ~self.scon & _REN
         self.scon = value
+        # Software sets and clears both flags; the interrupt is their OR (4316E sections 2.13, 2.16).
         self.interrupts.follow(_SERIAL, value & (_RI | _TI), cycle)
         if switched_on:
             self.bus.receiver_on(12 * cycle)
@@ -156,12 +157,15 @@ class Uart:
         """Loads the transmitter; a character on its way is cut off, the new one begins at the next rollover (U4)."""
         self.tx_value = value
         if self.scon & _SM0:  # nine bits
+            # TB8 is loaded together with SBUF: a later write to it is for the next character (4316E section 2.13).
             ninth = 1 if self.scon & _TB8 else 0
+            # The start bit (0) is lowest, then the data from bit 0 on, the stop bit (1) highest.
             self.tx_bits = (value << 1) | (ninth << 9) | (1 << 10)
             self.tx_left = 11
         else:
             self.tx_bits = (value << 1) | (1 << 9)
             self.tx_left = 10
+        # Taken anew from this character's first rollover; all its bits keep it (U3).
         self.tx_delay = 0
 
     def write_latch(self, latch: int, tick: int) -> None:
@@ -172,12 +176,14 @@ class Uart:
     def raise_flag(self, flag: int, tick: int) -> None:
         """TI or RI goes up at `tick`, and is seen at the next S5P2."""
         self.scon |= flag
+        # S5P2 is tick 9 of a cycle: a flag of ticks 10 and 11 is seen by the next one.
         self.interrupts.ask(_SERIAL, (tick + 2) // 12)
 
     # Transmitter
 
     def _transmit(self, tick: int) -> None:
         while True:
+            # The pin follows its rollover by at most 12 ticks, so before the next rollover.
             if self.tx_edge < tick:
                 self._edge()
             if self.tx_left == 0:
@@ -193,6 +199,7 @@ class Uart:
             self.tx_coming = self.tx_bits & 1
             self.tx_bits >>= 1
             self.tx_left -= 1
+        # The divider runs while nothing is sent: where it stands decides when the next character begins (U1).
         if self.tx_next < tick:
             passed = (tick - 1 - self.tx_next) // self.tx_period + 1
             self.tx_next += passed * self.tx_period
@@ -237,6 +244,7 @@ class Uart:
         enabled = self.scon & _REN
         while now < tick:
             level = self.level(now)
+            # A fall, not a low level: a line that is still low after a bad stop bit starts nothing (4316E 2.13).
             if enabled and self.rx_last and not level:
                 self.rx_last = 0
                 self.rx_count = 1
@@ -245,6 +253,7 @@ class Uart:
                 self.rx_next = now + self.rx_period
                 return
             self.rx_last = level
+            # P3.0 at 0 holds the pin low whatever the wire does.
             change = min(self.rxd.next_edge(now), tick) if self.latch & 1 else tick
             now += ((change - now + self.rx_period - 1) // self.rx_period) * self.rx_period
         self.rx_next = now
@@ -301,6 +310,7 @@ class Uart:
         number = self.rx_count >> 4
         bit = 1 if self.rx_votes >= 2 else 0
         self.rx_votes = 0
+        # A start bit that is 1 by majority was noise: back to the search (4316E section 2.13).
         if number == 0:
             if bit:
                 self.rx_count = 0
@@ -309,6 +319,7 @@ class Uart:
         elif number == _LAST_BIT:
             self.rx_frame = self.rx_bits | (bit << 8)
             self.rx_done = _flag_tick(now)
+            # Eight bits: this was the stop bit. The search begins before it is over, so a sender may be fast.
             if not self.scon & _SM0:
                 self.rx_count = 0
         else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now (U7)
@@ -319,6 +330,7 @@ class Uart:
         tick = self.rx_done
         self.rx_done = NEVER_TICK
         last = self.rx_frame >> 8
+        # Checked when the character is complete, not before: SBUF may be read until then (4316E section 2.13).
         if self.scon & _RI or (self.scon & _SM2 and not last):
             return
         self.received = self.rx_frame & 0xFF
