@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.shell.command import Option
@@ -30,16 +30,7 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
         raise BadInput("", option, "the place is empty", "give a symbol or an address as 0x..")
     if text.isascii() and text.isdecimal() and len(text) <= 6:
         raise BadInput("", option, f"{text} is no symbol", f"write {int(text):#x} for an address")
-    for name in (text, text.removeprefix("_")):
-        found = image.symbols.find(name)
-        if found is not None and found.space == "code":
-            return found.address
-    names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
-    remedy = "put its .map or .cdb beside it, or give an address as 0x.."
-    if names:
-        near = did_you_mean(text, names) or did_you_mean(f"_{text}", names)
-        remedy = near or "see the map beside the image"
-    raise BadInput(path, option, f"no symbol {text} in the code", remedy)
+    return image.code_address(text, path, option)
 
 
 def check_code_at(address: int, image: Image, path: str, option: str) -> None:

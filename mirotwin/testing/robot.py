@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 import msgspec
 
-from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import ms
 from miro_host.wheels import Wheels
 from miro_robot.faults import FirmwareFault
@@ -111,8 +110,6 @@ class RobotUnderTest:
         """Runs on until the instruction at `place`, an address or a symbol, is the next. `within`: ticks from now;
         None: the limit of virtual time. Raises WaitFailed, and BadInput for a symbol that is not there.
         """
-        if isinstance(place, str):
-            self._check_symbol(place)
         symbol, address = (place, None) if isinstance(place, str) else (None, place)
         condition = Reached(symbol=symbol, address=address, network=self.network, slot=self.slot)
         return self._until(condition, within, f"{place} was not reached")
@@ -146,16 +143,6 @@ class RobotUnderTest:
         """Runs on until the firmware has turned its serial receiver on, and returns the tick. Raises WaitFailed."""
         up = When(predicate=lambda robot: is_up(robot.board.cpu), network=self.network, slot=self.slot)
         return self._until(up, within, "the firmware has not turned its serial receiver on").tick
-
-    def _check_symbol(self, name: str) -> None:
-        symbols = self.world.image.symbols
-        symbol = symbols.find(name)
-        if symbol is not None and symbol.space == "code":
-            return
-        code = [one.removeprefix("_") for one, there in symbols.names.items() if there.space == "code"]
-        remedy = did_you_mean(name, code) or "give a function's name, or an address"
-        what = "there is no such function" if symbol is None else "is no code"
-        raise BadInput(self.world.image.path, name, what, remedy)
 
     def __repr__(self) -> str:
         wheels = self.wheels

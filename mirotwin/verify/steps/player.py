@@ -19,6 +19,7 @@ from itertools import takewhile
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_host.wheels import Wheels
 from miro_robot.image import Image
@@ -306,9 +307,8 @@ def check_symbols(steps: Sequence[Step], image: Image, origin: str) -> None:
         condition = getattr(step, "condition", None)
         if not isinstance(condition, Reached) or condition.symbol is None:
             continue
-        place = f"step {step.number}.symbol"
-        symbol = image.symbols.find(condition.symbol)
-        if symbol is None or symbol.space != "code":
-            what = "is no symbol of" if symbol is None else "is not in code memory:"
-            remedy = "C names are those of functions that are not static; `mirotwin fw disasm` shows them"
-            raise ScenarioError(origin, place, f"{condition.symbol!r} {what} {image.path}", remedy)
+        try:
+            image.code_address(condition.symbol)
+        except BadInput as error:
+            what = f"{error.what} of {image.path}"
+            raise ScenarioError(origin, f"step {step.number}.symbol", what, error.remedy) from None

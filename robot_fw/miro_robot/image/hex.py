@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.inputs import IMAGE_BYTES, InputError, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
 from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
@@ -61,6 +61,25 @@ class Image(msgspec.Struct, frozen=True):
         names = Symbols(lambda: {**other.symbols.names, **self.symbols.names}, used)
         sha256 = hashlib.sha256(f"{self.sha256} {other.sha256}".encode()).hexdigest()
         return Image(self.path, bytes(code), used, self.size + other.size, sha256, names)
+
+    def code_address(self, name: str, path: str | Path = "", place: str = "") -> int:
+        """Of a symbol of the code, with or without the underscore that C puts before it.
+
+        Raises BadInput with the names that come close. `path`, `place`: who asked for it; default: the image.
+        """
+        for known in (name, name.removeprefix("_")):
+            symbol = self.symbols.find(known)
+            if symbol is not None and symbol.space == "code":
+                return symbol.address
+        code = [one for one, symbol in self.symbols.names.items() if symbol.space == "code"]
+        names = code if name.startswith("_") else [one.removeprefix("_") for one in code]
+        otherwise = (
+            "see the map beside the image"
+            if names
+            else "put its .map or .cdb beside it, or give an address as 0x.."
+        )
+        remedy = did_you_mean(name, names) or otherwise
+        raise BadInput(path or self.path, place, f"no symbol {name} in the code", remedy)
 
     def __repr__(self) -> str:
         return f"Image({self.path.name!r}, {self.size} bytes, sha256={self.sha256[:12]})"

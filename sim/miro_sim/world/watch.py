@@ -126,11 +126,7 @@ class Watch:
             return condition
         image = self.world.image
         assert image is not None  # a machine with an inside
-        symbol = image.symbols.find(condition.symbol)
-        if symbol is None or symbol.space != "code":
-            what = "is no symbol of" if symbol is None else "is not in code memory:"
-            raise ValueError(f"{condition.symbol!r} {what} {image.path}")
-        return msgspec.structs.replace(condition, symbol=None, address=symbol.address)
+        return msgspec.structs.replace(condition, symbol=None, address=image.code_address(condition.symbol))
 
 
 class PinWatch:

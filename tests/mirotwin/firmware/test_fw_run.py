@@ -101,7 +101,7 @@ def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(mirotwin, tmp
 @pytest.mark.parametrize(
     ("until", "expected"),
     [
-        ("maim", "no symbol maim in the code; did you mean _main?"),
+        ("maim", "no symbol maim in the code; did you mean main?"),
         ("100", "100 is no symbol; write 0x64 for an address"),
         ("", "the place is empty; give a symbol"),
         ("0x10000", "beyond the last code address"),

@@ -81,7 +81,7 @@ def test_each_test_has_its_verdict(mixed):
         "test_mine.py::test_has_a_marker_with_a_mistake: @pytest.mark.mirotwin: there is no key 'scnario'; did you",
         "test_mine.py::test_has_no_firmware: gone.ihx: there is no such file; build it, or give the path",
         "last_lef: there is no such variable; did you mean last_left",
-        "motion_stap: there is no such function; did you mean motion_stop",
+        "no symbol motion_stap in the code; did you mean motion_stop",
         "the limit of virtual time was reached, duration_s = 60",
     ],
 )

@@ -399,7 +399,7 @@ def test_a_wait_without_an_end_ends_at_the_limit_of_virtual_time():
 
 
 def test_a_symbol_that_is_no_function_is_refused(robot):
-    with pytest.raises(BadInput, match="last_left: is no code"):
+    with pytest.raises(BadInput, match="no symbol last_left in the code"):
         robot.break_at("last_left")
 
 

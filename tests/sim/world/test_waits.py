@@ -185,8 +185,8 @@ def test_a_wait_without_end_ends_with_the_run():
         (wait.Answer(slot=12), "slot: is out of range; must be <= 4"),
         (wait.Answer(accepted=300), "accepted: is out of range; must be <= 255"),
         (wait.Received(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
-        (wait.Reached(symbol="mian"), "'mian' is no symbol of"),
-        (wait.Reached(symbol="frames_accepted"), "'frames_accepted' is not in code memory"),
+        (wait.Reached(symbol="mian"), "no symbol mian in the code; did you mean main"),
+        (wait.Reached(symbol="frames_accepted"), "no symbol frames_accepted in the code"),
     ],
 )
 def test_a_condition_on_what_is_not_there_is_refused_before_anything_moves(condition, message):
