@@ -32,6 +32,7 @@ class InputFilter:
     NOT_STATE = ("wait", "direct")
 
     def __init__(self, clocks: int, level: int) -> None:
+        # The first of `clocks` equal samples is on the clock edge itself: the wait is for the others.
         self.wait = 4 * (clocks - 1) if clocks > 0 else 0
         self.direct = 1 if clocks == 0 else 0
         self.take(level)
@@ -51,6 +52,7 @@ class InputFilter:
             self.pin = level
             self.due = tick if level != self.level else NEVER_TICK
             return
+        # A sample on a clock edge sees the level just before it: this one is seen by the next edge (X3).
         clock = (tick & -4) + 4
         if clock > self.pin_tick:
             if self.pin != self.run_level:
@@ -122,6 +124,7 @@ class Encoder:
             self.settle(tick)
             return
         clock = tick & -4
+        # The order of counts and index matters only while one is looked for; the count alone is the usual way.
         if self.index.due <= clock or self.armed:
             self.settle(clock)
         elif self.quadrature.due <= clock:
@@ -157,6 +160,7 @@ class Encoder:
 
     def arm(self, tick: int) -> None:
         """Catch the next index; it is caught at once if all three inputs are low."""
+        # What came before the SIP is not its index (X4).
         self.settle(tick)
         self.armed = 1
         self.caught = 0

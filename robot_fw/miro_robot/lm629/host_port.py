@@ -112,6 +112,7 @@ class HostPort:
     def pins(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int, flags: int) -> int:
         """New pin levels from `tick` on; returns what that led to. `flags`: status bits 7..1 just now."""
         writing = 1 if cs == 0 and wr == 0 else 0
+        # With both strobes low the write wins (B4).
         reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
         outcome = _NOTHING
         if self.writing and not writing:
@@ -137,6 +138,7 @@ class HostPort:
 
     def _read_begins(self, tick: int, flags: int) -> None:
         self.fate = _IGNORED
+        # Status may be read at any time, and leaves a word in progress alone (SNVS781, host interface).
         if self.ps == 0:
             self.drive = self.status(tick, flags)
             if self.status_flags and self.words_left > 0 and self.incoming and not self.is_busy(tick):
@@ -160,12 +162,14 @@ class HostPort:
             self.writes_while_busy += 1
             return _NOTHING
         if self.ps == 0:
+            # A command that comes before the last word of the one before it drops that one (E3).
             self.abandoned = 1 if self.words_left > 0 else 0
             self.command = self.data
             self.words_left = 0
             self.low_next = self.low_next if self.keeps_phase else 0
             self.recorded = 0
             if self.low_next:
+                # The half word before goes on in this command (B3, the other reading).
                 self._record(self.word >> 8)
             self._be_busy(tick)
             return _COMMAND
@@ -210,6 +214,7 @@ class HostPort:
         self._be_busy(tick)
 
     def _be_busy(self, tick: int) -> None:
+        # One busy time for commands and words, inside the sheet's 15 to 25 us (B1).
         self.busy_until = tick + self.busy_ticks if self.broken != _STUCK else NEVER_TICK
 
     def expect(self, words: int) -> None:

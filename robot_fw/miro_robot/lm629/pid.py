@@ -58,13 +58,17 @@ class Pid:
 
     def step(self, position_error: int) -> int:
         """One sample of the closed loop. `position_error` in counts, any width; returns -32768..32767."""
+        # The filter works on 16 bits of the error (SNVS781, PID Compensation Filter).
         e = _saturated(position_error)
         self.error_sum = max(-0x800000, min(self.error_sum + e, 0x7FFFFF))
         self.integral = self._limited(self._narrow(self.ki * self._top()))
+        # Held between its samples: an interval of ds + 1 samples makes slow motion visible to it.
         if self.phase == 0:
+            # The difference of two errors has 17 bits.
             self.derivative = self._narrow(self.kd * _saturated(e - self.previous))
             self.previous = e
         self.phase = self.phase + 1 if self.phase < self.ds else 0
+        # Each product is narrowed by itself, then their sum (F1).
         return self._narrow(self._narrow(self.kp * e) + self.integral + self.derivative)
 
     def top_of_sum(self) -> int:

@@ -25,8 +25,10 @@ def _stopping_distance(speed: int, acceleration: int) -> int:
     if speed == 0:
         return 0
     if acceleration == 0:
+        # It never stops: farther than any target.
         return NEVER_TICK
     n = speed // acceleration
+    # The sum of speed, speed - a, .. down to the last term that is not negative: n + 1 terms.
     return (n + 1) * speed - acceleration * n * (n + 1) // 2
 
 
@@ -99,6 +101,7 @@ class ProfileGenerator:
         self._approach(0)
         if self.velocity != 0:
             return 0
+        # Where it rests is the target from now on, on a whole count unless P2 says otherwise.
         self.target = self.position >> 16
         if self.keeps_fraction:
             self.moving = 0
@@ -126,10 +129,12 @@ class ProfileGenerator:
         v = -self.velocity if backwards else self.velocity
         if backwards:
             distance = -distance
+        # The last step, never longer than one of the acceleration, snaps on the target.
         if 0 <= v <= a and distance <= min(a, self.max_velocity):
             self.follow(self.target)
             return 1
         if v < 0:
+            # It moves away from the target: to rest first, then back in later samples.
             v = min(v + a, 0)
         else:
             v = self._speed(v, distance)
@@ -142,9 +147,11 @@ class ProfileGenerator:
         if v < self.max_velocity:
             up = min(v + a, self.max_velocity)
         else:
+            # Above the limit, as after an LTRJ with a lower one: down to it, by no more than the acceleration.
             up = max(v - a, self.max_velocity)
         if _stopping_distance(up, a) <= distance:
             return up
+        # Above the limit `up` is the slower one already, and holding is not allowed.
         if up >= v and _stopping_distance(v, a) <= distance:
             return v
         return max(v - a, 0)

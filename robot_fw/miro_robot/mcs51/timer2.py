@@ -66,6 +66,7 @@ class Timer2:
 
     def silent(self) -> int:
         """Overflows set no TF2: baud rate generator and clock output."""
+        # A rollover sets no TF2 while it makes a baud rate or a clock (4316E section 2.12).
         return 1 if self.control & (_RCLK | _TCLK) or self.drives_pin() else 0
 
     def up_down(self) -> int:
@@ -83,6 +84,7 @@ class Timer2:
     def left(self) -> int:
         """Counts to the next overflow or underflow."""
         if self.down():
+            # Down, the underflow is the count after the one that equals RCAP2 (1919D, timer 2, up or down).
             return ((self.count - self.capture) & 0xFFFF) + 1
         return 0x10000 - self.count
 
@@ -116,6 +118,7 @@ class Timer2:
         overflows = (counts - left) // span + 1
         beyond = counts - left - (overflows - 1) * span
         if down:
+            # An underflow reloads FFFFh, not RCAP2 (1919D, timer 2, up or down).
             self.count = 0xFFFF - beyond
         else:
             self.count = 0x10000 - span + beyond
@@ -128,7 +131,9 @@ class Timer2:
             return
         self.control |= _TF2
         if self.up_down():
+            # With DCEN, EXF2 toggles as a 17th bit and interrupts no more (1919D, timer 2).
             self.control ^= _EXF2 if overflows & 1 else 0
+        # Set at S2P2 and polled in its own cycle: as if S5P2 of the one before had seen it (1919D section 13).
         self.interrupts.ask(_TIMER2, cycle - 1)
 
     def next_flag(self) -> int:
@@ -147,6 +152,7 @@ class Timer2:
         """Tick at which the state ends that overflows next as a baud rate generator, or NEVER_TICK."""
         if self.rate() != _STATES:
             return NEVER_TICK
+        # Two ticks a state; the overflow shows with the last of them (U2).
         return 12 * self.synced + 2 * self.left() - 1
 
     def counts_pin(self) -> int:
