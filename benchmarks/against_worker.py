@@ -29,7 +29,12 @@ MANY = 200
 WARM_PERIODS = 30
 
 PARTS = {
-    "runner": ("mirotwin.recording.runner", "mirotwin.rerun.runner", "mirotwin.runner"),
+    "runner": (
+        "mirotwin.runs.runner",
+        "mirotwin.runs.runner",
+        "mirotwin.runs.runner",
+        "mirotwin.runner",
+    ),
     "recording": ("mirotwin.recording.recorder",),
     "scenario": ("miro_sim.scenario.file",),
     "world": ("miro_sim.world.world",),

@@ -30,7 +30,7 @@ from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.debug.wire import Wire
-from mirotwin.rerun.inspected_run import RobotRun
+from mirotwin.runs.inspected_run import RobotRun
 from mirotwin.shell.firmware_image import load_firmware
 
 ROUNDS = 40

@@ -22,13 +22,12 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.harness.program import OPERATIONS
 from miro_robot.image import Image, load_hex
-from miro_sim.world.world import World
 from mirotwin.fuzz.inputs import SILENCE, input_of, seeds
 from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
 from mirotwin.fuzz.target import RobotTarget
-from mirotwin.verify.cases.rerun import rerun
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec, silent_scenario
 from mirotwin.verify.checks.expect import CHECKS
-from mirotwin.verify.rig_options import silent_scenario
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.for_fuzzing import FOR_FUZZING
@@ -115,8 +114,8 @@ def failed(image: Image, target: RobotTarget, data: bytes) -> tuple[str, ...]:
         )
     )
     scenario = msgspec.structs.replace(scenario, expect=_EXPECT)
-    world = World(scenario, 0, image, target.script(data))
-    return tuple(failure.check for failure in rerun(world, end_tick).failures)
+    spec = RunSpec(scenario=scenario, image=image, script=target.script(data), until_tick=end_tick)
+    return tuple(failure.check for failure in Run(spec).play().failures)
 
 
 def judged(mistake: str, image: Image, given: Sequence[bytes]) -> Row:

@@ -17,8 +17,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.runs import runner
 
 GRIP = "network.robot.drive.tyre.grip=0.8"
 

@@ -14,22 +14,20 @@ from time import perf_counter
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
-from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.worker import RunOutcome, Work
-from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
+from mirotwin.runs.result import Result
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.interface import Check
-from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import expectation_lines, verdict_of_run
+from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.steps.keys import Step
-from mirotwin.verify.steps.player import Player, player_of
 from mirotwin.verify.steps.reading import steps_of
 
 
@@ -60,52 +58,55 @@ def run_single(job: Work) -> RunOutcome:
 def _run(job: Work) -> RunOutcome:
     image = load_firmware(job.firmware.path)
     text, expected, steps = prepared(job.origin, job.text, job.settings)
-    scenario = text.scenario
-    world = World(scenario, job.seed, image)
-    checks = Checks(world, expected)
-    player = player_of(world, steps, job.origin)
-    tracks = Tracks(delay_frames=scenario.camera.delay_frames)
+    spec = RunSpec(
+        scenario=text.scenario,
+        image=image,
+        seed=job.seed,
+        expected=expected,
+        steps=steps,
+        origin=job.origin,
+    )
+    run = Run(spec)
+    tracks = Tracks(delay_frames=text.scenario.camera.delay_frames)
     began_s = perf_counter()
     with ExitStack() as files:
         recorder = None
         if job.recording:
             stream = files.enter_context(Path(job.recording).open("wb"))
-            recorder = files.enter_context(Recorder(stream, source_of(text, world)))
-        _move(world, player, tracks, recorder)
+            recorder = files.enter_context(Recorder(stream, source_of(text, run.world)))
+
+        def keep(period: Period) -> None:
+            tracks.add(period)
+            if recorder is not None:
+                recorder.write_theories(tracks.theories())
+
+        run.drive(recorder, on_period=keep)
     wall_s = perf_counter() - began_s
-    checks.finish()
-    summary = summarise(world, tracks, wall_s)
-    judges = (checks, *(player.checks if player else ()))
-    failures = [one for group in judges for one in group.failures]
-    lines = [
-        line for group in judges for verdict, line in expectation_lines(group) if verdict == "not judged"
-    ]
-    failure = f"{min(failures, key=lambda one: one.tick)}" if failures else "; ".join(lines)
-    if player is not None and player.failure is not None:
-        failure = f"step: {player.failure}"
+    run.finish()
+    result = run.result()
     return RunOutcome(
         run=job.run,
-        verdict=verdict_of_run(checks, player),
-        failure=failure,
+        verdict=result.verdict,
+        failure=_failure(run, result),
         digest=tracks.digest,
-        figures=figures_of(summary, tracks),
-        checks=_verdicts(judges),
+        figures=figures_of(summarise(run.world, tracks, wall_s), tracks),
+        checks=_verdicts(result.expectations),
         wall_s=wall_s,
     )
 
 
-def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorder | None) -> None:
-    def keep(period: Period) -> None:
-        tracks.add(period)
-        if recorder is not None:
-            recorder.write_theories(tracks.theories())
+def _failure(run: Run, result: Result) -> str:
+    """The step or the first check that failed, else what was not judged."""
+    if run.player is not None and run.player.failure is not None:
+        return f"step: {run.player.failure}"
+    if result.failures:
+        return f"{min(result.failures, key=lambda one: one.tick)}"
+    return "; ".join(text for verdict, text in result.said if verdict == "not judged")
 
-    runner.run(world, recorder, on_period=keep, move=None if player is None else player.run)
 
-
-def _verdicts(judges: Iterable[Checks]) -> dict[str, str]:
-    """Those of the run, and of checks that steps began; a name that is there twice has its judge verdict."""
+def _verdicts(expectations: Iterable[Expectation]) -> dict[str, str]:
+    """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
     found: dict[str, str] = {}
-    for one in (one for group in judges for one in group.verdicts()):
+    for one in expectations:
         found[one.name] = judge([found.get(one.name, one.verdict), one.verdict])
     return found

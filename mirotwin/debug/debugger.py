@@ -24,7 +24,7 @@ from miro_sim.world.conditions import Condition
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Position, Timeline, Trap
-from mirotwin.rerun.inspected_run import RobotRun
+from mirotwin.runs.inspected_run import RobotRun
 
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
 _BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}

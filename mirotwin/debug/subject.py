@@ -18,20 +18,20 @@ from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.subject import SubjectOptions, open_run
-from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
-from mirotwin.rerun.job import Job
+from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
+from mirotwin.runs.inspected_run import BareRun, CaseRun, RobotRun
+from mirotwin.runs.job import Job
+from mirotwin.runs.result import Result
+from mirotwin.runs.run import Run
 from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, debugged_image, load_images
 from mirotwin.shell.options import AT, RESUME
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
-from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
-from mirotwin.verify.cases.rerun import CaseVerdict
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import CHECK
 
 
@@ -96,15 +96,15 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
             verdict = _judged(timeline, run.world, run.job)
         if verdict is not None:
             why = "case"
-            said += verdict.lines
-            if verdict.failure is not None:
-                _stand_at(timeline, verdict.failure, options.slot)
+            said += verdict.texts
+            if verdict.failures:
+                _stand_at(timeline, verdict.failures[0], options.slot)
         if options.at is not None:
             why = debugger.go_to(options.at.ticks(run.tick_hz))
     return debugger, said, why
 
 
-def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, CaseVerdict | None]:
+def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, Result | None]:
     """The run, and the verdict on a case of a bare processor."""
     path = options.subject
     if is_bare_case(path):
@@ -120,13 +120,14 @@ def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, CaseVe
     return run, None
 
 
-def _judged(timeline: Timeline, world: World, job: Job) -> CaseVerdict:
+def _judged(timeline: Timeline, world: World, job: Job) -> Result:
     """What the check of a case says this time."""
-    checks = Checks(world, job.expectations_of_case())
+    job.check_case()
+    run = Run(job.spec, world)
     end_tick = job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS
     timeline.go_to(end_tick, timeline.interrupted)
-    checks.finish()
-    return job.verdict_of_case(checks)
+    run.finish()
+    return job.result_of_case(run)
 
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:

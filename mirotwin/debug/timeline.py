@@ -26,7 +26,7 @@ from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event, HostLog
 from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
-from mirotwin.rerun.inspected_run import BareRun, CaseRun, RobotRun
+from mirotwin.runs.inspected_run import BareRun, CaseRun, RobotRun
 from mirotwin.shell.progress import ProgressBar
 
 BUDGET_BYTES = 16 << 20

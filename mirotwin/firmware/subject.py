@@ -13,9 +13,10 @@ from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_machine, report, target_of
-from mirotwin.recording.runner import report_faults
-from mirotwin.rerun.inspected_run import BareRun, RobotRun, Run, watch
-from mirotwin.rerun.job import load_job
+from mirotwin.runs.inspected_run import BareRun, RobotRun, Run, watch
+from mirotwin.runs.job import load_job
+from mirotwin.runs.result import fault_lines
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Options
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
@@ -31,9 +32,10 @@ from mirotwin.shell.options import (
     plain_parameters,
     refuse_steps,
 )
-from mirotwin.shell.program import tell_notes
+from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
+from mirotwin.shell.verdicts import exit_code
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
@@ -124,7 +126,9 @@ def look(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
     if isinstance(run, RobotRun):
-        return report_faults(run.world)
+        faults = list(fault_lines(run.world.robots))
+        complain(*(text for _, text in faults))
+        return exit_code(*(verdict for verdict, _ in faults))
     assert isinstance(run, BareRun)
     return report(run.machine, run.ended, options.bare)
 
@@ -154,13 +158,14 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         refuse_steps(text.scenario, subject)
         image = load_firmware(options.firmware)
         with plain_parameters(subject):
-            world = World(text.scenario, options.seed or 0, image)
+            world = RunSpec(scenario=text.scenario, image=image, seed=options.seed or 0).world()
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
         job = load_job(subject, options.firmware, options.settings)
+        complain(*job.notes)
         periods = job.recorded[-1].index + 1 if job.recorded else job.case_periods
         with plain_parameters(subject):
-            world = job.world_of()
+            world = job.spec.world()
     network, index = _which_robot(world, options)
     return RobotRun(world, network, index, periods, job)
 

@@ -36,6 +36,7 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
 from mirotwin.recording.decode_command import ROBOTS
+from mirotwin.runs.spec import silent_scenario
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import SourceFolders, source_folders
@@ -50,7 +51,6 @@ from mirotwin.shell.verdicts import VERDICTS
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import CHECK, EXPECT, as_settings
-from mirotwin.verify.rig_options import silent_scenario
 
 if TYPE_CHECKING:
     from rich.progress import ProgressColumn

@@ -19,9 +19,9 @@ from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.target import RobotTarget, Target, TargetFailure
-from mirotwin.verify.bare.case import BareRerun, after_ticks, rerun_bare
+from mirotwin.runs.bare_case import BareRerun, after_ticks, rerun_bare
+from mirotwin.runs.run import Run, robot_spec
 from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
-from mirotwin.verify.cases.rerun import Rerun, rerun_robot
 from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, struct_of
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
@@ -31,7 +31,7 @@ SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 Expected = Mapping[str, Any]
 """Checks by name with their parameters, as the table `[expect]` of a scenario."""
-OracleVerdict = Rerun | BareRerun
+OracleVerdict = Run | BareRerun
 """What an input did that was played again."""
 
 
@@ -41,15 +41,15 @@ class RobotOracle:
     def __init__(self, target: RobotTarget) -> None:
         self.target = target
 
-    def confirm(self, data: bytes, failure: TargetFailure) -> Rerun:
+    def confirm(self, data: bytes, failure: TargetFailure) -> Run:
         """Judges an input in which the target failed so."""
         return self._rerun(data, expected_of(failure.check), failure.tick, asks=failure.check == NEVER_SLEEPS)
 
-    def judged(self, data: bytes, expected: Expected) -> Rerun:
+    def judged(self, data: bytes, expected: Expected) -> Run:
         """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
         return self._rerun(data, expected, 0)
 
-    def _rerun(self, data: bytes, expected: Expected, last_tick: int, asks: bool = False) -> Rerun:
+    def _rerun(self, data: bytes, expected: Expected, last_tick: int, asks: bool = False) -> Run:
         target = self.target
         script: list[ScriptItem] = [*target.script(data)]
         if asks or any(struct_of(name).KIND == "safety" for name in {*expected} - {*ALWAYS_ON}):
@@ -57,7 +57,8 @@ class RobotOracle:
             script += _questions(script, last_tick, target.robots, target.slot)
         after_ticks = max(AFTER_TICKS, target.harness.after_ticks)
         until_tick = max(last_tick, _end_tick(script)) + after_ticks
-        return rerun_robot(target.image, target.robots, target.slot, script, expected, until_tick)
+        spec = robot_spec(target.image, target.robots, target.slot, script, expected, until_tick)
+        return Run.traced(spec).play()
 
 
 class BareProcessorOracle:

@@ -56,6 +56,7 @@ from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.session import Pace
 from mirotwin.ports.url import parse_url
 from mirotwin.recording.recorder import Recorder, source_of
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 
@@ -109,7 +110,8 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         try:
             options = parse_url(self._port)
             text = live_scenario(options.scenario, options.settings)
-            world = World(text.scenario, options.seed, load_firmware(options.firmware, named=False))
+            image = load_firmware(options.firmware, named=False)
+            world = RunSpec(scenario=text.scenario, image=image, seed=options.seed).world()
             self._radio = RadioPort(world, options.network)
             if options.out:
                 self._files.enter_context(_recorded(world, text, OutputFolder(Path(options.out))))

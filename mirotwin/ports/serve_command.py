@@ -9,11 +9,13 @@ from typing import Annotated
 
 from miro_exact.clock import ticks
 from miro_sim.scenario.file import LONGEST_S, live_scenario
-from miro_sim.world.world import World
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import FASTEST, Pace, Session
 from mirotwin.recording.recorder import source_of
+from mirotwin.run.run_command import reported
 from mirotwin.run.run_files import RunFiles
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
@@ -32,10 +34,8 @@ from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
-from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import Expected, as_settings, report_run, verdict_first
+from mirotwin.verify.expectations import Expected, as_settings
 
 CASE = "case.stream"
 
@@ -89,17 +89,19 @@ def serve(options: ServeOptions) -> int:
         options.out or default, options.ports.force, (*FILES, CASE), ours=options.out is None
     )
     image = load_firmware(options.firmware)
+    expected = expectations_of(text.scenario, text.origin)
+    spec = RunSpec(scenario=text.scenario, image=image, seed=seed, expected=expected, origin=text.origin)
     with plain_parameters(text.origin):
-        world = World(text.scenario, seed, image)
-    source = source_of(text, world)
-    trace, checks = Trace(world), Checks(world, expectations_of(text.scenario, text.origin))
+        run = Run.traced(spec)
+    world = run.world
+    run_files = RunFiles(folder, source_of(text, world), run, text.settings)
 
     def tell(line: str) -> None:
         if not options.quiet:
             complain(line)
 
     with (
-        verdict_first(world, checks),
+        reported(run_files),
         plain_parameters(text.origin),
         held_signals() as hold,
         folder,
@@ -111,28 +113,28 @@ def serve(options: ServeOptions) -> int:
         show_line("serving")
         end_tick = ticks(LONGEST_S) if options.duration is None else options.duration.ticks()
         session = Session(world, Pace(options.pace), selector, ports, tell, end_tick, options.once)
-        run_files = RunFiles(
-            folder, source, world, hold, checks, text.settings, move=session.run, live=session.live
-        )
+        run_files.move, run_files.live = session.run, session.live
         try:
-            summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
-            if checks.failures:
-                _leave_case(folder, world, trace, checks)
+            summary = run_files.fill(ProgressBar("serving", None, quiet=True), hold, None)
+            if run.failures:
+                _leave_case(folder, run)
         except BaseException:
             if world.index:
                 folder.keep = (*KEPT, CASE)
                 with suppress(OSError):  # a full disk, which is told as what ended the session
-                    _leave_case(folder, world, trace, checks)
+                    _leave_case(folder, run)
             raise
         finally:
             live = session.live()
             behind = f"; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else ""
             tell(f"at most {live.late_max_ms:.1f} ms behind the wall clock{behind}")
     tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
-    return report_run(world, checks)
+    result = run.result()
+    complain(*result.texts)
+    return result.code
 
 
-def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks) -> None:
+def _leave_case(folder: OutputFolder, run: Run) -> None:
     """What was sent as one text file, with the check that failed if one did; `mirotwin replay` runs it again."""
-    text = case_of_checks(world, trace, checks) if checks.failures else case_text(world, trace, {}, "")
+    text = run.case() if run.failures else run.stream()
     folder.part(CASE).write_text(text, encoding="utf-8")

@@ -16,23 +16,24 @@ from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import load
 from miro_sim.scenario.file import parse as parse_scenario
-from miro_sim.world.world import World
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.difference import ComparedRun, RunDifference, Way, compare_runs
+from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, refuse_given
 from mirotwin.replay.sources import RunOrigin, SourceDifference, source_differences
 from mirotwin.replay.text import difference_lines, difference_tables
-from mirotwin.rerun.job import (
+from mirotwin.runs.job import (
     DEFAULT_SCENARIO,
     image_if_any,
     load_job,
-    replaying,
-    warn_of_plugins,
+    plugin_notes,
     world_of,
 )
+from mirotwin.runs.result import fault_lines
+from mirotwin.runs.run import Run, replaying
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Option, Options, command_line, command_of, operand
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
@@ -54,7 +55,6 @@ from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.cases.artifacts import CASES
-from mirotwin.verify.cases.rerun import rerun
 
 NAMES = ("A", "B")
 
@@ -187,7 +187,7 @@ def _read_recording(path: str) -> Side:
         raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
     if recording.broken_off:
         complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-    warn_of_plugins(path, source)
+    complain(*plugin_notes(path, source))
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
     image = image_if_any(recording, path)
     ways = [partial(world_of, recording, path, scripted=scripted) for scripted in (False, True)]
@@ -198,31 +198,27 @@ def _read_recording(path: str) -> Side:
 def _run_images(options: DiffOptions) -> tuple[Side, Side]:
     """Runs both."""
     on = file_in(options.on, (*RECORDINGS, *CASES))
-    way: Way
     if Path(on).is_file() and not on.endswith(".toml"):
         job = load_job(on, options.a, options.settings, options.seed)
-        scenario, seed, way, end_tick = job.scenario, job.seed, job.world_of, job.end_tick
+        complain(*job.notes)
+        spec, end_tick = job.spec, job.end_tick
     else:
         text = load(on, options.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, text.origin)
-        scenario, seed, end_tick = text.scenario, options.seed or 0, text.scenario.end_tick
-        way = partial(World, scenario, seed)
+        image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
+        spec = RunSpec(scenario=text.scenario, image=image, seed=seed, origin=on)
     end_tick = min(end_tick, options.compare.rule.to_tick or end_tick)
     sides = []
     for name, path in zip(NAMES, (options.a, options.b), strict=True):
         image = load_firmware(path)
         with plain_parameters(on):
-            world = way(image)
-        with ProgressBar(f"running {name}", end_tick, not options.shows) as bar, replaying(on, world):
-            periods = rerun(world, end_tick, progress=bar.to, cut=True).periods
-        faults = tuple(
-            f"{name}: firmware fault: net{robot.network}/robot{robot.slot}: {robot.board.faults[0]}"
-            for robot in world.robots
-            if robot.board.faults
-        )
-        origin = RunOrigin(scenario, seed, image.sha256, image)
-        sides.append(Side(path, ComparedRun(periods, image, [way]), origin, faults))
+            run = Run(replace(spec, image=image, until_tick=end_tick, cut=True))
+        with ProgressBar(f"running {name}", end_tick, not options.shows) as bar, replaying(on, run.world):
+            run.play(bar.to)
+        faults = tuple(f"{name}: {text}" for _, text in fault_lines(run.world.robots))
+        origin = RunOrigin(spec.scenario, spec.seed, image.sha256, image)
+        sides.append(Side(path, ComparedRun(run.periods, image, [spec.world]), origin, faults))
     return sides[0], sides[1]
 
 

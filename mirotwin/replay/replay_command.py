@@ -15,12 +15,13 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.recording.runner import report_faults
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, refuse_given
 from mirotwin.replay.text import SHOWN, difference_lines, difference_tables, frame_tables, response_table
-from mirotwin.rerun.job import Job, load_job, rerun_job
+from mirotwin.runs.job import Job, load_job
+from mirotwin.runs.result import Result, expectation_lines, expectations_text, fault_lines
+from mirotwin.runs.run import Run
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
@@ -33,9 +34,8 @@ from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_path
-from mirotwin.verify.cases.rerun import CaseVerdict, Rerun
 from mirotwin.verify.checks.expect import says_anything
-from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
+from mirotwin.verify.expectations import as_settings
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
 _OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
@@ -122,10 +122,11 @@ def replay(options: ReplayOptions) -> int:
 
         options.compare.of_answers(file)  # refuses before anything is sent
         job = load_job(f"{record_at_port(job, options.desk, options.out, options.force, options.quiet)}")
+        complain(*job.notes)
     if job.origin:
         from mirotwin.replay.replay_port import compare_with_twin
 
-        rule = options.compare.of_answers(job.file)
+        rule = options.compare.of_answers(job.spec.origin)
         return compare_with_twin(job, rule, options.everything, options.quiet, options.compare.as_json)
     if options.compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
@@ -136,7 +137,7 @@ def replay(options: ReplayOptions) -> int:
 
 
 def _replay_bare_case(file: str, options: ReplayOptions) -> int:
-    from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case  # loads the bare processor
+    from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case  # loads the bare processor
 
     refuse_given(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
     image = load_case_firmware(file, options.firmware)
@@ -147,23 +148,23 @@ def _replay_bare_case(file: str, options: ReplayOptions) -> int:
 def _replay_case(job: Job, options: ReplayOptions) -> int:
     """The exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
     refuse_given(
-        job.file, "is not for a case, which ends where it failed", options.given("to_time", "as_json")
+        job.spec.origin, "is not for a case, which ends where it failed", options.given("to_time", "as_json")
     )
-    job.expectations_of_case()
+    job.check_case()
     end_tick = job.case.end_tick or None
     with ProgressBar("replaying", end_tick, options.quiet) as bar:
-        again = rerun_job(job, end_tick, bar.to)
-    line = debug_line(job.file, foreign_path(job.runs_on))
-    return _report_case(job.verdict_of_case(again.checks), line, options.quiet)
+        again = job.run(end_tick, bar.to)
+    line = debug_line(job.spec.origin, foreign_path(job.spec.image))
+    return _report_case(job.result_of_case(again), line, options.quiet)
 
 
-def _report_case(verdict: CaseVerdict, line: str, quiet: bool) -> int:
+def _report_case(result: Result, line: str, quiet: bool) -> int:
     """`line`: the command that stands at what failed."""
-    for text in verdict.lines:
-        (show if verdict.code == DONE else complain)(text)
-    if verdict.failure is not None and not quiet:
+    for text in result.texts:
+        (show if result.code == DONE else complain)(text)
+    if result.failures and not quiet:
         show(line)
-    return verdict.code
+    return result.code
 
 
 def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
@@ -172,6 +173,7 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     job = load_job(file, options.firmware, options.keys, options.seed, options.stack_from)
+    complain(*job.notes)
     if not job.recorded and not options.desk.port:
         refuse_given(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
@@ -186,14 +188,14 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     """Replays it; a stream has nothing to be compared with."""
     compare = options.compare
     if job.recorded:
-        compare.check_reaches(job.file, job.recorded)
+        compare.check_reaches(job.spec.origin, job.recorded)
     to_tick = compare.rule.to_tick
     recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
     again = _rerun(job, to_tick, not options.shows)
     rule = replace(compare.rule, digests=job.state == again.world.state.tables())
     found = compare_runs(
-        ComparedRun(recorded, job.image, [job.as_recorded().world_of]),
-        ComparedRun(again.periods, job.runs_on, [job.world_of]),
+        ComparedRun(recorded, job.image, [(job.as_recorded or job.spec).world]),
+        ComparedRun(again.periods, job.spec.image, [job.spec.world]),
         rule,
         (
             partial(annotated_of, images=images, sources=()),
@@ -206,31 +208,34 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
             show(table)
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
-    failed = report_failures(again.checks)
-    if options.shows and says_anything(job.scenario):
+    complain(*(text for _, text in expectation_lines(again.checks)))
+    failed = exit_code(again.checks.verdict())
+    if options.shows and says_anything(job.spec.scenario):
         show(expectations_text(again.checks.verdicts()))
-    faults = report_faults(again.world, again.tick)
+    wrong = list(fault_lines(again.world.robots, again.tick))
+    complain(*(text for _, text in wrong))
+    faults = exit_code(*(verdict for verdict, _ in wrong))
     differs = _report_difference(found, recorded, again.periods, compare)
     if found.differences and options.shows:
-        show(debug_line(job.file, options.firmware, found.differences[0].tick))
+        show(debug_line(job.spec.origin, options.firmware, found.differences[0].tick))
     code = (faults or failed) if options.expects else (differs or faults or failed)
     if compare.as_json:
         print_json(_document(job, again, found, options) | {"exit_code": code})
     return code
 
 
-def _document(job: Job, again: Rerun, found: RunDifference, options: ReplayOptions) -> dict[str, Any]:
+def _document(job: Job, again: Run, found: RunDifference, options: ReplayOptions) -> dict[str, Any]:
     return {
-        "file": job.file,
-        "seed": job.seed,
-        "firmware": {"recorded": job.image.sha256 if job.image else None, "replayed": job.runs_on.sha256},
+        "file": job.spec.origin,
+        "seed": job.spec.seed,
+        "firmware": {"recorded": job.image.sha256 if job.image else None, "replayed": job.spec.image.sha256},
         "periods": {"recorded": len(job.recorded), "replayed": len(again.periods)},
         **options.compare.rule_as_json(),
         **found.as_json(options.everything),
     }
 
 
-def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Rerun:
+def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
     """All of it, or the control periods that begin before `to_tick`; a stream to that tick.
 
     Its checks end there, and its world with the control period, so that all frames are listed.
@@ -241,7 +246,7 @@ def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Rerun:
     elif to_tick is not None:
         end_tick = min(to_tick, job.case.end_tick or to_tick)
     with ProgressBar("replaying", end_tick, quiet) as bar:
-        again = rerun_job(job, end_tick, bar.to, cut=to_tick is not None)
+        again = job.run(end_tick, bar.to, cut=to_tick is not None)
     if again.world.in_period and not again.world.stopped:
         again.world.run_to(again.world.period_end)
     return again

@@ -21,7 +21,7 @@ from mirotwin.recording.recorder import RunSource
 from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.text import difference_tables
 from mirotwin.report.page.port_page import beside_twin
-from mirotwin.rerun.job import Job, sent_in
+from mirotwin.runs.job import Job, sent_in
 from mirotwin.shell.console import show
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.outputs import RECORDING, OutputFolder
@@ -44,14 +44,14 @@ _TWIN = (
 def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, quiet: bool) -> Path:
     """Sends all that the job's hosts send to the robots at the port; the recording of it. Raises BadInput."""
     sent = _sendable(job, desk)
-    folder = OutputFolder(out or _default(job.file), force, (RECORDING,), ours=out is None)
-    firmware = job.firmware if job.runs_on is job.image else b""
-    source = twin_source(job.scenario, job.seed, job.runs_on, firmware)
-    robots = job.scenario.networks[0].robots
+    folder = OutputFolder(out or _default(job.spec.origin), force, (RECORDING,), ours=out is None)
+    firmware = job.firmware if job.spec.image is job.image else b""
+    source = twin_source(job.spec.scenario, job.spec.seed, job.spec.image, firmware)
+    robots = job.spec.scenario.networks[0].robots
     with (
         folder,
         folder.part(RECORDING).open("wb") as stream,
-        RobotPort(desk, job.scenario, job.file, complain) as port,
+        RobotPort(desk, job.spec.scenario, job.spec.origin, complain) as port,
     ):
         port.record(stream, source)
         port.greet(sent=sent)
@@ -76,8 +76,8 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
 
 def _sendable(job: Job, desk: DeskOptions) -> list[Transmission]:
     """What is to be sent. Raises BadInput for what no port can send, or the guard does not allow."""
-    file = job.file
-    sent, guard = sent_in(job.script), Guard(desk, file)
+    file = job.spec.origin
+    sent, guard = sent_in(job.spec.script or ()), Guard(desk, file)
     if not sent:
         raise BadInput(file, "", "no line from host to robot", "nothing can be sent")
     for one in sent:
@@ -88,7 +88,7 @@ def _sendable(job: Job, desk: DeskOptions) -> list[Transmission]:
             what = "has a character with a bad stop bit, which no serial port sends"
             raise BadInput(file, f"tick {one.tick}", what, "leave the line out")
         guard.check(one.data, f"tick {one.tick}")
-    if count := len(job.script) - len(sent):
+    if count := len(job.spec.script or ()) - len(sent):
         actions = amount(count, "action on robots and radios is", "actions on robots and radios are")
         complain(f"{file}: {actions} not observable on a port, and left out")
     return sent
@@ -122,7 +122,7 @@ def compare_with_twin(job: Job, rule: CompareRule, everything: bool, quiet: bool
     count = sum(map(len, comparison.robots.values()))
     code = exit_code("differs" if found else "passed" if count else "not observable")
     if as_json:
-        head = {"file": job.file, "seed": job.seed, "source": PORT, "silent": comparison.silent}
+        head = {"file": job.spec.origin, "seed": job.spec.seed, "source": PORT, "silent": comparison.silent}
         head["not_judged"] = comparison.not_judged
         print_json(head | difference.as_json(everything) | {"exit_code": code})
     elif found and not quiet:

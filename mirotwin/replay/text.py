@@ -20,7 +20,7 @@ from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference
 from mirotwin.replay.lockstep.instructions import InstructionDifference
 from mirotwin.replay.lockstep.variables import VariableDifference
-from mirotwin.rerun.job import Job
+from mirotwin.runs.job import Job
 from mirotwin.shell.console import plain_table
 
 LISTED = 5
@@ -100,7 +100,7 @@ def frame_tables(
     job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None
 ) -> Iterator[Table | str]:
     """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
-    robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
+    robots = {index: network.robots for index, network in enumerate(job.spec.scenario.networks)}
     found = sorted(
         rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
         key=lambda row: row.event.start_tick,

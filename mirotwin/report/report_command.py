@@ -19,11 +19,12 @@ from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.summary import Summary
-from mirotwin.rerun.job import Job, load_job
+from mirotwin.runs.job import Job, load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
+from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
 from mirotwin.verify.cases.case import is_bare_case
@@ -102,6 +103,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
         what = "is a case of a bare processor, which has no robot to show"
         raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
     job = load_job(file, wanted.firmware)
+    complain(*job.notes)
     if job.origin:
         return port_page(job, wanted.quiet)
     return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name))
@@ -123,7 +125,7 @@ def _file_of(subject: str) -> str:
 
 
 def _of_recording(wanted: ReportOptions, job: Job) -> Material:
-    file, image, shown = job.file, job.runs_on, wanted.shown
+    file, image, shown = job.spec.origin, job.spec.image, wanted.shown
     recorded = [period for period in job.recorded if period.index in shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
@@ -163,24 +165,24 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     _, to_tick = window(wanted.from_time, wanted.to_time)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
     again = reproduce(job, min(ends, default=None), wanted.quiet)
-    report = Path(job.file).with_name(REPORT)
+    report = Path(job.spec.origin).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     return Material(
         kind="failed test" if text else "case",
         job=job,
         again=again,
         periods=[period for period in again.periods if period.index in wanted.shown],
-        sources=source_folders(job.runs_on, wanted.sources),
+        sources=source_folders(job.spec.image, wanted.sources),
         command=_command(wanted, job),
-        notes=[*([_played_with(job.runs_on, "case")] if job.case.changed else []), *_said(job, again)],
-        name=(name or Path(job.file).absolute().parent.name) if text else "",
+        notes=[*([_played_with(job.spec.image, "case")] if job.case.changed else []), *_said(job, again)],
+        name=(name or Path(job.spec.origin).absolute().parent.name) if text else "",
         report=text,
         verdict="failed" if text and not again.failures else "",
     )
 
 
 def _command(wanted: ReportOptions, job: Job) -> str:
-    return replay_line(Path(job.file).name, Path(wanted.firmware).name if wanted.firmware else None)
+    return replay_line(Path(job.spec.origin).name, Path(wanted.firmware).name if wanted.firmware else None)
 
 
 def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:

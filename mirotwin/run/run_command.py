@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
-from miro_sim.world.world import World
 from mirotwin.recording.recorder import source_of
 from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
+from mirotwin.runs.test_file import keep_saved
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
-from mirotwin.shell.program import tell_notes
+from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import as_settings, report_run, verdict_first
-from mirotwin.verify.steps.player import player_of
+from mirotwin.verify.expectations import as_settings
 from mirotwin.verify.steps.reading import everything, steps_of
-from mirotwin.verify.steps.running import keep_saved
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View
@@ -71,12 +73,20 @@ def run(options: RunOptions) -> int:
     earlier = "" if options.out is not None else digest_in(folder.path)
     image = load_firmware(options.firmware, stack_from=options.stack_from)
 
+    spec = RunSpec(
+        scenario=text.scenario,
+        image=image,
+        seed=seed,
+        expected=expectations_of(text.scenario, text.origin),
+        steps=steps,
+        cut=stops.to_tick is not None,
+        origin=text.origin,
+    )
     with plain_parameters(text.origin):
-        world = World(text.scenario, seed, image)
+        world = spec.world()
         stops.begin(world)
     source = source_of(text, world, record, stops.resumed)
-    checks = Checks(world, expectations_of(text.scenario, text.origin), cut=stops.to_tick is not None)
-    player = player_of(world, steps, text.origin)
+    under_way = Run(spec, world)
     views: list[View] = []
     if options.frames is not None or options.record_frames:
         from mirotwin.camera.view import views_of  # loads the pictures' library
@@ -87,21 +97,21 @@ def run(options: RunOptions) -> int:
         from mirotwin.camera.frame_folder import FrameFolder
 
         saved = FrameFolder(options.frames, options.force)
+    run_files = RunFiles(folder, source, under_way, text.settings, stops=stops)
     with (
-        verdict_first(world, checks, player),
+        reported(run_files),
         plain_parameters(text.origin),
         held_signals() as hold,
         folder,
     ):
         if saved is not None:
             saved.fill(views, hold)
-        recorded = views if options.record_frames else []
-        move = player.run if player else partial(stops.move, world, folder) if stops else None
-        run_files = RunFiles(
-            folder, source, world, hold, checks, text.settings, recorded, player, move, stops=stops
-        )
+        if options.record_frames:
+            run_files.views = views
+        if stops:
+            run_files.move = partial(stops.move, world, folder)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, options.quiet)
-        summary = run_files.fill(bar, None if options.no_figure else text.scenario.title)
+        summary = run_files.fill(bar, hold, None if options.no_figure else text.scenario.title)
     if earlier not in ("", summary.digest):
         note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
         tell_notes([f"{note}; --out keeps both"])
@@ -109,7 +119,22 @@ def run(options: RunOptions) -> int:
         from mirotwin.run.run_table import print_table  # loads rich
 
         print_table(summary, run_files.tracks, folder.path)
-    code = report_run(world, checks, player)
-    if player is not None:
-        keep_saved(player, folder.path)
-    return code
+    result = under_way.result()
+    complain(*result.texts)
+    keep_saved(under_way.player, folder.path)
+    return result.code
+
+
+@contextmanager
+def reported(run_files: RunFiles) -> Iterator[None]:
+    """Around all that writes files: where that breaks off, tells what is left, and the verdict if there is one (a full
+    disk).
+    """
+    try:
+        yield
+    except BaseException as error:
+        if run_files.broken_off:
+            complain(run_files.broken_off)
+        if isinstance(error, BadInput) and run_files.run.tick >= 0:
+            complain(*run_files.run.result().texts)
+        raise

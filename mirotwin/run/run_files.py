@@ -25,18 +25,16 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.recording import runner
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
+from mirotwin.runs.run import Run
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
-from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
 from mirotwin.verify.checks.interface import at, in_ms
-from mirotwin.verify.checks.monitors import Checks
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View
@@ -108,34 +106,32 @@ class Stops:
 
 @dataclass
 class RunFiles:
-    """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
+    """Does `run` and fills `folder`, which is open meanwhile.
 
-    The recording gets each frame of `views`. `move` drives the world, None: it is stepped; `live` tells how it went.
-    `player`: that of a world with steps. `stops`: where the world is saved, and ends.
+    The recording gets each frame of `views`. `move` drives the world, None: its run does; `live` tells how it went.
+    `stops`: where the world is saved, and ends. `broken_off`: what is left of a run that was, "" before.
     """
 
     folder: OutputFolder
     source: RunSource
-    world: World
-    hold: Hold
-    checks: Checks
+    run: Run
     settings: tuple[str, ...] = ()
     views: Sequence[View] = ()
-    player: Player | None = None
     move: Callable[[], object] | None = None
     live: Callable[[], LiveFigures] | None = None
     stops: Stops | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
+    broken_off: str = field(default="", init=False)
     _wall_s: float = field(default=0.0, init=False)
 
-    def fill(self, bar: ProgressBar, title: str | None) -> Summary:
+    def fill(self, bar: ProgressBar, hold: Hold, title: str | None) -> Summary:
         """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
 
-        `title` None: no figure.
+        `hold` holds signals. `title` None: no figure.
         """
         try:
-            self._record(bar)
-            self.checks.finish()
+            self._record(bar, hold)
+            self.run.finish()
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
             if self.tracks.count and title is not None:
@@ -148,19 +144,19 @@ class RunFiles:
             raise
         return summary
 
-    def _record(self, bar: ProgressBar) -> None:
+    def _record(self, bar: ProgressBar, hold: Hold) -> None:
         began_s = time.perf_counter()
         try:
             with (
                 self.folder.part(RECORDING).open("wb", buffering=0) as stream,
-                Recorder(stream, self.source, self.hold) as recorder,
+                Recorder(stream, self.source, hold) as recorder,
             ):
                 recorder.flush()
-                self._simulate(recorder, bar)
+                self._simulate(recorder, bar, hold)
         finally:
             self._wall_s = time.perf_counter() - began_s
 
-    def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
+    def _simulate(self, recorder: Recorder, bar: ProgressBar, hold: Hold) -> None:
         def keep(period: Period) -> None:
             self.tracks.add(period)
             recorder.write_theories(self.tracks.theories())
@@ -172,20 +168,21 @@ class RunFiles:
 
         for view in self.views:
             view.shows.append(keep_frame)
-        with bar, self.hold.released():
-            runner.run(self.world, recorder, self.source.record == "full", keep, self.move)
+        with bar, hold.released():
+            self.run.drive(recorder, self.source.record == "full", keep, self.move)
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick
+        world, player = self.run.world, self.run.player
         return replace(
-            summarise(self.world, self.tracks, self._wall_s, begin_tick),
+            summarise(world, self.tracks, self._wall_s, begin_tick),
             complete=complete,
             reason=reason,
             set=self.settings,
-            calibrations=learnt_calibrations(self.world.networks),
-            wheels=learnt_wheels(self.world.networks),
-            expectations=self.checks.verdicts(),
-            steps=None if self.player is None else self._steps(self.player),
+            calibrations=learnt_calibrations(world.networks),
+            wheels=learnt_wheels(world.networks),
+            expectations=self.run.checks.verdicts(),
+            steps=None if player is None else self._steps(player),
             live=None if self.live is None else self.live(),
         )
 
@@ -204,7 +201,7 @@ class RunFiles:
         self.folder.keep = KEPT
         with suppress(OSError):  # a full disk, which is reported as what broke the run off
             self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False, reason=reason)))
-        complain(
+        self.broken_off = (
             f"the run broke off after {amount(self.tracks.count, 'control period')},"
             f" recorded in {self.folder.path / part_name(RECORDING)}"
         )

@@ -43,15 +43,15 @@ class ReaderGone(Exception):
     """The reader of our output has closed it (`| head`)."""
 
 
-def complain(message: str) -> None:
-    """One line on stderr, whatever the message holds."""
-    click.echo(f"mirotwin: {one_line(message)}", err=True)
+def complain(*messages: str) -> None:
+    """One line each on stderr, whatever the messages hold."""
+    for message in messages:
+        click.echo(f"mirotwin: {one_line(message)}", err=True)
 
 
 def tell_notes(notes: Iterable[str]) -> None:
     """What the settings of a scenario left out, on stderr."""
-    for note in notes:
-        complain(f"note: {note}")
+    complain(*(f"note: {note}" for note in notes))
 
 
 def show_line(text: str) -> None:

@@ -19,13 +19,11 @@ from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
 from mirotwin.shell.command import shell_line
 from mirotwin.testing.rig import Rig
+from mirotwin.testing.rig_options import rig_options
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import case_lines, clear, leave, nothing_left, report_line
-from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.replay_line import foreign_path
-from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.interface import Failure, at
-from mirotwin.verify.rig_options import rig_options
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
@@ -83,7 +81,7 @@ def tell(
 ) -> None:
     """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
     rig = item.stash[RIG]
-    seed = rig.options.seed
+    seed = rig.world.seed
     nodeid = item.nodeid.replace(f"-seed{seed}]", "]").replace(f"[seed{seed}]", "")
     file, _, name = nodeid.partition("::")
     file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
@@ -129,14 +127,14 @@ def _leave(
     rig = item.stash[RIG]
     case = case_of(rig, failures, None if caught is None else caught.value)
     where = f"{_relative(item.config, folder)}"
-    more = [] if case is None else case_lines(where, foreign_path(rig.options.image) is None)
+    more = [] if case is None else case_lines(where, foreign_path(rig.world.image) is None)
     text = story(rig, failures, [*lines, *more], _failed_at(item, report, caught, failures))
     if not rig.written:
         text += f"\n{report_line(where)}"
-    sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
+    sent = None if rig.written else rig.run.stream()
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
-    leave(folder, text + "\n", case, sent, rig.options.image, others)
+    leave(folder, text + "\n", case, sent, rig.world.image, others)
     return text
 
 
@@ -196,9 +194,9 @@ def _failed_at(
 
 def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str], failed_at: Sequence[str] = ()) -> str:
     """The section of a report: what ran, what failed where, the last events, and `lines` to reproduce it."""
-    image, world = rig.options.image, rig.world
+    image, world = rig.world.image, rig.world
     text = [
-        f"scenario {rig.options.scenario.name}, seed {rig.options.seed}, {at(rig.tick)}",
+        f"scenario {world.scenario.name}, seed {world.seed}, {at(rig.tick)}",
         f"firmware {image.path.name}, {image.sha256[:12]}",
         f"digest {world.digest}",
         *failed_at,
@@ -222,7 +220,7 @@ def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None)
     if rig.written:
         return None
     if isinstance(caught, WaitFailed) and caught.expect is not None:
-        case = case_of_expect(rig.world, rig.trace, caught.expect)
+        case = rig.run.case_of_expect(caught.expect)
         if case is not None:
             return case
-    return case_of_checks(rig.world, rig.trace, rig.checks) if failures else None
+    return rig.run.case() if failures else None

@@ -17,9 +17,9 @@ from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.desk.robot_port import LACKS, RobotPort, port_for_test
 from mirotwin.testing.link import Link
+from mirotwin.testing.rig_options import rig_options
 from mirotwin.testing.session_options import desk_of
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.rig_options import rig_options
 
 NAME = "mirotwin-port"
 """Of the plugin that has these fixtures."""
@@ -40,7 +40,7 @@ class PortFixtures:
         """The robots at the port, standing, and told to stand again when the test is over."""
         try:
             marks = request.node.iter_markers("mirotwin")
-            asked = rig_options(marks, request.node.path.parent, None, _mirotwin_seed)
+            asked = rig_options(marks, request.node.path.parent, None, _mirotwin_seed).spec
             note = partial(request.node.add_report_section, "call", "mirotwin")
             with port_for_test(self.desk, asked.scenario, request.node.name, note) as port:
                 for name in asked.scenario.expect:

@@ -8,14 +8,14 @@ import msgspec
 
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
+from mirotwin.runs.run import Run
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.testing.link import Link
+from mirotwin.testing.rig_options import RigOptions
 from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
 from mirotwin.verify.cases.case import Trace
 from mirotwin.verify.checks.interface import Expectation, Failure
-from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.rig_options import RigOptions
 
 LAST_EVENTS = 240
 LAST_LINES = 12
@@ -29,24 +29,29 @@ class Rig:
 
     def __init__(self, options: RigOptions) -> None:
         self.options = options
-        self.world, self.trace, self.checks = world_for(options)
+        self.run = run_for(options)
+        self.world = self.run.world
         self.links = [Link(self.world, network.index) for network in self.world.networks]
         self.robots = [RobotUnderTest(self.world, robot.network, robot.slot) for robot in self.world.robots]
-        self.tick = -1
+
+    @property
+    def tick(self) -> int:
         """Where the test ended, -1 while it runs."""
+        return self.run.tick
 
     def judge(self) -> Sequence[Failure]:
         """What the checks have found when the test is over; lets a control period end first."""
         if self.tick < 0:
-            self.tick = self.world.tick
+            self.run.tick = self.world.tick
             if not self.world.stopped and (self.world.in_period or not self.world.finished):
                 self.world.run_to(self.world.period_end)
-            self.checks.finish()
-        return self.checks.failures
+            self.run.finish()
+        return self.run.failures
 
     def unjudged(self) -> list[Expectation]:
         """The checks that were named and could not judge, by the reason that each has."""
-        return [one for one in self.checks.verdicts() if one.reason and one.name in self.checks.named]
+        checks = self.run.checks
+        return [one for one in checks.verdicts() if one.reason and one.name in checks.named]
 
     @property
     def written(self) -> bool:
@@ -56,9 +61,9 @@ class Rig:
     def facts(self) -> dict[str, str | int]:
         """What names a run: for the report and for JUnit."""
         return {
-            "mirotwin_seed": self.options.seed,
-            "mirotwin_scenario": self.options.scenario.name,
-            "mirotwin_firmware": self.options.image.sha256,
+            "mirotwin_seed": self.world.seed,
+            "mirotwin_scenario": self.world.scenario.name,
+            "mirotwin_firmware": self.world.image.sha256,
             "mirotwin_digest": self.world.digest,
         }
 
@@ -74,10 +79,11 @@ class Rig:
         return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
 
     def __repr__(self) -> str:
-        return f"Rig({self.options.scenario.name!r}, seed={self.options.seed}, tick={self.world.tick})"
+        world = self.world
+        return f"Rig({world.scenario.name!r}, seed={world.seed}, tick={world.tick})"
 
 
-def world_for(options: RigOptions) -> tuple[World, Trace, Checks]:
+def run_for(options: RigOptions) -> Run:
     """A new world, what goes into it, and the checks of all that happens in it.
 
     Its robots are up, and only the first world of its kind waits for the firmware. A robot is up when its serial
@@ -86,23 +92,24 @@ def world_for(options: RigOptions) -> tuple[World, Trace, Checks]:
 
     Raises BadInput where the firmware does not come up.
     """
-    world = World(options.scenario, options.seed, options.image)
+    spec = options.spec
+    world = spec.world()
     trace = Trace(world)
-    scenario = msgspec.json.encode(msgspec.structs.replace(options.scenario, expect={}))
-    key = (scenario, options.seed, options.image.sha256)
+    scenario = msgspec.json.encode(msgspec.structs.replace(spec.scenario, expect={}))
+    key = (scenario, spec.seed, spec.image.sha256)
     # the coverage of the firmware is to count the same however the tests are spread
     watched = any(robot.board.cpu.inspector for robot in world.robots)
     saved = None if watched or not options.boot else _STATES.get(key)
     if saved is not None:
         world.load(saved)
-    checks = Checks(world, options.expected)
+    run = Run(spec, world, trace)
     if options.boot and saved is None:
         _boot(world)
-        if not (checks.failures or world.faults or watched):  # every test is to see what failed
+        if not (run.failures or world.faults or watched):  # every test is to see what failed
             if len(_STATES) >= _KEPT:
                 del _STATES[next(iter(_STATES))]
             _STATES[key] = world.save()
-    return world, trace, checks
+    return run
 
 
 def _boot(world: World) -> None:

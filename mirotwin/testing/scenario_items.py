@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
+from mirotwin.runs.result import Result
+from mirotwin.runs.test_file import stem_of
 from mirotwin.testing.session_options import desk_of, number_option, path_option
 from mirotwin.testing.test_command import TestOptions, run_scenario
-from mirotwin.verify.steps.running import Outcome, stem_of
 
 
 class ScenarioFailed(Exception):
@@ -45,28 +46,26 @@ class ScenarioItem(pytest.Item):
             desk=desk_of(self.config),
         )
         try:
-            outcome = run_scenario(options, file)
+            result = run_scenario(options, file)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
-        self._note(outcome)
-        if outcome.verdict == "not observable":
-            pytest.skip("; ".join(outcome.notes))
-        if outcome.verdict != "passed":
-            left = [f"left in {relative(Path(outcome.left))}"] if outcome.left else []
-            raise ScenarioFailed(
-                "\n".join((*outcome.lines, *outcome.notes, f"again: {outcome.again}", *left))
-            )
+        self._note(result)
+        if result.verdict == "not observable":
+            pytest.skip("; ".join(result.notes))
+        if result.verdict != "passed":
+            left = [f"left in {relative(Path(result.left))}"] if result.left else []
+            raise ScenarioFailed("\n".join((*result.lines, *result.notes, f"again: {result.again}", *left)))
 
-    def _note(self, outcome: Outcome) -> None:
+    def _note(self, result: Result) -> None:
         facts = {
-            "mirotwin_seed": outcome.seed,
-            "mirotwin_digest": outcome.digest,
-            "mirotwin_firmware_sha256": outcome.firmware_sha256,
-            "mirotwin_reproduce": outcome.again,
+            "mirotwin_seed": result.seed,
+            "mirotwin_digest": result.digest,
+            "mirotwin_firmware_sha256": result.firmware_sha256,
+            "mirotwin_reproduce": result.again,
         }
         self.user_properties += list(facts.items())
-        if outcome.notes:
-            self.add_report_section("call", "mirotwin", "\n".join(outcome.notes))
+        if result.notes:
+            self.add_report_section("call", "mirotwin", "\n".join(result.notes))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, ScenarioFailed):

@@ -18,7 +18,9 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.rerun.job import load_stream, rerun_job
+from mirotwin.runs.job import load_stream
+from mirotwin.runs.result import Line, Result
+from mirotwin.runs.test_file import KINDS, cannot_be_run, collect, run_test, stem_of
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
@@ -30,10 +32,8 @@ from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_l
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
-from mirotwin.verify.cases.rerun import CaseVerdict
 from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import CHECK, Expected, as_settings
-from mirotwin.verify.steps.running import KINDS, Outcome, collect, run_test, stem_of
 
 
 class CaseTests:
@@ -44,50 +44,42 @@ class CaseTests:
         self.checks = checks
         self.unused = set(checks)
 
-    def run(self, path: str) -> Outcome:
-        """Runs one; a case that cannot be run is an outcome, too."""
+    def run(self, path: str) -> Result:
+        """Runs one; a case that cannot be run is a result, too."""
         check = None
         try:
             if is_bare_case(path):
-                from mirotwin.verify.bare.case import check_of_case  # loads the bare processor
+                from mirotwin.runs.bare_case import check_of_case  # loads the bare processor
 
                 name = check_of_case(path)
                 check = next((text for text in self.checks if text.rpartition(":")[2] == name), None)
-                outcome = self._run_bare(path, check)
+                result = self._run_bare(path, check)
             else:
-                outcome = self._run(path)
+                result = self._run(path)
         except BadInput as error:
-            outcome = Outcome(path, "error", (f"{error}",))
-        return replace(outcome, again=replay_line(path, self.firmware, check))
+            result = cannot_be_run(path, error)
+        return replace(result, again=replay_line(path, self.firmware, check))
 
-    def _run(self, path: str) -> Outcome:
+    def _run(self, path: str) -> Result:
         job = load_stream(path, self.firmware)
-        again = rerun_job(job, job.case.end_tick or None)
-        outcome = _outcome(path, job.verdict_of_case(again.checks))
-        return replace(
-            outcome,
-            tick=again.tick,
-            seed=job.seed,
-            digest=again.world.digest,
-            firmware_sha256=job.runs_on.sha256 or "",
-        )
+        return _as_test(path, job.result_of_case(job.run(job.case.end_tick or None)))
 
-    def _run_bare(self, path: str, check: str | None) -> Outcome:
-        from mirotwin.verify.bare.case import load_case_firmware, rerun_bare_case
+    def _run_bare(self, path: str, check: str | None) -> Result:
+        from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
 
         image = load_case_firmware(path, self.firmware)
         self.unused.discard(check or "")
-        outcome = _outcome(path, rerun_bare_case(path, image, check)[1])
-        return replace(outcome, firmware_sha256=image.sha256 or "")
+        result = rerun_bare_case(path, image, check)[1]
+        return _as_test(path, replace(result, firmware_sha256=image.sha256 or ""))
 
 
-def _outcome(path: str, found: CaseVerdict) -> Outcome:
+def _as_test(path: str, result: Result) -> Result:
     """What a case comes to as a test: where its check passes, it passes, whichever firmware it is of."""
-    failures = dict.fromkeys(one for one in (found.failure, found.fault) if one is not None)
-    lines = tuple(f"expectation failed: {one}" for one in failures) or found.lines
-    if found.verdict in ("passed", "differs"):
-        return Outcome(path, "passed", notes=found.lines[1:])
-    return Outcome(path, found.verdict, lines)
+    if result.verdict in ("passed", "differs"):
+        notes: list[Line] = [("passed", text) for text in result.texts[1:]]
+        return replace(result, path=path, verdict="passed", said=notes)
+    said: list[Line] = [("failed", f"expectation failed: {one}") for one in result.failures]
+    return replace(result, path=path, said=said or result.said)
 
 
 class TestOptions(Options, frozen=True, kw_only=True):
@@ -133,17 +125,17 @@ class TestOptions(Options, frozen=True, kw_only=True):
         return again.command_line()
 
 
-def run_scenario(options: TestOptions, file: str) -> Outcome:
+def run_scenario(options: TestOptions, file: str) -> Result:
     """Runs a scenario file as a test: in the twin, or at a port."""
     image, again = load_firmware(options.firmware), partial(options.line_for, file)
     settings = (*options.settings, *as_settings(options.expected))
     if options.desk.port:
         from mirotwin.testing.port_test import run_port_test  # loads pyserial
 
-        outcome = run_port_test(file, image, options.desk, settings, options.artifacts)
+        result = run_port_test(file, image, options.desk, settings, options.artifacts)
     else:
-        outcome = run_test(file, image, options.seed, settings, options.artifacts, again)
-    return replace(outcome, again=outcome.again or again())
+        result = run_test(file, image, options.seed, settings, options.artifacts, again)
+    return replace(result, again=result.again or again())
 
 
 @command_of(TestOptions)
@@ -189,23 +181,23 @@ def test(options: TestOptions) -> int:
 
         require_bokeh()
     left_out: dict[str, None] = {}
-    outcomes: list[Outcome] = []
+    results: list[Result] = []
     told: list[TestCase] = []
     cases = CaseTests(options.firmware, options.checks)
     for file in chosen:
         began_s = time.perf_counter()
-        outcome = cases.run(file) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
-        told.append(_test_case(outcome, time.perf_counter() - began_s))
-        outcomes.append(outcome)
-        tell_notes(note for note in outcome.left_out if note not in left_out)
-        left_out |= dict.fromkeys(outcome.left_out)
-        _show(outcome, options.quiet)
-        if options.pages and outcome.left:
+        result = cases.run(file) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
+        told.append(_test_case(result, time.perf_counter() - began_s))
+        results.append(result)
+        tell_notes(note for note in result.left_out if note not in left_out)
+        left_out |= dict.fromkeys(result.left_out)
+        _show(result, options.quiet)
+        if options.pages and result.left:
             try:
-                leave_page(Path(outcome.left))
+                leave_page(Path(result.left))
             except (OSError, BadInput) as error:
                 show_line(f"    no page: {error}")
-    code = _summary(outcomes)
+    code = _summary(results)
     if junit is not None:  # the verdicts are told first, whatever becomes of their file
         with whole_file(junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin", told))
@@ -215,50 +207,50 @@ def test(options: TestOptions) -> int:
     return code
 
 
-def _show(outcome: Outcome, quiet: bool) -> None:
-    passed = outcome.verdict == "passed"
+def _show(result: Result, quiet: bool) -> None:
+    passed = result.verdict == "passed"
     if quiet and passed:
         return
-    steps = f"{outcome.done} of {amount(outcome.steps, 'step')}, " if outcome.steps else ""
-    digest = f", digest {outcome.digest[:12]}" if outcome.digest else ""  # of a robot at a port there is none
-    how = f" ({steps}{in_ms(outcome.tick)}{digest})" if steps or digest else ""
-    show_line(f"{VERDICTS[outcome.verdict].line}  {outcome.path}{how}")
-    for line in (*outcome.lines, *outcome.notes):
+    steps = f"{result.done} of {amount(result.steps, 'step')}, " if result.steps else ""
+    digest = f", digest {result.digest[:12]}" if result.digest else ""  # of a robot at a port there is none
+    how = f" ({steps}{in_ms(result.tick)}{digest})" if steps or digest else ""
+    show_line(f"{VERDICTS[result.verdict].line}  {result.path}{how}")
+    for line in (*result.lines, *result.notes):
         show_line(f"    {line}")
-    if outcome.left:
-        show_line(f"    left in {outcome.left}")
-        case = Path(outcome.left) / CASE
+    if result.left:
+        show_line(f"    left in {result.left}")
+        case = Path(result.left) / CASE
         if case.exists():
             own = not case.with_name(FIRMWARE).exists()
-            for line in case_lines(outcome.left, own):
+            for line in case_lines(result.left, own):
                 show_line(f"    {line}")
-        show_line(f"    {report_line(outcome.left)}")
-    if not passed and outcome.verdict != "error":
-        show_line(f"    {outcome.again}")
+        show_line(f"    {report_line(result.left)}")
+    if not passed and result.verdict != "error":
+        show_line(f"    {result.again}")
 
 
-def _summary(outcomes: Sequence[Outcome]) -> int:
+def _summary(results: Sequence[Result]) -> int:
     """Prints what came of all; returns the exit code."""
-    counted = Counter(one.verdict for one in outcomes)
+    counted = Counter(one.verdict for one in results)
     found = [verdict for verdict in VERDICTS if counted[verdict]]
     said = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in found)
-    if unseen := sum(one.unseen for one in outcomes):
+    if unseen := sum(one.unseen for one in results):
         said += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
     show_line(said)
     return exit_code(*counted)
 
 
-def _test_case(outcome: Outcome, time_s: float) -> TestCase:
+def _test_case(result: Result, time_s: float) -> TestCase:
     return TestCase(
-        name=stem_of(outcome.path),
-        classname=str(Path(outcome.path).parent).strip("./").replace("/", ".") or "scenario",
+        name=stem_of(result.path),
+        classname=str(Path(result.path).parent).strip("./").replace("/", ".") or "scenario",
         time_s=time_s,
-        verdict=VERDICTS[outcome.verdict].junit,
-        lines=(*outcome.lines, *outcome.notes),
+        verdict=VERDICTS[result.verdict].junit,
+        lines=(*result.lines, *result.notes),
         properties={
-            "seed": str(outcome.seed),
-            "digest": outcome.digest,
-            "firmware_sha256": outcome.firmware_sha256,
-            "reproduce": outcome.again,
+            "seed": str(result.seed),
+            "digest": result.digest,
+            "firmware_sha256": result.firmware_sha256,
+            "reproduce": result.again,
         },
     )

@@ -9,7 +9,7 @@ from miro_sim.scenario.file import load, parse
 from mirotwin import campaign
 from mirotwin.recording.reader import read
 from mirotwin.recording.recorder import Recorder
-from mirotwin.rerun.job import load_job
+from mirotwin.runs.job import load_job
 from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.program import mirotwin
 

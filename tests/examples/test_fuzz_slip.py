@@ -97,7 +97,7 @@ def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images
 @needs_sdcc
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
-    from mirotwin.verify.bare.case import rerun_bare_case
+    from mirotwin.runs.bare_case import rerun_bare_case
 
     _, again = rerun_bare_case(path, images["dimmer"], CHECK)
     assert again.failure is not None

@@ -17,7 +17,7 @@ from miro_sim.scenario.places import check_places
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
 from mirotwin.replay.text import frame_tables, frame_text
-from mirotwin.rerun.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
+from mirotwin.runs.job import robots_of_stream, scenario_of_stream, script_of, script_of_stream
 from tests.mirotwin.synthetic import periods
 
 *BEFORE, PERIOD = periods(4, [(0, 0), (1, 2)])
@@ -172,6 +172,8 @@ def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(network
     )
     recorded = [msgspec.structs.replace(PERIOD, wire=sent)]
     scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3)] * networks)
-    (table,) = frame_tables(SimpleNamespace(scenario=scenario, recorded=recorded), [], True, None)
+    (table,) = frame_tables(
+        SimpleNamespace(spec=SimpleNamespace(scenario=scenario), recorded=recorded), [], True, None
+    )
     network = "net0 " if networks > 1 else ""
     assert list(table.columns[3].cells) == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]

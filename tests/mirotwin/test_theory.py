@@ -18,13 +18,13 @@ from miro_robot.image import load_hex
 from miro_sim.periods import Control
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.recording import runner
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.theory.chattering import Chattering
 from mirotwin.recording.theory.figures import SlidingGains, authority, gains_of, theory_of, theory_text
 from mirotwin.recording.theory.track import TheoryTrack
 from mirotwin.recording.track import Tracks
+from mirotwin.runs import runner
 from tests.mirotwin.mutated_files import without_sums
 from tests.mirotwin.synthetic import periods, robot
 from tests.naive import theory_terms as naive

@@ -9,8 +9,8 @@ from mirotwin.firmware.bare_options import load_bare_image, make_machine, target
 from mirotwin.firmware.fw_run import FwRunOptions, run
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
+from mirotwin.runs.bare_case import rerun_bare_case
 from mirotwin.shell.command import _read
-from mirotwin.verify.bare.case import rerun_bare_case
 from mirotwin.verify.bare.exchange import check_named
 from mirotwin.verify.bare.run import BarePlayback
 from tests.vectors.bare_runs import program_of

@@ -15,7 +15,7 @@ from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.sequences import LogEntry, Pair
 from mirotwin.report.page.document import render
-from mirotwin.rerun.job import Job, rerun_job
+from mirotwin.runs.job import Job
 from mirotwin.shell.progress import ProgressBar
 
 FIRST = 200
@@ -28,8 +28,8 @@ def beside_twin(job: Job, quiet: bool, rule: CompareRule = ANSWERS) -> PortCompa
     """Runs the twin with what was sent at the port; the recorded answers beside its own."""
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     with ProgressBar("running the twin", end_tick, quiet) as bar:
-        again = rerun_job(job, end_tick, bar.to)
-    return compare(job.recorded, again.periods, job.scenario.networks[0].robots, rule)
+        again = job.run(end_tick, bar.to)
+    return compare(job.recorded, again.periods, job.spec.scenario.networks[0].robots, rule)
 
 
 def port_page(job: Job, quiet: bool) -> bytes:
@@ -44,9 +44,9 @@ def port_page(job: Job, quiet: bool) -> bytes:
         for channel in SHOWN
     }
     values = {
-        "file": Path(job.file).name,
-        "firmware": job.runs_on.sha256 or "",
-        "scenario": job.scenario.name,
+        "file": Path(job.spec.origin).name,
+        "firmware": job.spec.image.sha256 or "",
+        "scenario": job.spec.scenario.name,
         "duration_s": end_s,
         "found": found,
         "shown": SHOWN,

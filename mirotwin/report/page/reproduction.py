@@ -16,13 +16,12 @@ from miro_robot.inspect.profile import profile as profile_of
 from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period
 from mirotwin.report.page.link import LinkLog, LinkMark
-from mirotwin.rerun.job import Job, replaying
+from mirotwin.runs.job import Job
+from mirotwin.runs.run import Run, replaying
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import Verdict
-from mirotwin.verify.cases.rerun import rerun
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Expectation, Failure
 
 
@@ -46,15 +45,16 @@ class Reproduction(msgspec.Struct, frozen=True):
 
 def reproduce(job: Job, until_tick: int | None, quiet: bool) -> Reproduction:
     """Runs it to `until_tick` (None: to its end), and on to the end of that control period. Raises BadInput."""
-    with plain_parameters(job.file, "replayed"):
-        world = job.world_of()
+    spec = msgspec.structs.replace(job.spec, until_tick=until_tick)
+    with plain_parameters(spec.origin, "replayed"):
+        world = spec.world()
     log = LinkLog(world)
     counters, activity = Counters(), Activity()
     cpu = world.networks[0].robots[0].board.cpu
     attach(cpu, counters, activity)
-    total = until_tick or job.scenario.end_tick
-    with ProgressBar("running it again", total, quiet) as bar, replaying(job.file, world):
-        again = rerun(world, until_tick, expectations_of(job.scenario, job.file), bar.to)
+    total = until_tick or spec.scenario.end_tick
+    with ProgressBar("running it again", total, quiet) as bar, replaying(spec.origin, world):
+        again = Run(spec, world).play(bar.to)
         detach(cpu, counters, activity)
         if not world.stopped and world.in_period:
             world.run_to(world.period_end)

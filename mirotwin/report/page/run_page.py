@@ -27,7 +27,7 @@ from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
-from mirotwin.rerun.job import Job
+from mirotwin.runs.job import Job
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.case import tables_of
@@ -65,7 +65,7 @@ def run_page(material: Material) -> bytes:
     """The page. Raises BadInput where Bokeh is not installed."""
     from mirotwin.report.page.plots import KIND_COLOURS, figures_of  # loads Bokeh
 
-    scenario, again = material.job.scenario, material.again
+    scenario, again = material.job.spec.scenario, material.again
     steered = [network.host != SILENT for network in scenario.networks]
     delay_frames = getattr(scenario.camera, "delay_frames", 0)
     tracks = tracks_of(material.periods, steered, delay_frames)
@@ -76,9 +76,9 @@ def run_page(material: Material) -> bytes:
     kinds = {mark.kind for mark in marks}
     values = {
         "about": material,
-        "file": Path(material.job.file).name,
+        "file": Path(material.job.spec.origin).name,
         "scenario": scenario,
-        "firmware": material.job.runs_on.path.name,
+        "firmware": material.job.spec.image.path.name,
         "scenario_text": tomli_w.dumps(tables_of(scenario)),
         "verdict": _verdict(material),
         "told": any(value == value for robot in tracks.robots for value in robot.told_v_m_s),
@@ -157,11 +157,11 @@ def _verdict(material: Material) -> tuple[str, str]:
 
 def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:
     """Name, what is shown, and the whole of it where that is shortened."""
-    digest, image = material.again.digest, material.job.runs_on
+    digest, image = material.again.digest, material.job.spec.image
     if material.periods and material.replayed:
         digest = material.periods[-1].digest
     facts = [
-        ("seed", f"{material.job.seed}", ""),
+        ("seed", f"{material.job.spec.seed}", ""),
         ("firmware", image.sha256[:12] or "no file", f"{image.path.name} {image.sha256}"),
         ("digest", digest[:12], digest),
         ("simulated", f"{len(tracks.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s", ""),

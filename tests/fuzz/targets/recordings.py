@@ -12,7 +12,7 @@ from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.recorded import transmissions, transmissions_of
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.reader import parse
-from mirotwin.rerun.job import load_job
+from mirotwin.runs.job import load_job
 from tests.fuzz.target import Draws, Target, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records, without_sums
 

@@ -1,7 +1,5 @@
 """What people write to say what runs: scenarios with steps and expectations, settings, cases, URLs."""
 
-import contextlib
-import io
 from urllib.parse import quote
 
 import tomli_w
@@ -15,7 +13,7 @@ from miro_sim.scenario.file import decode, of_table, parse
 from miro_sim.scenario.keys import without_expectations
 from miro_sim.world.world import World
 from mirotwin.ports.url import parse_url
-from mirotwin.rerun.job import load_job
+from mirotwin.runs.job import load_job
 from mirotwin.verify.cases.case import tables_of
 from mirotwin.verify.steps.reading import everything
 from tests.fuzz.target import Target, always, folder, refused
@@ -74,20 +72,17 @@ def _case(data):
     """Stream files as `replay` takes them, up to the world that is to run."""
     path = folder() / "fuzz.stream"
     path.write_bytes(data)
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said):
-        try:
-            job = load_job(str(path))
-        except BadInput as error:
-            return refused(error)
-        assert all(line.isprintable() for line in said.getvalue().splitlines())
-        if sum(len(network.robot) for network in job.scenario.networks) > 10:
-            return "too many robots for here"
-        try:
-            job.world_of()
-        except (BadInput, DomainError) as error:
-            return refused(error)
-    return f"taken, {min(len(job.script), 3)} in the script, case {bool(job.case.verdict)}"
+    try:
+        job = load_job(str(path))
+    except BadInput as error:
+        return refused(error)
+    if sum(len(network.robot) for network in job.spec.scenario.networks) > 10:
+        return "too many robots for here"
+    try:
+        job.spec.world()
+    except (BadInput, DomainError) as error:
+        return refused(error)
+    return f"taken, {min(len(job.spec.script), 3)} in the script, case {bool(job.case.verdict)}"
 
 
 def _url(data):

@@ -16,7 +16,7 @@ from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise, tracking_of
-from mirotwin.verify.steps.running import run_test
+from mirotwin.runs.test_file import run_test
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")

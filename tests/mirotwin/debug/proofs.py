@@ -25,7 +25,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
 from mirotwin.debug.expression import content
 from mirotwin.debug.timeline import Trap
-from mirotwin.rerun.inspected_run import BareRun
+from mirotwin.runs.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
 

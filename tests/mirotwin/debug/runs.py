@@ -9,7 +9,7 @@ from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.rerun.inspected_run import RobotRun
+from mirotwin.runs.inspected_run import RobotRun
 from mirotwin.shell.firmware_image import load_firmware
 from tests.sim.digests import GOLDEN
 

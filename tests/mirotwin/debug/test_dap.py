@@ -11,7 +11,7 @@ import pytest
 from miro_robot.bare.machine import BareMachine
 from mirotwin.debug import debug_command
 from mirotwin.debug.adapter import Adapter
-from mirotwin.rerun.inspected_run import BareRun
+from mirotwin.runs.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.debug.runs import debugger_of, robot_run

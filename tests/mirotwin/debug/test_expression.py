@@ -11,7 +11,7 @@ from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from miro_robot.image.c_types import CType
 from mirotwin.debug.expression import NoValue, Value, content, expression
-from mirotwin.rerun.inspected_run import BareRun
+from mirotwin.runs.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
 from tests.mutants.sdcc import needs_sdcc

@@ -9,7 +9,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from mirotwin.debug.expression import content, expression
-from mirotwin.rerun.inspected_run import BareRun
+from mirotwin.runs.inspected_run import BareRun
 from tests import children
 from tests.mirotwin.debug.proofs import arguments
 from tests.mirotwin.debug.runs import debugger_of, robot_run

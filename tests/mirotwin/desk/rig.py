@@ -7,7 +7,7 @@ from contextlib import suppress
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.transmission import Transmission
 from mirotwin.recording import reader
-from mirotwin.rerun.job import script_of
+from mirotwin.runs.job import script_of
 
 PERIOD = 800_800
 CLEAN = "set=network.radio.bit_error_rate=0"

@@ -21,8 +21,8 @@ from miro_protocol.whitening import whiten
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.world import World
 from mirotwin.desk.guard import DeskOptions, Guard
+from mirotwin.runs.spec import silent_scenario
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.rig_options import silent_scenario
 from tests.mirotwin.desk.rig import ROBOT
 from tests.naive import guard as naive
 from tests.vectors.paths import CASES

@@ -30,8 +30,8 @@ from mirotwin import Telemetry
 from mirotwin.desk import robot_port
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.desk.robot_port import PortError, RobotPort
+from mirotwin.runs.spec import silent_scenario
 from mirotwin.testing.link import Link
-from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.desk.rig import ROBOT, stream_text
 from tests.mirotwin.ports.rig import sent_bytes, served

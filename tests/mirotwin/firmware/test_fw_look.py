@@ -13,7 +13,7 @@ from miro_robot.image import load_hex
 from miro_robot.inspect.counters import Activity, Counters
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.rerun.inspected_run import RobotRun, watch
+from mirotwin.runs.inspected_run import RobotRun, watch
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build_modules

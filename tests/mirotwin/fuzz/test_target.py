@@ -17,8 +17,8 @@ from miro_sim.world.world import World
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.oracle import expected_of
 from mirotwin.fuzz.target import RobotTarget
+from mirotwin.runs.spec import silent_scenario
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.rig_options import silent_scenario
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted

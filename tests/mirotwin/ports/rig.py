@@ -19,7 +19,7 @@ from mirotwin.ports.endpoint import PortContext
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.session import Pace
 from mirotwin.recording import reader
-from mirotwin.rerun.job import script_of
+from mirotwin.runs.job import script_of
 from tests import children
 from tests.mirotwin.program import COMMAND
 

@@ -13,7 +13,7 @@ from mirotwin.ports.endpoint import ByteFifo, Endpoint, PortContext
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.session import Session
 from mirotwin.ports.sockets import TcpEndpoint
-from mirotwin.rerun.job import script_of
+from mirotwin.runs.job import script_of
 from tests.mirotwin.ports.rig import NO_SELECTOR, FakePace, Rig, own_image, question
 
 

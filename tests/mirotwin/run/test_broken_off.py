@@ -13,7 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
 from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
-from mirotwin.run import run_command, run_files
+from mirotwin.run import run_files
 from mirotwin.shell.outputs import OutputFolder
 from tests import children
 from tests.mirotwin import program
@@ -47,7 +47,7 @@ def at_period(monkeypatch, index, act):
                 act()
             return super().step()
 
-    monkeypatch.setattr(run_command, "World", Interrupted)
+    monkeypatch.setattr("miro_sim.world.world.World", Interrupted)
 
 
 def raising(error):

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from mirotwin.commands import main
 from mirotwin.recording import reader as recording_reader
-from mirotwin.recording import runner
+from mirotwin.runs import runner
 from tests import children
 
 LONGEST_LOSS_S = 0.5

@@ -14,10 +14,10 @@ from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.testing.rig import Rig
+from mirotwin.testing.rig_options import rig_options
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.rig_options import rig_options
 from tests.mirotwin.conftest import hex_file
 
 HERE = Path(__file__).parent
@@ -143,18 +143,18 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
         "expect": {"inside_pitch": False, "frames_accepted_min": 1},
     }
     made = options(inner, outer)
-    assert (made.boot, made.scenario.duration_s, made.scenario.networks[0].robots) == (False, 2, 5)
-    added = [check.name for check in made.expected[0, 0]][len(ALWAYS_ON) :]
+    assert (made.boot, made.spec.scenario.duration_s, made.spec.scenario.networks[0].robots) == (False, 2, 5)
+    added = [check.name for check in made.spec.expected[0, 0]][len(ALWAYS_ON) :]
     assert added == ["inside_pitch", "frames_accepted_min"]
 
 
 def test_a_test_that_names_no_scenario_has_the_one_that_is_called_silent():
-    assert options().scenario == options({"scenario": "silent"}).scenario == load("silent").scenario
+    assert options().spec.scenario == options({"scenario": "silent"}).spec.scenario == load("silent").scenario
 
 
 def test_a_table_as_scenario_changes_keys_of_the_silent_one():
     table = {"network.radio": {"profile": "fade15", "keyup_s": 0.002}, "duration_s": 5}
-    network = options({"scenario": table}).scenario.networks[0]
+    network = options({"scenario": table}).spec.scenario.networks[0]
     assert (network.radio.keyup_s, network.host) == (0.002, "silent")
 
 
@@ -185,7 +185,7 @@ def test_the_end_of_a_test_is_its_own_not_that_of_the_period(one, world):
 
 def test_checks_of_a_world_that_was_loaded_judge_as_those_from_its_begin(one):
     whole = World(one.world.scenario, 0, one.world.image)
-    checks = Checks(whole, one.options.expected)
+    checks = Checks(whole, one.options.spec.expected)
     frame = encode(ServiceFrame.ping(0, 0), 3)
     for world in (one.world, whole):
         world.run_to(ms(50))
@@ -194,7 +194,7 @@ def test_checks_of_a_world_that_was_loaded_judge_as_those_from_its_begin(one):
     one.judge()
     whole.run_to(one.world.tick)
     checks.finish()
-    assert one.checks.verdicts() == checks.verdicts()
+    assert one.run.checks.verdicts() == checks.verdicts()
     assert one.world.digest == whole.digest
 
 

@@ -9,7 +9,7 @@ import pytest
 from mirotwin.fuzz.oracle import RobotOracle
 from mirotwin.fuzz.target import RobotTarget
 from mirotwin.report.page import document
-from mirotwin.verify.steps.running import collect
+from mirotwin.runs.test_file import collect
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
 

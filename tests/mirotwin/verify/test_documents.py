@@ -7,9 +7,9 @@ import pytest
 
 from docs.site import conformance_table
 from miro_sim.world.conditions import CONDITIONS, Fault
+from mirotwin.runs.test_file import run_test
 from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, struct_of
 from mirotwin.verify.steps.keys import SENDS, VERBS, SendFrame, StreamStep
-from mirotwin.verify.steps.running import run_test
 from tests.mirotwin.verify.checks.rig import own_image
 
 ROOT = Path(__file__).parents[3]

@@ -9,9 +9,9 @@ import sys
 
 from miro_sim.world.world import World
 from mirotwin.conform.probe import Listening
+from mirotwin.runs.spec import silent_scenario
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.rig_options import silent_scenario
 
 
 def listen(seconds, robots, seed=0):

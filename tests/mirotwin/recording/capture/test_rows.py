@@ -17,7 +17,6 @@ from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.recording import runner
 from mirotwin.recording.capture import recorded
 from mirotwin.recording.capture.detect import FORMATS
 from mirotwin.recording.capture.input import Input
@@ -26,6 +25,7 @@ from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.runs import runner
 from tests.sim.world.rig import image
 
 PERIOD = 800_800

@@ -11,7 +11,7 @@ from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
-from mirotwin.verify.bare.case import case_text, rerun_bare_case
+from mirotwin.runs.bare_case import case_text, rerun_bare_case
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.bare.run import BarePlayback
 from tests.exact import distribution

@@ -10,7 +10,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.transmission import Transmission
 from miro_sim.scenario.errors import ScenarioError
-from mirotwin.verify.steps.running import run_test
+from mirotwin.runs.test_file import run_test
 from tests.mirotwin.verify.checks.rig import MS, built, needs_sdcc, own_image, planted
 from tests.mirotwin.verify.steps.rig import digest_without_steps, play
 

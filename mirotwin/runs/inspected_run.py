@@ -11,7 +11,7 @@ from miro_robot.image import Image
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.world import World
-from mirotwin.rerun.job import Job
+from mirotwin.runs.job import Job
 from mirotwin.verify.bare.run import BarePlayback
 
 PIECE_TICKS = CONTROL_PERIOD_TICKS

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS, NEVER_TICK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
 from miro_sim.periods import Period
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.recorder import Recorder
-from mirotwin.shell.program import complain
-from mirotwin.shell.verdicts import DONE, exit_code
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World  # a hot module: not before the engine was chosen
@@ -66,15 +64,3 @@ def _sample(tick: int, board: Any) -> SampleMessage:
         duty = -chip.pwm_magnitude if chip.sign else chip.pwm_magnitude
         values += (chip.desired_position, chip.real_position, chip.desired_velocity, duty)
     return SampleMessage(tick, *values)
-
-
-def report_faults(world: World, to_tick: int = NEVER_TICK) -> int:
-    """Says on stderr what the firmware did wrong up to `to_tick`; returns the exit code."""
-    code = DONE
-    for robot in world.robots:
-        faults = [fault for fault in robot.board.faults if fault.tick <= to_tick]
-        if faults:
-            code = exit_code("fault")
-            more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-            complain(f"firmware fault: net{robot.network}/robot{robot.slot}: {faults[0]}{more}")
-    return code

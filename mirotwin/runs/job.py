@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
@@ -20,7 +20,6 @@ from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image, Symbol, Symbols, parse_hex
 from miro_sim.periods import Period
-from miro_sim.radio.downlink import TransmissionError
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, changed, load, of_table
@@ -33,17 +32,16 @@ from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import RunSource
 from mirotwin.recording.writer import MAGIC
+from mirotwin.runs.result import Result, expectation_lines, result_of_case
+from mirotwin.runs.run import Run, replaying
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import command_line, operand
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
-from mirotwin.shell.program import complain
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import image_beside
-from mirotwin.verify.cases.rerun import CaseVerdict, Rerun, rerun, verdict_of
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.monitors import Checks, Expected
-from mirotwin.verify.expectations import expectation_lines
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
@@ -152,20 +150,20 @@ def _default_scenario(script: Sequence[ScriptItem], path: str) -> Scenario:
     base = load(DEFAULT_SCENARIO, settings).scenario
     model = base.networks[0].robot[0]
     assert isinstance(model.reference, msgspec.Struct)  # parameters of a line
-    standing = msgspec.structs.replace(model.reference, drive_s=0.0)  # nothing steers by it
-    model = msgspec.structs.replace(model, wheel_radius_mismatch=0.0, reference=standing)
+    standing = replace(model.reference, drive_s=0.0)  # nothing steers by it
+    model = replace(model, wheel_radius_mismatch=0.0, reference=standing)
     networks = []
     for index in range(count):
         robots = robots_of_stream(one for one in script if one.network == index)
         network = NetworkSpec(
             robots=5 if robots == 5 else 3,
             radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
-            robot=tuple(msgspec.structs.replace(model, slot=slot) for slot in range(robots)),
+            robot=tuple(replace(model, slot=slot) for slot in range(robots)),
         )
         networks.append(network)
     periods = -(-end_tick // CONTROL_PERIOD_TICKS)
     duration_s = seconds(periods * CONTROL_PERIOD_TICKS)
-    return msgspec.structs.replace(base, name="stream", duration_s=duration_s, networks=tuple(networks))
+    return replace(base, name="stream", duration_s=duration_s, networks=tuple(networks))
 
 
 def image_of(recording: Recording, path: str | Path) -> Image:
@@ -173,7 +171,7 @@ def image_of(recording: Recording, path: str | Path) -> Image:
     source = recording.source
     image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
     symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
-    return msgspec.structs.replace(image, symbols=symbols)
+    return replace(image, symbols=symbols)
 
 
 def image_if_any(recording: Recording, path: str | Path) -> Image | None:
@@ -190,12 +188,14 @@ def world_of(recording: Recording, path: str, image: Image | None = None, script
     `scripted`: its hosts send what was recorded; else they compute it again. What was done to robots and radios is
     done again. Raises ValueError for what no caller can have done.
     """
-    from miro_sim.world.world import World
-
     source = recording.source
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
-    script = script_of(recording.periods) if scripted else None
-    world = World(scenario, source.seed, image or image_of(recording, path), script=script)
+    spec = RunSpec(
+        scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
+        image=image or image_of(recording, path),
+        seed=source.seed,
+        script=script_of(recording.periods) if scripted else None,
+    )
+    world = spec.world()
     if not scripted:
         for action in (action for period in recording.periods for action in period.actions):
             world.do(action)
@@ -230,81 +230,67 @@ class Case(msgspec.Struct, frozen=True):
     changed: bool = False
 
 
-class Job(msgspec.Struct, frozen=True):
+class Job(msgspec.Struct, frozen=True, kw_only=True):
     """What is to be replayed: a recording, or a text stream (then `recorded` is empty and `image` None).
 
-    `file` holds it; `runs_on`: the image to play it to. `image`: the one that was recorded, None where it is none.
-    `state`: the form of the states whose digests were recorded, if a replay computes the same states, else empty: a
-    controller's states are not computed again. `origin`: "port" where the answers that were recorded are those of real
-    robots. `firmware`: the recorded file.
+    `spec`: the run, on the image to play it to. `image`: the one that was recorded, None where it is none. `state`: the
+    form of the states whose digests were recorded, if a replay computes the same states, else empty: a controller's
+    states are not computed again. `origin`: "port" where the answers that were recorded are those of real robots.
+    `firmware`: the recorded file. `notes`: what there is to know of the file, a line each. `as_recorded`: a recording's
+    run without other settings, seed or firmware.
     """
 
-    scenario: Scenario
-    seed: int
-    script: list[ScriptItem]
-    recorded: Sequence[Period]
-    file: str
-    runs_on: Image
+    spec: RunSpec
+    recorded: Sequence[Period] = ()
     image: Image | None = None
     state: str = ""
     case: Case = Case()
-    resumed: bytes = b""
     origin: str = ""
     firmware: bytes = b""
-    own: tuple[Scenario, int] | None = None
-
-    def as_recorded(self) -> Job:
-        """The job without other settings, seed or firmware."""
-        scenario, seed = self.own or (self.scenario, self.seed)
-        return msgspec.structs.replace(self, scenario=scenario, seed=seed, runs_on=self.image or self.runs_on)
+    notes: Sequence[str] = ()
+    as_recorded: RunSpec | None = None
 
     @property
     def end_tick(self) -> int:
         """Where it is over: with what was recorded, where a case failed, or with its scenario."""
+        scenario = self.spec.scenario
         if not self.recorded:
-            return self.case.end_tick or self.scenario.end_tick
-        return min(self.recorded[-1].index + 1, self.scenario.periods) * CONTROL_PERIOD_TICKS
+            return self.case.end_tick or scenario.end_tick
+        return min(self.recorded[-1].index + 1, scenario.periods) * CONTROL_PERIOD_TICKS
 
     @property
     def case_periods(self) -> int | None:
         """After so many control periods a case is over; None: with its scenario."""
         return -(-self.case.end_tick // CONTROL_PERIOD_TICKS) or None
 
-    def expectations_of_case(self) -> Expected:
-        """What its scenario expects. Raises BadInput where that is not the check that the case is about."""
+    def check_case(self) -> None:
+        """Raises BadInput where the scenario does not expect the check that the case is about."""
         name = self.case.verdict.partition(":")[0]
-        expected = expectations_of(self.scenario, self.file)
-        if not any(check.name == name for checks in expected.values() for check in checks):
+        if not any(check.name == name for checks in (self.spec.expected or {}).values() for check in checks):
             what = f"the verdict is of the check {name!r}, which nothing expects"
-            raise BadInput(self.file, "header", what, "put it into [expect], or take the verdict away")
-        return expected
+            raise BadInput(self.spec.origin, "header", what, "put it into [expect], or take the verdict away")
 
-    def verdict_of_case(self, checks: Checks) -> CaseVerdict:
-        """What the checks that it names say this time, or all where it has no verdict; `checks` were there."""
+    def result_of_case(self, run: Run) -> Result:
+        """What the checks that it names say this time, or all where it has no verdict."""
+        checks, result = run.checks, run.result()
         named = [one.verdict for one in checks.verdicts() if one.name in checks.named]
         verdict = judge(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
-        return verdict_of(self.case.verdict, checks.failures, self.case.changed, verdict, why)
+        said = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
+        return replace(result, verdict=said.verdict, said=said.said, failures=said.failures)
 
-    def world_of(self, image: Image | None = None) -> World:
-        """A world that is to do it again, on `image` if one is given; a resumed run begins where that one did."""
-        from miro_sim.world.world import World  # a hot module: not before the engine was chosen
-
-        run = image or self.runs_on
-        if not self.resumed:
-            return World(self.scenario, self.seed, run, script=self.script)
-        world = World(self.scenario, self.seed, run, script=())
-        try:
-            world.load(self.resumed)
-        except ValueError as error:
-            what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
-            raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
-        for one in self.script:
-            if isinstance(one, Transmission):
-                world.inject(one.data, one.network, one.tick, one.bad_stop)
-            else:
-                world.do(one)
-        return world
+    def run(
+        self,
+        until_tick: int | None = None,
+        progress: Callable[[int], object] = lambda tick: None,
+        cut: bool = False,
+    ) -> Run:
+        """Sends it again to `until_tick` (None: to its end). `cut`: as of RunSpec. Raises BadInput."""
+        spec = replace(self.spec, until_tick=until_tick, cut=cut)
+        with plain_parameters(spec.origin, "replayed"):
+            run = Run.traced(spec)
+        with replaying(spec.origin, run.world):
+            return run.play(progress)
 
 
 def load_job(
@@ -323,11 +309,8 @@ def load_job(
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if MAGIC.startswith(data[: len(MAGIC)]):
         recording = parse(data, file)
-        if recording.broken_off:
-            complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
-        warn_of_plugins(file, recording.source)
         if firmware is None:
             image = image_of(recording, file)
             return _job_of_recording(recording, file, settings, image, image, seed)
@@ -336,51 +319,27 @@ def load_job(
     given = _stream(data, file)
     header = given.header
     image = load_firmware(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
-    wanted = header.firmware_sha256
+    wanted, notes = header.firmware_sha256, []
     if wanted not in (None, image.sha256):
         what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
         if firmware is None:
             raise BadInput(file, "header", what, "name the image with --firmware")
-        complain(f"{file}: {what}")  # to run another one is what a replay is for
-    return _job_of_stream(given, file, settings, image, seed)
+        notes = [f"{file}: {what}"]  # to run another one is what a replay is for
+    return replace(_job_of_stream(given, file, settings, image, seed), notes=notes)
 
 
-def warn_of_plugins(file: str, source: RunSource) -> None:
+def plugin_notes(file: str, source: RunSource) -> list[str]:
     """A line for each plug-in that a run used and that is another one here."""
-    for text in plugin_differences(source.plugins):
-        complain(f"{file}: {one_line(shortened(text))}: run again, it may do something else")
+    return [
+        f"{file}: {one_line(shortened(text))}: run again, it may do something else"
+        for text in plugin_differences(source.plugins)
+    ]
 
 
 def load_stream(file: str, firmware: str | None) -> Job:
     """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
     return _job_of_stream(_stream(read_input(file), file), file, (), load_firmware(firmware), None)
-
-
-def rerun_job(
-    job: Job,
-    until_tick: int | None = None,
-    progress: Callable[[int], object] = lambda tick: None,
-    cut: bool = False,
-) -> Rerun:
-    """Sends it again, under what its scenario expects; None: to the end of that. `cut`: as of `rerun`.
-
-    Raises BadInput.
-    """
-    with plain_parameters(job.file, "replayed"):
-        world = job.world_of()
-    with replaying(job.file, world):
-        return rerun(world, until_tick, expectations_of(job.scenario, job.file), progress, cut)
-
-
-@contextmanager
-def replaying(file: str, world: World) -> Iterator[None]:
-    """Within it, what cannot be sent or computed is bad input of `file`."""
-    try:
-        with plain_parameters(file, "replayed"):
-            yield
-    except TransmissionError as error:
-        raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
 
 
 _PAIRS = re.compile(rb"^\s*[0-9a-fA-F]{2}", re.MULTILINE)
@@ -417,19 +376,32 @@ def _job_of_recording(
     check_script(script, path, scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
-    return Job(
-        scenario,
-        source.seed if seed is None else seed,
-        script,
-        recording.periods,
-        path,
-        runs_on,
-        image,
-        source.state if as_it_was and silent else "",
+    notes = plugin_notes(path, source)
+    if recording.broken_off:
+        notes.insert(0, f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+    spec = RunSpec(
+        scenario=scenario,
+        image=runs_on,
+        seed=source.seed if seed is None else seed,
+        script=script,
         resumed=source.resumed,
+        expected=expectations_of(scenario, path),
+        origin=path,
+    )
+    return Job(
+        spec=spec,
+        recorded=recording.periods,
+        image=image,
+        state=source.state if as_it_was and silent else "",
         origin=source.origin,
         firmware=source.firmware,
-        own=(parse_scenario(source.scenario_text, f"{path}: scenario.toml"), source.seed),
+        notes=notes,
+        as_recorded=replace(
+            spec,
+            scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
+            image=image or runs_on,
+            seed=source.seed,
+        ),
     )
 
 
@@ -444,5 +416,12 @@ def _job_of_stream(
     check_script(script, path, scenario)
     other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
     other = other or (bool(settings) and scenario != changed(written, path, keys, expectations_of))
-    case = Case(header.verdict or "", header.end_tick or 0, other)
-    return Job(scenario, own if seed is None else seed, script, (), path, image, case=case)
+    spec = RunSpec(
+        scenario=scenario,
+        image=image,
+        seed=own if seed is None else seed,
+        script=script,
+        expected=expectations_of(scenario, path),
+        origin=path,
+    )
+    return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))

@@ -31,6 +31,7 @@ from miro_protocol.actions import ScriptItem
 from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import SPACE_BYTES, Image
+from mirotwin.runs.result import Result, result_of_case
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.bare.exchange import (
@@ -47,7 +48,6 @@ from mirotwin.verify.bare.exchange import (
 from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.case import stream_text
-from mirotwin.verify.cases.rerun import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
 
 
@@ -146,9 +146,7 @@ def check_of_case(path: str | Path) -> str:
     return _name(stream.read(path))
 
 
-def rerun_bare_case(
-    path: str | Path, image: Image, check: str | None = None
-) -> tuple[BareRerun, CaseVerdict]:
+def rerun_bare_case(path: str | Path, image: Image, check: str | None = None) -> tuple[BareRerun, Result]:
     """Plays a case on `image`, from power-on. `check`: FILE.py:FUNCTION, where the case names one that is in a file.
 
     Raises BadInput for what is no such case.
@@ -164,7 +162,9 @@ def rerun_bare_case(
     changed = header.firmware_sha256 not in (None, image.sha256)
     failures = [] if again.failure is None else [again.failure]
     why = [f"expectation not judged: {name}: {again.unjudged}"] if again.unjudged else []
-    return again, verdict_of(header.verdict or "", failures, changed, "not judged" if why else "passed", why)
+    return again, result_of_case(
+        header.verdict or "", failures, changed, "not judged" if why else "passed", why
+    )
 
 
 AFTER_MS = 50

@@ -11,7 +11,6 @@ how the printed line repeats a test.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,12 +18,11 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.domain import MAX_SEED
-from miro_robot.image import Image
 from miro_sim.scenario.file import load
 from miro_sim.scenario.keys import Scenario
+from mirotwin.runs.spec import RunSpec, silent_scenario
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.interface import Check
 
 if TYPE_CHECKING:
     import pytest
@@ -33,12 +31,9 @@ MARKER = "@pytest.mark.mirotwin"
 
 
 class RigOptions(msgspec.Struct, frozen=True):
-    """What a test's world is made of. `boot`: it begins when the firmware is up, not at power-on."""
+    """The run of a test. `boot`: it begins when the firmware is up, not at power-on."""
 
-    scenario: Scenario
-    image: Image
-    seed: int
-    expected: Mapping[tuple[int, int], Sequence[Check]]
+    spec: RunSpec
     boot: bool
 
 
@@ -100,7 +95,8 @@ def rig_options(
     image = load_firmware(_near(mark["firmware"], folder) if "firmware" in mark else firmware)
     scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark["expect"]})
     boot = mark.get("boot", all(one.host == "silent" for one in scenario.networks))
-    return RigOptions(scenario, image, seed, expectations_of(scenario, scenario.name), boot)
+    expected = expectations_of(scenario, scenario.name)
+    return RigOptions(RunSpec(scenario=scenario, image=image, seed=seed, expected=expected), boot)
 
 
 def _scenario(source: str | Path | dict[str, Any] | None, settings: Sequence[str], folder: Path) -> Scenario:
@@ -115,12 +111,6 @@ def _scenario(source: str | Path | dict[str, Any] | None, settings: Sequence[str
 def _near(path: str | Path, folder: Path) -> Path:
     """Beside the test if it is there, else as given."""
     return folder / path if (folder / path).exists() else Path(path)
-
-
-@lru_cache(64)
-def silent_scenario(settings: tuple[str, ...]) -> Scenario:
-    """The scenario of a test that names none, with these settings: read once for all that want the same."""
-    return load("silent", settings).scenario
 
 
 def _toml(value: Any) -> str:

@@ -1,1 +1,0 @@
-"""A world made from what a file holds, and run again."""

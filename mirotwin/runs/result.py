@@ -1,0 +1,136 @@
+"""What came of a run: its verdict, and the lines that say why, the same for every command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from miro_exact.bad_input import amount
+from miro_exact.clock import NEVER_TICK
+from miro_sim.world.robot import Robot
+from mirotwin.shell.verdicts import VERDICTS, Verdict
+from mirotwin.verify.checks.expect import ALWAYS_ON
+from mirotwin.verify.checks.interface import Expectation, Failure
+from mirotwin.verify.checks.monitors import Checks
+
+LINES = 5
+"""Failures of one check that are listed."""
+Line = tuple[Verdict, str]
+"""What is said, and the verdict that it speaks for."""
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """`said`: a line for each part that failed, or could not be judged; `failures`: of checks, in the order of time.
+
+    `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
+    the run ended. `left`: the folder with its case; `left_out`: what settings left out of the scenario, a line each.
+    `again`: the command that gives the verdict again.
+    """
+
+    path: str = ""
+    verdict: Verdict
+    said: Sequence[Line] = ()
+    failures: Sequence[Failure] = ()
+    expectations: Sequence[Expectation] = ()
+    done: int = 0
+    steps: int = 0
+    unseen: int = 0
+    tick: int = 0
+    seed: int = 0
+    digest: str = ""
+    firmware_sha256: str = ""
+    left: str = ""
+    left_out: Sequence[str] = ()
+    again: str = ""
+
+    @property
+    def code(self) -> int:
+        """The exit code."""
+        return VERDICTS[self.verdict].code
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """All lines."""
+        return tuple(text for _, text in self.said)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What is wrong: firmware faults first."""
+        wrong = [one for one in self.said if VERDICTS[one[0]].junit in ("failure", "error")]
+        return tuple(text for _, text in sorted(wrong, key=lambda one: one[0] != "fault"))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What else there is to say."""
+        wrong = self.lines
+        return tuple(text for text in self.texts if text not in wrong)
+
+
+def expectation_lines(checks: Checks) -> Iterator[Line]:
+    """Which checks failed, had no occasion, or cannot be observed. Firmware faults have lines of their own."""
+    for verdict in checks.verdicts():
+        if verdict.reason and verdict.name in checks.named:
+            yield verdict.verdict, f"expectation {verdict.verdict}: {verdict.name}: {verdict.reason}"
+        failures = [one for one in checks.failures if one.check == verdict.name and not one.fault]
+        for failure in failures[:LINES]:
+            yield "failed", f"expectation failed: {failure}"
+        if failures and verdict.failures > LINES:
+            yield "failed", f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times"
+
+
+def fault_lines(robots: Sequence[Robot], to_tick: int = NEVER_TICK) -> Iterator[Line]:
+    """What the firmware did wrong up to `to_tick`, a line for each robot."""
+    for robot in robots:
+        faults = [fault for fault in robot.board.faults if fault.tick <= to_tick]
+        if faults:
+            more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+            yield "fault", f"firmware fault: net{robot.network}/robot{robot.slot}: {faults[0]}{more}"
+
+
+def expectations_text(expectations: Sequence[Expectation]) -> str:
+    """How many checks passed, and the names of those that did not, for people. One that is always on and had no
+    occasion is not counted.
+    """
+    counted = [one for one in expectations if one.verdict != "not judged" or one.name not in ALWAYS_ON]
+    others = [f"{one.name} {one.verdict}" for one in counted if one.verdict != "passed"]
+    return ", ".join([f"{len(counted) - len(others)} of {amount(len(counted), 'check')} passed", *others])
+
+
+def result_of_case(
+    recorded: str,
+    failures: Sequence[Failure],
+    changed: bool,
+    verdict: Verdict = "passed",
+    why: Sequence[str] = (),
+) -> Result:
+    """From the line that was recorded ("" for none). `changed`: other firmware or settings ran than those of the case;
+    `verdict`: that of the checks it names, where none failed, and `why` they were not judged.
+
+    `failures` of the result: the check that failed, as recorded or otherwise, and the first firmware fault.
+    """
+    name = recorded.partition(":")[0]
+    if failures:
+        same = [one for one in failures if str(one) == recorded]
+        first = (same or failures)[0]
+        lines = [f"fails as recorded: {first}" if same else f"still fails, but not as recorded: {first}"]
+        if not recorded:
+            lines = [f"fails: {first}"]
+        elif not same:
+            lines.append(f"recorded: {recorded}")
+        fault = next((one for one in failures if one.fault), None)
+        if fault not in (None, first):
+            lines.append(f"and a firmware fault: {fault}")
+        kept = [first] if fault in (None, first) else [first, fault]
+        return _case("failed" if fault is None else "fault", lines, kept)
+    if verdict != "passed":
+        return _case(verdict, [*why, *([f"recorded: {recorded}"] if recorded else [])])
+    if not recorded:
+        return _case("passed", ["passes", *why])
+    if changed:
+        return _case("passed", [f"cured: {name} passes; recorded: {recorded}", *why])
+    return _case("differs", [f"not reproduced: {name} passes; recorded: {recorded}", *why])
+
+
+def _case(verdict: Verdict, lines: Sequence[str], failures: Sequence[Failure] = ()) -> Result:
+    return Result(verdict=verdict, said=[(verdict, line) for line in lines], failures=failures)

@@ -1,0 +1,222 @@
+"""A run under way: its world, and all that watches and drives it.
+
+run = Run(spec)
+run.drive()                  by its steps, or control period by control period; `play` for what is sent again
+run.result()                 its verdict and what there is to say
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
+from miro_protocol.actions import ScriptItem
+from miro_robot.image import Image
+from miro_sim.periods import Period
+from miro_sim.radio.downlink import TransmissionError
+from mirotwin.recording.recorder import Recorder
+from mirotwin.runs import runner
+from mirotwin.runs.result import Result, expectation_lines, fault_lines
+from mirotwin.runs.spec import RunSpec, silent_scenario
+from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.verdicts import Verdict, judge
+from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
+from mirotwin.verify.checks.happens import expect_of
+from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.steps.keys import ConditionStep, WaitStep
+from mirotwin.verify.steps.player import Player, player_of
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+
+class Run:
+    """`world`: one of the spec that nobody has moved, or that was moved to where the checks are to begin.
+
+    `trace`: what goes into it, None where nobody needs it as a case. `player`: that of its steps. `periods`: those that
+    `play` came past. `tick`: where the run ended, -1 while it goes on.
+    """
+
+    def __init__(self, spec: RunSpec, world: World | None = None, trace: Trace | None = None) -> None:
+        self.spec = spec
+        self.world = spec.world() if world is None else world
+        self.trace = trace
+        self.checks = Checks(self.world, spec.expected, spec.cut)
+        self.player: Player | None = player_of(self.world, spec.steps, spec.origin)
+        self.periods: list[Period] = []
+        self.tick = -1
+
+    @classmethod
+    def traced(cls, spec: RunSpec, world: World | None = None) -> Run:
+        """One that can become a case, unless it goes on from a saved world."""
+        world = spec.world() if world is None else world
+        return cls(spec, world, None if world.tick else Trace(world))
+
+    # Driving
+
+    def drive(
+        self,
+        recorder: Recorder | None = None,
+        full: bool = False,
+        on_period: Callable[[Period], object] = lambda period: None,
+        move: Callable[[], object] | None = None,
+    ) -> None:
+        """To its end: as `move` does it, by its steps, or control period by control period; see `runner.run`."""
+        if move is None and self.player is not None:
+            move = self.player.run
+        runner.run(self.world, recorder, full, on_period, move)
+
+    def play(self, progress: Callable[[int], object] = lambda tick: None) -> Run:
+        """To its end, which may be within a control period. `progress` is told the tick.
+
+        Raises TransmissionError for a script that cannot be sent.
+        """
+        world, until_tick = self.world, self.spec.until_tick
+        end_tick = world.periods * CONTROL_PERIOD_TICKS if until_tick is None else until_tick
+        world.observers.append(self.periods.append)
+        while not world.stopped and world.tick < end_tick:
+            world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
+            progress(world.tick)
+        self.finish()
+        return self
+
+    def finish(self) -> None:
+        """It is over, by itself or because it was broken off."""
+        if self.tick < 0:
+            self.tick = self.world.tick
+        self.checks.finish()
+
+    # Judging
+
+    @property
+    def judges(self) -> list[Checks]:
+        """The checks of the whole run, and those that steps began."""
+        return [self.checks, *(self.player.checks if self.player else ())]
+
+    @property
+    def failures(self) -> list[Failure]:
+        return self.checks.failures
+
+    @property
+    def failure(self) -> Failure | None:
+        """The first one."""
+        return self.failures[0] if self.failures else None
+
+    def verdict_on(self, name: str) -> Verdict:
+        """That of one check."""
+        return next(one.verdict for one in self.checks.verdicts() if one.name == name)
+
+    def result(self) -> Result:
+        """Its verdict, and the lines of steps, checks and firmware faults."""
+        world, player = self.world, self.player
+        said = [line for group in self.judges for line in expectation_lines(group)]
+        if player is not None and player.failure is not None:
+            said.insert(0, ("failed", f"step failed: {player.failure}"))
+        said += fault_lines(world.robots, NEVER_TICK if self.spec.until_tick is None else self.tick)
+        parts = [group.verdict() for group in self.judges]
+        parts += [verdict for verdict, _ in said if verdict in ("fault", "failed")]
+        return Result(
+            path=self.spec.origin,
+            verdict=judge(parts),
+            said=said,
+            failures=[one for group in self.judges for one in group.failures],
+            expectations=[one for group in self.judges for one in group.verdicts()],
+            done=0 if player is None else player.done,
+            steps=0 if player is None else player.count,
+            tick=world.tick if self.tick < 0 else self.tick,
+            seed=self.spec.seed,
+            digest=world.digest,
+            firmware_sha256=world.image.sha256 or "",
+        )
+
+    # As a file
+
+    def case(self) -> str:
+        """The case of the first failure. Raises ValueError if nothing failed."""
+        return case_of_checks(self.world, self._known_trace(), self.checks)
+
+    def stream(self) -> str:
+        """The same run as a stream that nothing is expected of."""
+        return case_text(self.world, self._known_trace(), {}, "")
+
+    def case_of_step(self) -> str | None:
+        """The case of the step that has just failed; None where no check can judge it."""
+        player = self.player
+        failure = None if player is None else player.failure
+        if player is None or failure is None or failure.tick <= failure.begun_tick:
+            return None
+        step = player.steps[player.done]
+        if not isinstance(step, ConditionStep) or (isinstance(step, WaitStep) and not failure.timed_out):
+            return None
+        name = "happens" if isinstance(step, WaitStep) else "never_happens"
+        until_tick = max(failure.tick, self.world.tick)
+        expect = expect_of(name, step.condition, failure.begun_tick, until_tick)
+        return None if expect is None else self.case_of_expect(expect)
+
+    def case_of_expect(self, expect: Mapping[str, Any]) -> str | None:
+        """The case by a check that the run did not have: a new one with the same input is judged by `expect`.
+
+        None where the check passes, or cannot be one: a wait for no time at all.
+        """
+        trace, world = self._known_trace(), self.world
+        scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
+        spec = RunSpec(
+            scenario=scenario,
+            image=world.image,
+            seed=world.seed,
+            script=trace.script(),
+            until_tick=world.tick,
+        )
+        try:
+            again = Run(spec).play()
+        except BadInput:
+            return None
+        failure = next((one for one in again.failures if one.check in expect), None)
+        return None if failure is None else case_text(world, trace, expect, str(failure))
+
+    def _known_trace(self) -> Trace:
+        assert self.trace is not None, "nobody traced the run, or it began with what another one had saved"
+        return self.trace
+
+
+def robot_spec(
+    image: Image,
+    robots: int,
+    slot: int,
+    script: Sequence[ScriptItem],
+    expect: Mapping[str, Any],
+    until_tick: int,
+) -> RunSpec:
+    """One robot of `robots` that stands hears `script`, over a radio without errors whose carrier is always on.
+
+    `expect`: checks by name with their parameters, as in `[expect]`. It goes on to the end of the control period.
+    """
+    whole_s = -(-until_tick // TICKS_PER_SECOND)  # whole seconds, so that few texts are read
+    settings = (
+        f"network.robots={robots}",
+        f"network.robot.slot={slot}",
+        'network.radio.carrier="on"',
+        f"duration_s={whole_s + 1}",
+    )
+    return RunSpec(
+        scenario=msgspec.structs.replace(silent_scenario(settings), expect=dict(expect)),
+        image=image,
+        script=sorted(script, key=lambda one: one.tick),
+        until_tick=-(-until_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS,
+    )
+
+
+@contextmanager
+def replaying(file: str, world: World) -> Iterator[None]:
+    """Within it, what cannot be sent or computed is bad input of `file`."""
+    try:
+        with plain_parameters(file, "replayed"):
+            yield
+    except TransmissionError as error:
+        raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None

@@ -1,0 +1,69 @@
+"""What is to be run. The one place that builds a world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.actions import ScriptItem
+from miro_protocol.transmission import Transmission
+from miro_robot.image import Image
+from miro_sim.scenario.file import load
+from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks.monitors import Expected
+from mirotwin.verify.steps.keys import Step
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+
+class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
+    """A world and how it is driven and judged. `script`: what is sent and done instead of what its hosts do.
+
+    `resumed`: the saved world with which it begins. `expected`: the checks; None: those of the scenario. `steps`: what
+    is done on the way. `until_tick`: where it ends, perhaps beyond its scenario; None: with that. `cut`: it may be
+    ended before it is over. `origin`: the file that messages name.
+    """
+
+    scenario: Scenario
+    image: Image
+    seed: int = 0
+    script: Sequence[ScriptItem] | None = None
+    resumed: bytes = b""
+    expected: Expected | None = None
+    steps: Sequence[Step] = ()
+    until_tick: int | None = None
+    cut: bool = False
+    origin: str = ""
+
+    def world(self, image: Image | None = None) -> World:
+        """A new one, at its first tick, with another image if one is given. Raises BadInput where the saved world is
+        another one's.
+        """
+        from miro_sim.world.world import World  # a hot module: not before the engine was chosen
+
+        script = () if self.resumed else self.script
+        world = World(self.scenario, self.seed, image or self.image, script)
+        if not self.resumed:
+            return world
+        try:
+            world.load(self.resumed)
+        except ValueError as error:
+            what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
+            raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
+        for one in self.script or ():
+            if isinstance(one, Transmission):
+                world.inject(one.data, one.network, one.tick, one.bad_stop)
+            else:
+                world.do(one)
+        return world
+
+
+@lru_cache(64)
+def silent_scenario(settings: tuple[str, ...]) -> Scenario:
+    """The scenario of a test that names none, with these settings: read once for all that want the same."""
+    return load("silent", settings).scenario

@@ -1,0 +1,174 @@
+"""One scenario file run to its verdict: its steps, what it expects, and what every run has to fulfil."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput
+from miro_exact.domain import DomainError
+from miro_exact.plugins import PluginError
+from miro_robot.image import Image
+from miro_sim.scenario.file import ScenarioText, load
+from mirotwin.runs.result import Result
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
+from mirotwin.shell.outputs import whole_file
+from mirotwin.shell.program import show_traceback
+from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
+from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
+from mirotwin.verify.cases.case import is_case
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.reading import everything, steps_of
+
+SCENARIO = "scenario.toml"
+"""The whole scenario with all that was set, in the folder of a file that failed."""
+
+
+def run_test(
+    path: str,
+    image: Image,
+    seed: int = 0,
+    settings: Sequence[str] = (),
+    artifacts: Path | None = None,
+    again: Callable[[bool], str] = lambda saves: "",
+) -> Result:
+    """Runs a file to its verdict; whatever cannot be run is a result, too.
+
+    `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
+    file that saves needs one. `again`: makes the command that gives the verdict again, told whether the file saves.
+    """
+    return result_of(path, artifacts, lambda folder: _run(path, image, seed, settings, folder, again), seed)
+
+
+def result_of(
+    path: str, artifacts: Path | None, run: Callable[[Path | None], Result], seed: int = 0
+) -> Result:
+    """What `run` makes of the file and of its folder below `artifacts`, which holds nothing of an earlier run."""
+    folder = None if artifacts is None else folder_of(artifacts, path)
+    if folder is not None:
+        with suppress(OSError, BadInput):  # who leaves something there says why nothing can be left
+            clear(folder, SCENARIO)
+    try:
+        return run(folder)
+    except (DomainError, PluginError, OSError) as error:
+        show_traceback(error)
+        return cannot_be_run(path, BadInput(path, "", f"cannot be run: {error}"), seed)
+    except BadInput as error:
+        show_traceback(error)
+        return cannot_be_run(path, error, seed)
+
+
+def cannot_be_run(path: str, error: BadInput, seed: int = 0) -> Result:
+    return Result(path=path, verdict="error", said=[("error", f"{error}")], seed=seed)
+
+
+def _run(
+    path: str,
+    image: Image,
+    seed: int,
+    settings: Sequence[str],
+    folder: Path | None,
+    again: Callable[[bool], str],
+) -> Result:
+    text = load(path, settings, everything)
+    steps = steps_of(text.scenario, path)
+    saving = [step for step in steps if step.VERB == "save"]
+    if saving and folder is None:
+        raise BadInput(
+            path, f"step {saving[0].number}", "there is no folder to save into", "give --artifacts DIR"
+        )
+    expected = expectations_of(text.scenario, path)
+    spec = RunSpec(
+        scenario=text.scenario, image=image, seed=seed, expected=expected, steps=steps, origin=path
+    )
+    run = Run(spec) if folder is None else Run.traced(spec)
+    case = None
+    if run.player is not None:
+        run.player.play()
+        case = None if folder is None else run.case_of_step()
+    run.drive(move=run.player.finish if run.player else None)
+    run.finish()
+    result = replace(run.result(), left_out=text.notes, again=again(bool(saving)))
+    return result if folder is None else _left(run, case, result, folder, text)
+
+
+def _left(run: Run, case: str | None, result: Result, folder: Path, text: ScenarioText) -> Result:
+    """What `save` steps kept, and the case if it failed, stand in the folder now."""
+    failed = bool(result.lines)
+    try:
+        keep_saved(run.player, folder)
+        if failed:
+            said = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
+            case = case or (run.case() if run.failures else None)
+            files = {SCENARIO: text.text}
+            leave(folder, "\n".join((*said, "")), case, run.stream(), run.spec.image, files)
+            return replace(result, left=str(folder))
+    except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
+        with suppress(OSError, BadInput):
+            clear(folder, SCENARIO)
+        saves = run.player is not None and run.player.saved
+        verdict = "error" if saves and not failed else result.verdict
+        return replace(result, verdict=verdict, said=[*result.said, ("passed", nothing_left(folder, error))])
+    return result
+
+
+def folder_of(artifacts: Path, path: str) -> Path:
+    """The file's own folder: by its path, which no other file has."""
+    parts = [part for part in Path(path).parts if part not in (".", "..", os.sep)]
+    return artifacts / "-".join([*parts[:-1], stem_of(path)])
+
+
+def stem_of(path: str) -> str:
+    """The name of a file without what its kind is called."""
+    return Path(path).name.removesuffix(".stream").removesuffix(".toml").removesuffix(".scenario")
+
+
+def keep_saved(player: Player | None, folder: Path) -> None:
+    """Writes what `save` steps kept. Raises OutputError."""
+    for name, content in (player.saved if player else {}).items():
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole_file(folder / name, "--artifacts") as part:
+            part.write_bytes(content)
+
+
+SUFFIX = ".scenario.toml"
+KINDS = f"*{SUFFIX} or *{CASE_SUFFIX}"
+SKIPPED = ("node_modules", "__pycache__")
+
+
+def collect(paths: Sequence[str]) -> list[str]:
+    """The files, each once: those that are named, and all of these kinds below each folder, sorted by path.
+
+    Of streams below a folder those are tests that expect something. A folder that is a link is not looked into, unless
+    it is named.
+
+    Raises BadInput for a path that is not there, and for a file of another kind.
+    """
+    found: dict[str, None] = {}
+    for path in paths:
+        if os.path.isdir(path):
+            found |= dict.fromkeys(_below(path))
+            continue
+        if not os.path.exists(path):
+            raise BadInput(path, "", "there is no such file or folder", f"name a folder, or a {KINDS}")
+        if not path.endswith((SUFFIX, CASE_SUFFIX)):
+            raise BadInput(path, "", f"is no {KINDS}", "rename it; `mirotwin run` takes any scenario")
+        found[path] = None
+    return list(found)
+
+
+def _below(folder: str) -> Iterator[str]:
+    for above, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in SKIPPED)
+        for name in sorted(names):
+            path = Path(above, name)
+            if not path.is_file() and not path.is_symlink():  # no pipes and devices
+                continue
+            if name.endswith(SUFFIX) or (name.endswith(CASE_SUFFIX) and is_case(path)):
+                yield str(path)
