@@ -101,10 +101,10 @@ def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
 
     _, again = rerun_bare_case(path, images["dimmer"], CHECK)
     assert again.failure is not None
-    assert again.lines[0].startswith("fails as recorded: ")
+    assert again.texts[0].startswith("fails as recorded: ")
     assert again.code == (3 if "no_fault" in path.stem else 1)
     _, cured = rerun_bare_case(path, images["mended"], CHECK)
-    assert (cured.code, cured.lines[0].partition(":")[0]) == (0, "cured")
+    assert (cured.code, cured.texts[0].partition(":")[0]) == (0, "cured")
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def run_case(entry, folder):
         image = load_hex(program_of(entry.other, folder, "other.ihx"))
     again, verdict = rerun_bare_case(path, image, check)
     processor = BarePlayback(image, again.line, again.script, again.end_tick).play().processor
-    return _end(processor, processor.bus.said, processor.faults, verdict.verdict, verdict.lines[0])
+    return _end(processor, processor.bus.said, processor.faults, verdict.verdict, verdict.texts[0])
 
 
 def _end(machine, sent, faults, why, verdict=""):

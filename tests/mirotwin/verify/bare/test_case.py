@@ -49,7 +49,7 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
 def test_a_case_fails_again_as_recorded(tmp_path, data, firmware, code, said):
     _, again = rerun_bare_case(case(tmp_path, data, firmware), image(firmware))
     assert (again.code, again.failure is not None) == (code, True)
-    assert again.lines[0].startswith(said)
+    assert again.texts[0].startswith(said)
 
 
 def test_a_case_of_a_check_needs_that_check(tmp_path):
@@ -57,8 +57,8 @@ def test_a_case_of_a_check_needs_that_check(tmp_path):
     file = tmp_path / "mycheck.py"
     file.write_text(WRONG.replace("short", "too_long"))
     _, again = rerun_bare_case(path, image(SLEEPS), f"{file}:too_long")
-    assert (again.code, again.lines[0].partition(":")[0]) == (1, "fails as recorded")
-    assert again.lines[0].endswith("3 are too many")
+    assert (again.code, again.texts[0].partition(":")[0]) == (1, "fails as recorded")
+    assert again.texts[0].endswith("3 are too many")
     with pytest.raises(
         BadInput, match="names the check 'too_long', which is not installed; give it: --check "
     ):
@@ -283,7 +283,7 @@ def test_a_distribution_may_bring_one(tmp_path, monkeypatch):
 def test_a_case_of_a_fault_finds_it_in_a_build_that_comes_to_it_later(tmp_path):
     slower = SLEEPS.replace("LJMP 4000h", "MOV R7,#0FFh\nDJNZ R7,$\nLJMP 4000h")
     _, again = rerun_bare_case(case(tmp_path, b"ab!"), image(slower))
-    assert (again.verdict, again.lines[0].partition(":")[0]) == ("fault", "still fails, but not as recorded")
+    assert (again.verdict, again.texts[0].partition(":")[0]) == ("fault", "still fails, but not as recorded")
 
 
 def test_a_stream_ends_where_it_says_also_before_its_last_line(tmp_path):
