@@ -6,18 +6,14 @@ Nothing here imports a hot module: a new process reads this file before its engi
 from __future__ import annotations
 
 import os
-import signal
-import threading
-from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
-from multiprocessing import current_process, parent_process
+from multiprocessing import current_process
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from miro_exact import engine
 from miro_exact.bad_input import BadInput
-from mirotwin.shell.processes import cores, safe_path
+from mirotwin.shell.process_pool import start_pool
+from mirotwin.shell.processes import cores
 
 NAME = "mirotwin worker"
 FAILED = 1
@@ -67,51 +63,11 @@ def refuse_in_import() -> None:
 
 
 def processes(count: int, context: WorkerContext | None = None) -> ProcessPoolExecutor:
-    """Processes with the engine of this one, which have begun.
-
-    Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
-    instruction on: what a process ignores, those that it starts ignore too.
-    """
+    """Processes with the engine of this one, which have begun."""
     refuse_in_import()
     context = context or WorkerContext()
-    with _ignoring_interrupts(), safe_path():
-        found = ProcessPoolExecutor(
-            max_workers=count,
-            mp_context=context,
-            initializer=_begin,
-            initargs=(engine.active(),),
-        )
-        for _ in range(count):  # each of which starts a process, as long as none is idle
-            context.begun.append(found.submit(int))
-    return found
-
-
-def _begin(chosen: str) -> None:
-    """In a new process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    engine.select(chosen)
-
-
-def _end_with_parent() -> None:
-    """Ends this process when its parent does: it would wait for jobs for ever if that was killed."""
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
-
-
-@contextmanager
-def _ignoring_interrupts() -> Iterator[None]:
-    try:
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    except ValueError:  # not the thread that signals come to
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+    pool, context.begun = start_pool(count, context)
+    return pool
 
 
 AHEAD = 4

@@ -6,23 +6,20 @@ about them, whichever trial they came in.
 
 A second process tries every second rule, where Linux has a core for it. A trial depends on its rule, the image and the
 seed alone, so the verdicts are those of one process, and they come in the same order. The second process does not know
-what fails in the first: it tries rules that are then not judged, too. What it does not tell, because it was ended, is
-tried by the first.
+what fails in the first: it tries rules that are then not judged, too. If it is killed, the first tries the rest.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import NoReturn
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Future
+from contextlib import nullcontext, suppress
+from functools import partial
+from itertools import islice
 
 import msgspec
 
-from miro_robot.faults import FirmwareFault
+from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import RobotId
 from miro_sim.world.world import World
@@ -31,6 +28,7 @@ from mirotwin.conform.rule import Rule
 from mirotwin.conform.rule_monitor import ConformsTo
 from mirotwin.conform.rules import presupposed, presupposed_first
 from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
+from mirotwin.shell.process_pool import spare_process
 from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
 from mirotwin.verify.checks.faults import NoFault
@@ -131,31 +129,56 @@ def _robots(world: World) -> list[RobotId]:
     return [(robot.network, robot.slot) for robot in world.robots]
 
 
+FEWEST = 10
+"""Rules for which a process is worth starting."""
+
+
 def try_all(
     rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False, ahead: bool = False
 ) -> Iterator[Outcome]:
     """Each as soon as it is known, those that others presuppose first; see `with_faults`. `ahead`: by two processes.
 
-    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run. Nor is it where the
-    firmware did, before it failed, what another of `rules` forbids: what comes after that says nothing of the rule.
+    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run.
     """
     forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
+    tried = partial(_try_and_explain, image=image, seed=seed, keep=keep, forbidden=forbidden)
+    theirs: dict[str, Future[Outcome]] = {}
 
-    def tried(rule: Rule) -> Outcome:
-        outcome = try_rule(rule, image, seed, keep)
-        if not outcome.failures:
-            return outcome
-        first_tick = outcome.failures[0].tick
-        before = [fault.kind for _, _, fault in outcome.faults if fault.tick <= first_tick]
-        cause = next((forbidden[kind] for kind in before if kind in forbidden), "")
-        if cause:
-            return msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
-        place = (outcome.failures[0].network, image, seed)
-        hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
-        return msgspec.structs.replace(outcome, hint=hint)
+    def outcome_of(rule: Rule) -> Outcome:
+        with suppress(BrokenExecutor):  # the process was killed
+            if rule.id in theirs:
+                return theirs[rule.id].result()
+        return tried(rule)
 
-    with tried_ahead(presupposed_first(rules) if ahead else (), tried) as found:
-        yield from in_order(rules, found)
+    outcomes = in_order(rules, outcome_of)
+    yield from islice(
+        outcomes, 1
+    )  # before the process is copied: the first trial loads what every trial needs
+    with spare_process() if ahead and len(rules) >= FEWEST else nullcontext() as pool:
+        if pool is not None:
+            theirs |= {rule.id: pool.submit(tried, rule) for rule in presupposed_first(rules)[1::2]}
+        yield from outcomes
+
+
+def _try_and_explain(
+    rule: Rule, image: Image, seed: int, keep: bool, forbidden: Mapping[FaultKind, str]
+) -> Outcome:
+    """The outcome of a rule, with a hint if it failed.
+
+    It is not judged where the firmware did, before it failed, what another rule forbids (`forbidden`: kind of fault ->
+    rule): what comes after that says nothing of the rule.
+    """
+    outcome = try_rule(rule, image, seed, keep)
+    if not outcome.failures:
+        return outcome
+    first_tick = outcome.failures[0].tick
+    before = [fault.kind for _, _, fault in outcome.faults if fault.tick <= first_tick]
+    cause = next((forbidden[kind] for kind in before if kind in forbidden), "")
+    if cause:
+        return msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
+    place = (outcome.failures[0].network, image, seed)
+    hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
+    return msgspec.structs.replace(outcome, hint=hint)
 
 
 def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
@@ -186,61 +209,3 @@ def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outc
             failures = (*forbidden, *outcome.failures)
             found.append(msgspec.structs.replace(outcome, failures=failures, cause=cause))
     return found
-
-
-FEWEST = 10
-"""Rules for which a process is worth starting."""
-
-
-def has_core() -> bool:
-    """Whether a second process would have one. A process with threads is not forked: their locks would stay locked."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    return cores > 1 and threading.active_count() == 1
-
-
-@contextmanager
-def tried_ahead(
-    rules: Sequence[Rule], tried: Callable[[Rule], Outcome]
-) -> Iterator[Callable[[Rule], Outcome]]:
-    """`tried`, for all or some of `rules` in this order; a second process does every second of them."""
-    if len(rules) < FEWEST or not has_core():
-        yield tried
-        return
-    theirs = rules[::2]
-    reading, writing = os.pipe()
-    process = os.fork()
-    if process == 0:
-        _tell(theirs, tried, reading, writing)
-    os.close(writing)
-    ids = {rule.id for rule in theirs}
-
-    def taken(rule: Rule) -> Outcome:
-        try:
-            while rule.id in ids:
-                outcome: Outcome = pickle.load(told)
-                if outcome.rule == rule.id:
-                    return outcome
-        except (EOFError, pickle.UnpicklingError):
-            ids.clear()
-        return tried(rule)
-
-    try:
-        with open(reading, "rb") as told:
-            yield taken
-    finally:
-        os.kill(process, signal.SIGKILL)
-        os.waitpid(process, 0)
-
-
-def _tell(rules: Sequence[Rule], tried: Callable[[Rule], Outcome], reading: int, writing: int) -> NoReturn:
-    """The second process. It ends when its outcomes have no reader, as after a signal that the first one got."""
-    try:
-        os.close(reading)
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.SIG_DFL)
-        with open(writing, "wb") as pipe:
-            for rule in rules:
-                pickle.dump(tried(rule), pipe)
-                pipe.flush()
-    finally:
-        os._exit(0)

@@ -6,7 +6,7 @@ import hashlib
 import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import msgspec
@@ -35,7 +35,7 @@ class Image(msgspec.Struct, frozen=True):
 
     `code`: 64 KB, FF where nothing was loaded; `used`: (first, end) ranges of loaded addresses, ascending;
     `size`: bytes loaded; `sha256`: hex digest of the file; `symbols`: read from the files beside it when the first
-    one is asked for.
+    one is asked for; `content`: of the file, or of all files that were merged.
     """
 
     path: Path
@@ -44,6 +44,7 @@ class Image(msgspec.Struct, frozen=True):
     size: int
     sha256: str
     symbols: Symbols
+    content: bytes = b""
 
     def merged(self, other: Image) -> Image:
         """Both as one program, called as this one. Raises ImageError where both have a byte at the same address."""
@@ -60,7 +61,8 @@ class Image(msgspec.Struct, frozen=True):
         used = _ranges(loaded)
         names = Symbols(lambda: {**other.symbols.names, **self.symbols.names}, used)
         sha256 = hashlib.sha256(f"{self.sha256} {other.sha256}".encode()).hexdigest()
-        return Image(self.path, bytes(code), used, self.size + other.size, sha256, names)
+        content = self.content + other.content
+        return Image(self.path, bytes(code), used, self.size + other.size, sha256, names, content)
 
     def code_address(self, name: str, path: str | Path = "", place: str = "") -> int:
         """Of a symbol of the code, with or without the underscore that C puts before it.
@@ -99,19 +101,29 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
     return parse_hex(content, path, limit)
 
 
-def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
-    """The same from the file's content; `path` is for messages and symbols."""
+def parse_hex(
+    content: bytes, path: Path, limit: int = FLASH_BYTES, names: dict[str, tuple[int, str]] | None = None
+) -> Image:
+    """The same from the file's content; `path` is for messages and symbols.
+
+    `names`: address and space of each name, instead of the files beside `path`.
+    """
     try:
         known = _parsed(content, limit)
     except ImageError as error:
         raise ImageError(path, error.place, error.what, error.remedy) from None
+    if names is None:
+        symbols = Symbols(partial(_names_beside, path, content, limit), known.used)
+    else:
+        symbols = Symbols({name: Symbol(*place) for name, place in names.items()}, known.used)
     return Image(
         path=path,
         code=known.code,
         used=known.used,
         size=known.loaded.count(1),
         sha256=known.sha256,
-        symbols=Symbols(lambda: _names_beside(path, known.code, known.loaded), known.used),
+        symbols=symbols,
+        content=content,
     )
 
 
@@ -145,15 +157,16 @@ def _parsed(content: bytes, limit: int) -> _Content:
     return _Content(bytes(code), bytes(loaded), _ranges(loaded), hashlib.sha256(content).hexdigest())
 
 
-def _names_beside(path: Path, code: bytes, loaded: bytes) -> dict[str, Symbol]:
+def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
     """The names in the `.map` and `.cdb` beside an image; what is missing contributes nothing.
 
     Raises ImageError when one of them contradicts the image.
     """
+    known = _parsed(content, limit)
     map_path, cdb_path = path.with_suffix(".map"), path.with_suffix(".cdb")
     found_map, found_cdb = parse_map(read_text(map_path)), parse_cdb(read_text(cdb_path))
-    _refuse(map_path, check_map(found_map, code, loaded))
-    _refuse(cdb_path, check_cdb(found_cdb, code, loaded))
+    _refuse(map_path, check_map(found_map, known.code, known.loaded))
+    _refuse(cdb_path, check_cdb(found_cdb, known.code, known.loaded))
     return found_map.names | found_cdb.names
 
 

@@ -4,95 +4,113 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
 from mirotwin.conform import run
-from mirotwin.conform.rules import RULES
-from mirotwin.conform.run import FEWEST, Outcome, tried_ahead, try_all
-from mirotwin.verify.checks.interface import Failure
+from mirotwin.conform.rules import RULES, presupposed_first
+from mirotwin.conform.run import FEWEST, Outcome, try_all
+from mirotwin.shell import process_pool
 from tests import children
 from tests.mirotwin.conform.images import FAULTS, HANGS, image_of
 from tests.mirotwin.verify.checks.rig import own_image
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="Linux alone forks")
-SOME = RULES[: 2 * FEWEST]
+SOME = presupposed_first(RULES[: 2 * FEWEST])
 
 
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch):
-    monkeypatch.setattr(run, "has_core", lambda: True)
+    monkeypatch.setattr(process_pool, "cores", lambda: 2)
 
 
-def failing(rule):
-    """An outcome that says which process it is from."""
-    return Outcome(rule.id, (Failure("conforms_to", os.getpid(), 1, 7, "one", "another"),))
+@pytest.fixture
+def trying(monkeypatch):
+    """Has rules tried by this function instead of a trial, in this process and in the one that is copied from it."""
+    return lambda tried: monkeypatch.setattr(run, "try_rule", lambda rule, *_: tried(rule))
 
 
 def processes():
     return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def no_children():
-    """Says whether there is no process but those that other tests of this one have left, such as a resource tracker."""
+    """No process is left but those that other tests of this one have left, such as a resource tracker."""
     before = processes()
-
-    def check():
-        assert processes() == before
-
-    return check
+    yield
+    assert processes() == before
 
 
-def test_every_second_rule_is_tried_by_another_process_which_is_gone_then(no_children):
-    with tried_ahead(SOME, failing) as tried:
-        found = [tried(rule) for rule in SOME]
-    assert [one.rule for one in found] == [rule.id for rule in SOME]
-    processes = [one.failures[0].network for one in found]
-    assert set(processes[1::2]) == {os.getpid()}
-    assert len(set(processes[::2])) == 1
-    assert processes[0] != os.getpid()
-    no_children()
+def by_this_process(rule):
+    """An outcome that says which process it is from."""
+    return Outcome(rule.id, (), fault_count=os.getpid())
 
 
-def test_rules_may_be_left_out(no_children):
-    with tried_ahead(SOME, failing) as tried:
-        assert [tried(rule).rule for rule in SOME[5::3]] == [rule.id for rule in SOME[5::3]]
-    no_children()
+def ahead(rules):
+    """Rules in the order in which they were tried -> the process that did it."""
+    return {one.rule: one.fault_count for one in try_all(rules, own_image(), ahead=True)}
 
 
-@pytest.mark.parametrize("last", [0, 4], ids=["begins", "has told some"])
-def test_what_a_process_does_not_tell_is_tried_by_the_first(last):
+def test_another_process_tries_every_second_rule(trying):
+    trying(by_this_process)
+    found = ahead(SOME)
+    assert list(found) == [rule.id for rule in SOME]
+    first, second = list(found.values())[::2], list(found.values())[1::2]
+    assert set(first) == {os.getpid()}
+    assert len(set(second)) == 1
+    assert second[0] != os.getpid()
+
+
+@pytest.mark.parametrize("last", [1, 5], ids=["first", "third"])
+def test_what_a_killed_process_was_to_try_is_tried_by_the_first(trying, last):
     own = os.getpid()
 
     def tried_until(rule):
         if os.getpid() != own and rule == SOME[last]:
             os.kill(os.getpid(), signal.SIGKILL)
-        return failing(rule)
+        return by_this_process(rule)
 
-    with tried_ahead(SOME, tried_until) as tried:
-        found = [tried(rule) for rule in SOME]
-    assert [one.rule for one in found] == [rule.id for rule in SOME]
-    assert {one.failures[0].network for one in found[last:]} == {own}
-
-
-def test_an_error_is_raised_where_the_first_process_meets_it(no_children):
-    def error(rule):
-        raise ZeroDivisionError(rule.id)
-
-    with pytest.raises(ZeroDivisionError, match=SOME[0].id), tried_ahead(SOME, error) as tried:
-        tried(SOME[0])
-    no_children()
+    trying(tried_until)
+    found = ahead(SOME)
+    assert list(found) == [rule.id for rule in SOME]
+    assert {found[rule.id] for rule in SOME[last:]} == {own}
 
 
-def test_few_rules_and_a_single_core_need_no_process(monkeypatch):
-    with tried_ahead(SOME[: FEWEST - 1], failing) as tried:
-        assert tried is failing
-    monkeypatch.setattr(run, "has_core", lambda: False)
-    with tried_ahead(SOME, failing) as tried:
-        assert tried is failing
+@pytest.mark.parametrize("place", [0, 1])
+def test_an_error_in_a_trial_is_raised_by_whichever_process_it_came(trying, place):
+    def tried(rule):
+        if rule == SOME[place]:
+            raise ZeroDivisionError(rule.id)
+        return by_this_process(rule)
+
+    trying(tried)
+    with pytest.raises(ZeroDivisionError, match=SOME[place].id):
+        ahead(SOME)
+
+
+def test_few_rules_need_no_other_process(trying):
+    trying(by_this_process)
+    assert set(ahead(SOME[: FEWEST - 1]).values()) == {os.getpid()}
+
+
+def test_nor_does_a_single_core_have_one(trying, monkeypatch):
+    trying(by_this_process)
+    monkeypatch.setattr(process_pool, "cores", lambda: 1)
+    assert set(ahead(SOME).values()) == {os.getpid()}
+
+
+def test_a_process_with_threads_is_not_copied(trying):
+    trying(by_this_process)
+    end = threading.Event()
+    thread = threading.Thread(target=end.wait)
+    thread.start()
+    assert set(ahead(SOME).values()) == {os.getpid()}
+    end.set()
+    thread.join()
 
 
 @pytest.mark.slow
@@ -107,14 +125,18 @@ HOLDS = """
 import os, time
 from mirotwin.conform import run
 from mirotwin.conform.rules import RULES
+from mirotwin.shell import process_pool
+from mirotwin.shell.firmware_image import load_firmware
 
-run.has_core = lambda: True
-def tried(rule):
-    os.write(1, b"%d\\n" % os.getpid())
-    time.sleep(1)
+process_pool.cores = lambda: 2
+def tried(rule, *others):
+    if rule != RULES[0]:
+        os.write(1, b"%d\\n" % os.getpid())
+        time.sleep(1)
+    return run.Outcome(rule.id, ())
 
-with run.tried_ahead(RULES, tried) as one:
-    one(RULES[1])
+run.try_rule = tried
+list(run.try_all(RULES[:12], load_firmware(), ahead=True))
 """
 
 
