@@ -69,13 +69,9 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     quiet: Annotated[bool, QUIET.saying("No progress bar and no lists of frames or differences.")] = False
 
     @property
-    def keys(self) -> tuple[str, ...]:
-        """What is set in the scenario."""
-        return (*self.settings, *as_settings(self.expected))
-
-    @property
     def expects(self) -> bool:
-        return any(".expect." in f".{key}" for key in self.keys)
+        """Whether checks decide, not differences."""
+        return bool(self.expected) or any(".expect." in f".{key}" for key in self.settings)
 
     @property
     def shows(self) -> bool:
@@ -172,7 +168,8 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     refuse_given(file, "is for a case of a bare processor", options.given("check"))
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job = load_job(file, options.firmware, options.keys, options.seed, options.stack_from)
+    keys = (*options.settings, *as_settings(options.expected))
+    job = load_job(file, options.firmware, keys, options.seed, options.stack_from)
     complain(*job.notes)
     if not job.recorded and not options.desk.port:
         refuse_given(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
