@@ -18,7 +18,7 @@ from mirotwin.shell.debug_files import debugged_image
 
 
 class CodeLocation(Record, frozen=True):
-    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, None where no debug file tells.
+    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, None where no debug file has it.
 
     `symbol` with offset; `source`: what stands in that line, None where the file is not there; `text` disassembled.
     """

@@ -13,16 +13,14 @@ import msgspec
 
 from miro_exact.clock import seconds
 from miro_robot.image import Image
-from miro_robot.image.symbol_files import read_text
+from miro_robot.image.symbol_files import STACK
+from miro_robot.image.variables import variables_of
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
 
 _BANKS = 0x20
 _RAM_BYTES = 0x100
-_SIZE = re.compile(r"^S:(?:G|F\w+)\$(\w+)\$\w+\$\w+\(\{([0-9]{1,3})\}", re.MULTILINE)
-STACK = "__start__stack"
-"""SDCC's name for the first byte after all variables."""
 
 
 def variables(image: Image) -> list[tuple[int, str]]:
@@ -53,10 +51,14 @@ def name_of_byte(image: Image, address: int) -> str:
 def extents(image: Image) -> dict[str, tuple[int, int]]:
     """Name -> (first address, bytes) of each variable; nothing of what lies on the stack.
 
-    A debug file tells sizes; without one a variable ends where the next begins.
+    Sizes come from the debug file; without one a variable ends where the next begins.
     """
-    sizes = {f"_{name}": int(size) for name, size in _SIZE.findall(read_text(image.path.with_suffix(".cdb")))}
     places = variables(image)
+    sizes = (
+        {f"_{name}": known[0].type.size for name, known in variables_of(image).by_name.items()}
+        if places
+        else {}
+    )
     found = {}
     for (first, name), (end, _) in pairwise([*places, (_RAM_BYTES, "")]):
         if name != STACK:
@@ -75,7 +77,7 @@ Value = int | float | str | None
 
 
 class Record(msgspec.Struct, frozen=True):
-    """What was found. As JSON: fields by name, a tick in seconds too, `one` and `other` as a pair."""
+    """Part of a result. As JSON: fields by name, a tick also in seconds, `one` and `other` as a pair."""
 
     def as_json(self) -> dict[str, Any]:
         found: dict[str, Any] = {}

@@ -193,7 +193,7 @@ def _compared(builds: Builds) -> str:
 
 
 def _missing(annotated: tuple[AnnotatedImage, AnnotatedImage]) -> Iterator[str]:
-    """What the debug files do not tell."""
+    """Debug files that are missing or wrong, a line each."""
     for one in annotated:
         image = one.image
         beside = "put its .map, .cdb and .rst beside it"

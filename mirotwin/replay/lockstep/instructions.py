@@ -3,7 +3,7 @@
 Two instructions are looked for. *Changed*: the first one executed whose code is not the same; found at full speed, by
 marks at all changed places. *Effect*: the one after which the processors' states are not the same again. The worlds'
 states are compared every millisecond; from the last time they are the same on, each step is. An effect that is gone
-within a millisecond is no such effect: what the first changed instruction does is told of it.
+within a millisecond does not count; then only the first changed instruction is reported.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
 from miro_exact.state import Flat
+from miro_robot.image.symbol_files import STACK
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
 from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
-from mirotwin.replay.lockstep.fields import STACK, Record, Value, item_differences, name_of_byte
+from mirotwin.replay.lockstep.fields import Record, Value, item_differences, name_of_byte
 from mirotwin.replay.lockstep.pair import LOOK_TICKS, WorldPair
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ REGISTERS = {
     **{f"peripherals.ports.latches[{port}]": f"P{port}" for port in range(4)},
 }  # fmt: skip
 _RAM_BYTES = 0x100
-NOT_TOLD = ("instructions", "idle_cycles", "blocked")
-"""Counts that follow from the others."""
+DERIVED = ("instructions", "idle_cycles", "blocked")
+"""Counts that follow from the others: left out."""
 
 
 class ValueDifference(Record, frozen=True):
@@ -234,7 +235,7 @@ def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[Va
     flat = Flat(robot.board.cpu)
     values, others = flat.decode(one), flat.decode(other)
     for path, value in values.items():
-        if path in NOT_TOLD:
+        if path in DERIVED:
             continue
         for item, here, there in item_differences(value, others[path]):
             name = path + item

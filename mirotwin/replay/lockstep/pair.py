@@ -102,8 +102,8 @@ def first_difference(
 
     Default: to the end of the shorter one. None: they never do, looked at every `look_ticks`. Both worlds are left at
     the tick that was found. What enters no digest is not compared: how early input was announced. Worlds of other
-    scenarios are compared in the fields that both have. Both go back and on again, so their observers are told some
-    periods twice. Raises ValueError unless both stand at one tick, and for steps that do not exist.
+    scenarios are compared in the fields that both have. Both go back and on again, so their observers are
+    called twice for some periods. Raises ValueError unless both stand at one tick, and for steps that do not exist.
     """
     if look_ticks < 1:
         raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")

@@ -1,9 +1,9 @@
 """Where two builds go apart whose code lies at other addresses: the first variables that differ, and who wrote them.
 
 Such builds execute nothing at the same address, and most things at other times. They are compared where both processors
-sleep, and so have done all there was to do: every half millisecond the variables that both symbol files name. What
-holds times (a timer's count, say) differs between builds of other speed, and means nothing; so those that still differ
-at the end are listed by when that began, and with the last instruction of each build that changed them.
+sleep, and so have done all there was to do: every half millisecond the variables that both symbol files name. Ignore
+timer variables: they differ between builds of another speed. Variables that still differ at the end are listed by when
+that began, and with the last instruction of each build that changed them.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class Builds:
         return slept
 
     def _traced(self, found: VariableDifference, before: tuple[Mark, Mark]) -> VariableDifference:
-        """The same with the instructions that wrote it."""
+        """`found` with the instructions that wrote the variable, searched from the look before it differed."""
         self.pair.go_back(before)
         first, second, size = self.places[found.name]
         watchers = Writes(first, size), Writes(second, size)
