@@ -6,31 +6,23 @@ import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import load
-from miro_sim.scenario.file import parse as parse_scenario
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, refuse_given
-from mirotwin.replay.sources import RunOrigin, SourceDifference, source_differences
+from mirotwin.replay.sources import SourceDifference, source_differences
 from mirotwin.replay.text import difference_lines, difference_tables
-from mirotwin.runs.job import (
-    DEFAULT_SCENARIO,
-    image_if_any,
-    load_job,
-    plugin_notes,
-    world_of,
-)
+from mirotwin.runs.job import DEFAULT_SCENARIO, load_job, recorded_spec, recording_notes
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
@@ -91,15 +83,6 @@ class DiffOptions(Options, frozen=True, kw_only=True):
         return not self.quiet and not self.compare.as_json
 
 
-class Side(msgspec.Struct, frozen=True):
-    """A or B: the run, what it was made from, and what else there is to say of it."""
-
-    path: str
-    run: ComparedRun
-    origin: RunOrigin
-    notes: tuple[str, ...] = ()
-
-
 @command_of(DiffOptions)
 def diff(options: DiffOptions) -> int:
     """Compares the recordings A and B (run.mcap, or a run's folder): what they were made from, then all they hold. Or
@@ -116,33 +99,28 @@ def diff(options: DiffOptions) -> int:
         remedy = "`mirotwin replay` compares a recording made at a port with its twin"
         raise BadInput("", "--compare answers", "is for robots at a port, beside their twin", remedy)
     sources = checked_sources(options.sources)
-    images = _are_images(options)
-    one, other = _run_images(options) if images else _read_recordings(options)
+    one, other = _run_images(options) if _are_images(options) else _read_recordings(options)
     one, other = _with_same_robots(one, other)
-    for side in (one, other):
-        compare.check_reaches(side.path, side.run.periods)
-    rule, notes = _rule(compare.rule, one, other)
-    known = load_images(options.lines_from, one.run.image, other.run.image)
+    for run in (one, other):
+        compare.check_reaches(run.ways[0].origin, run.periods)
+    (spec, *_), (other_spec, *_) = one.ways, other.ways
+    known = load_images(options.lines_from, spec.image, other_spec.image)
     annotate = partial(annotated_of, images=known, sources=sources)
-    alike = one.origin.scenario == other.origin.scenario and one.origin.seed == other.origin.seed
-    found = compare_runs(one.run, other.run, rule, (annotate, annotate), NAMES, alike)
+    alike = (spec.scenario, spec.seed) == (other_spec.scenario, other_spec.seed)
+    rule, notes = _rule(compare.rule, one, other)
+    found = compare_runs(one, other, rule, (annotate, annotate), NAMES, alike)
     found = replace(found, notes=(*one.notes, *other.notes, *notes, *found.notes))
-    origins = [*source_differences(one.origin, other.origin)]
+    origins = [*source_differences(one, other)]
     if options.shows:
         _print_tables(origins, found, options.everything)
-    code = _report(options, one, other, origins, found)
+    code = _report(options, one, other, found, alike=not origins)
     if compare.as_json:
-        run = {"on": options.on, "seed": one.origin.seed} if images else {}
-        document = {
-            "a": one.path,
-            "b": other.path,
-            **run,
-            "sources": [each.as_json() for each in origins],
-            "periods": {"a": len(one.run.periods), "b": len(other.run.periods)},
-            **compare.rule_as_json(),
-            **found.as_json(options.everything),
-            "exit_code": code,
-        }
+        document: dict[str, Any] = {"a": file_in(options.a), "b": file_in(options.b)}
+        if not one.recorded:
+            document |= {"on": options.on, "seed": spec.seed}
+        document["sources"] = [each.as_json() for each in origins]
+        document["periods"] = {"a": len(one.periods), "b": len(other.periods)}
+        document |= compare.rule_as_json() | found.as_json(options.everything) | {"exit_code": code}
         print_json(document)
     return code
 
@@ -168,35 +146,30 @@ def _is_image(path: str) -> bool:
         return file.read(1) == b":"
 
 
-def _read_recordings(options: DiffOptions) -> tuple[Side, Side]:
+def _read_recordings(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
     return _read_recording(file_in(options.a)), _read_recording(file_in(options.b))
 
 
-def _read_recording(path: str) -> Side:
+def _read_recording(path: str) -> ComparedRun:
     check_no_folder(path)
     data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if not MAGIC.startswith(data[: len(MAGIC)]):
         remedy = "give a run.mcap that `mirotwin run` wrote, or two images (.ihx)"
         raise BadInput(path, "offset 0", "not a recording", remedy)
     recording = parse(data, path)
+    source = recording.source
     if not recording.periods:
         raise BadInput(path, "", "the recording holds no control period", "there is nothing to compare")
-    source = recording.source
     if source.resumed:
         what = f"a run that was resumed: it begins with control period {recording.periods[0].index}"
         raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
-    if recording.broken_off:
-        complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-    complain(*plugin_notes(path, source))
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
-    image = image_if_any(recording, path)
-    ways = [partial(world_of, recording, path, scripted=scripted) for scripted in (False, True)]
-    origin = RunOrigin(scenario, source.seed, source.firmware_sha256, image, source.plugins, source.state)
-    return Side(path, ComparedRun(recording.periods, image, ways, recorded=True), origin)
+    complain(*recording_notes(recording, path))
+    sent = recorded_spec(recording, path)
+    ways = replace(sent, computed=True), sent
+    return ComparedRun(recording.periods, ways, True, source.state, source.plugins)
 
 
-def _run_images(options: DiffOptions) -> tuple[Side, Side]:
-    """Runs both."""
+def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
     on = file_in(options.on, (*RECORDINGS, *CASES))
     if Path(on).is_file() and not on.endswith(".toml"):
         job = load_job(on, options.a, options.settings, options.seed)
@@ -209,39 +182,38 @@ def _run_images(options: DiffOptions) -> tuple[Side, Side]:
         image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
         spec = RunSpec(scenario=text.scenario, image=image, seed=seed, origin=on)
     end_tick = min(end_tick, options.compare.rule.to_tick or end_tick)
-    sides = []
+    spec = replace(spec, until_tick=end_tick, cut=True)
+    runs = []
     for name, path in zip(NAMES, (options.a, options.b), strict=True):
-        image = load_firmware(path)
+        again = replace(spec, image=load_firmware(path))
         with plain_parameters(on):
-            run = Run(replace(spec, image=image, until_tick=end_tick, cut=True))
+            run = Run(again)
         with ProgressBar(f"running {name}", end_tick, not options.shows) as bar, replaying(on, run.world):
             run.play(bar.to)
-        faults = tuple(f"{name}: {text}" for _, text in fault_lines(run.world.robots))
-        origin = RunOrigin(spec.scenario, spec.seed, image.sha256, image)
-        sides.append(Side(path, ComparedRun(run.periods, image, [spec.world]), origin, faults))
-    return sides[0], sides[1]
+        faults = [f"{name}: {text}" for _, text in fault_lines(run.world.robots)]
+        runs.append(ComparedRun(run.periods, [again], notes=faults))
+    return runs[0], runs[1]
 
 
-def _with_same_robots(one: Side, other: Side) -> tuple[Side, Side]:
+def _with_same_robots(one: ComparedRun, other: ComparedRun) -> tuple[ComparedRun, ComparedRun]:
     """Both with the robots that both have, and a note on each that has more. Raises BadInput where none is in both."""
     here, there = _robots(one), _robots(other)
     if here == there:
         return one, other
     common = [place for place in here if place in there]
-    sides = []
-    for name, side, robots in ((NAMES[0], one, here), (NAMES[1], other, there)):
+    runs = []
+    for name, run, robots in ((NAMES[0], one, here), (NAMES[1], other, there)):
         alone = [f"net{network}/robot{slot}" for network, slot in robots if (network, slot) not in common]
-        notes = (*side.notes, *([f"only {name} has {', '.join(alone)}"] if alone else []))
-        periods = [_only(period, common) for period in side.run.periods]
-        sides.append(replace(side, run=replace(side.run, periods=periods), notes=notes))
+        notes = [*run.notes, *([f"only {name} has {', '.join(alone)}"] if alone else [])]
+        runs.append(replace(run, periods=[_only(period, common) for period in run.periods], notes=notes))
     if not common:
-        both = "; ".join(note for side in sides for note in side.notes)
+        both = "; ".join(note for run in runs for note in run.notes)
         raise BadInput("", "", f"the recordings have no robot in common: {both}")
-    return sides[0], sides[1]
+    return runs[0], runs[1]
 
 
-def _robots(side: Side) -> list[RobotId]:
-    return [(robot.network, robot.slot) for robot in side.run.periods[0].robots]
+def _robots(run: ComparedRun) -> list[RobotId]:
+    return [(robot.network, robot.slot) for robot in run.periods[0].robots]
 
 
 def _only(period: Period, robots: Sequence[RobotId]) -> Period:
@@ -249,10 +221,10 @@ def _only(period: Period, robots: Sequence[RobotId]) -> Period:
     return replace(period, robots=tuple(by_place[place] for place in robots))
 
 
-def _rule(rule: CompareRule, one: Side, other: Side) -> tuple[CompareRule, list[str]]:
+def _rule(rule: CompareRule, one: ComparedRun, other: ComparedRun) -> tuple[CompareRule, list[str]]:
     """With what only recordings are compared in; and why digests are not, if they should."""
-    bits, recorded = rule.kind == "bits", one.run.recorded
-    digests = bits and recorded and one.origin.state == other.origin.state  # they are of states of one form
+    bits, recorded = rule.kind == "bits", one.recorded
+    digests = bits and recorded and one.state == other.state  # they are of states of one form
     why = "their states have another form, by scenario or version of this program"
     notes = [f"the digests are not compared: {why}"] if bits and recorded and not digests else []
     return replace(rule, host=bits, digests=digests), notes
@@ -270,23 +242,23 @@ def _print_tables(origins: Sequence[SourceDifference], found: RunDifference, eve
 
 
 def _report(
-    options: DiffOptions, one: Side, other: Side, origins: Sequence[SourceDifference], found: RunDifference
+    options: DiffOptions, one: ComparedRun, other: ComparedRun, found: RunDifference, alike: bool
 ) -> int:
-    """Lines for people; the exit code."""
-    noun = "recordings" if one.run.recorded else "images"
-    shorter, longer = sorted((one.run.periods, other.run.periods), key=len)
+    """Lines for people; the exit code. `alike`: they were made from the same."""
+    noun = "recordings" if one.recorded else "images"
+    shorter, longer = sorted((one.periods, other.periods), key=len)
     cut = len(shorter) != len(longer) and options.compare.to_time is None
     for line in difference_lines(found, f"the {noun} differ") if found.differences else ():
         complain(line)
     if cut:
-        complain(f"A has {amount(len(one.run.periods), 'control period')}, B has {len(other.run.periods)}")
+        complain(f"A has {amount(len(one.periods), 'control period')}, B has {len(other.periods)}")
     for note in found.notes:
         complain(note)
     if found.differences or cut:
         return exit_code("differs")
     if not options.compare.as_json:
         extent = options.compare.extent(shorter)
-        whence = "; they were not made from the same" if origins else ""
+        whence = "" if alike else "; they were not made from the same"
         recorded = f"the recordings hold the same in {extent}{whence}"
-        show(recorded if one.run.recorded else f"on {options.on}, the images do the same in {extent}")
+        show(recorded if one.recorded else f"on {options.on}, the images do the same in {extent}")
     return DONE

@@ -17,34 +17,36 @@ from mirotwin.recording.difference import DIGEST, WORDS, Difference, first_per_c
 from mirotwin.replay.lockstep.annotated_image import AnnotatedImage
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep.pair import LOOK_TICKS, StateDifference, first_difference
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.options import plain_parameters
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
 
-Way = Callable[[Image], "World"]
-"""Makes a world that repeats a run from its start, on this image."""
 Annotate = Callable[[Image], AnnotatedImage]
 
 
 class ComparedRun(msgspec.Struct, frozen=True):
-    """One of two runs. `periods`: what it did; `image`: what it ran on, None where what was recorded is no image.
+    """One of two runs. `periods`: what it did; `ways`: how it may be repeated, none where that cannot be.
 
-    `ways`: how it may be repeated. `recorded`: a way repeats it only if it gives the digests of `periods` again.
+    `recorded`: a way repeats it only if it gives the digests of `periods` again. `state`: the form of the states, and
+    `plugins` that it used, as its recording has them. `notes`: what else there is to say of it.
     """
 
     periods: Sequence[Period]
-    image: Image | None
-    ways: Sequence[Way]
+    ways: Sequence[RunSpec]
     recorded: bool = False
+    state: str = ""
+    plugins: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
 
-    def again(self, way: Way, image: Image, period: int) -> World | None:
+    def again(self, way: RunSpec, period: int) -> World | None:
         """Its world at the start of control period `period`, None where the way does not repeat it.
 
         A run that was recorded beside a controller, with input put in, is repeated by no controller.
         """
         try:
-            world = way(image)
+            world = way.world()
             world.run_to(period * CONTROL_PERIOD_TICKS)
         except BadInput:
             raise
@@ -120,7 +122,7 @@ def compare_runs(
     found = RunDifference(names, differences(one.periods, other.periods, rule))
     if not found.differences:
         return found
-    if one.image is None or other.image is None:
+    if not one.ways or not other.ways:
         return replace(found, notes=("they cannot be run again: what was recorded is no firmware image",))
     try:
         with plain_parameters("the run", "repeated"):
@@ -133,11 +135,9 @@ def _repeated(
     found: RunDifference, one: ComparedRun, other: ComparedRun, annotate: tuple[Annotate, Annotate] | None
 ) -> RunDifference:
     """`annotate` None: no instruction is looked for."""
-    assert one.image is not None
-    assert other.image is not None
     first, unrepeated = _first_period(one, other, found.period), set(found.names)
     for way, other_way in zip(one.ways, other.ways, strict=True):
-        world, other_world = one.again(way, one.image, first), other.again(other_way, other.image, first)
+        world, other_world = one.again(way, first), other.again(other_way, first)
         if world is not None and other_world is not None:
             break
         repeated = found.names[0] if world is not None else found.names[1] if other_world is not None else ""
@@ -150,9 +150,13 @@ def _repeated(
     if state is None:
         return replace(found, notes=(_NOT_RECORDED.format(found.period),))
     instruction = None
-    if annotate is not None and one.image.code != other.image.code:
-        images = annotate[0](one.image), annotate[1](other.image)
-        instruction = first_instruction(other_way, *images, found.seen_tick + LOOK_TICKS)
+    if annotate is not None and way.image.code != other_way.image.code:
+        instruction = first_instruction(
+            other_way.world,
+            annotate[0](way.image),
+            annotate[1](other_way.image),
+            found.seen_tick + LOOK_TICKS,
+        )
     return replace(found, state=state, instruction=instruction)
 
 

@@ -146,12 +146,9 @@ def _replay_case(job: Job, options: ReplayOptions) -> int:
     refuse_given(
         job.spec.origin, "is not for a case, which ends where it failed", options.given("to_time", "as_json")
     )
-    job.check_case()
-    end_tick = job.case.end_tick or None
-    with ProgressBar("replaying", end_tick, options.quiet) as bar:
-        again = job.run(end_tick, bar.to)
-    line = debug_line(job.spec.origin, foreign_path(job.spec.image))
-    return _report_case(job.result_of_case(again), line, options.quiet)
+    with ProgressBar("replaying", job.end_tick, options.quiet) as bar:
+        result = job.judge_case(bar.to)
+    return _report_case(result, debug_line(job.spec.origin, foreign_path(job.spec.image)), options.quiet)
 
 
 def _report_case(result: Result, line: str, quiet: bool) -> int:
@@ -191,8 +188,8 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     again = _rerun(job, to_tick, not options.shows)
     rule = replace(compare.rule, digests=job.state == again.world.state.tables())
     found = compare_runs(
-        ComparedRun(recorded, job.image, [(job.as_recorded or job.spec).world]),
-        ComparedRun(again.periods, job.spec.image, [job.spec.world]),
+        ComparedRun(recorded, [job.as_recorded] if job.image and job.as_recorded else []),
+        ComparedRun(again.periods, [job.spec]),
         rule,
         (
             partial(annotated_of, images=images, sources=()),

@@ -45,7 +45,7 @@ def record_at_port(job: Job, desk: DeskOptions, out: Path | None, force: bool, q
     """Sends all that the job's hosts send to the robots at the port; the recording of it. Raises BadInput."""
     sent = _sendable(job, desk)
     folder = OutputFolder(out or _default(job.spec.origin), force, (RECORDING,), ours=out is None)
-    firmware = job.firmware if job.spec.image is job.image else b""
+    firmware = job.source.firmware if job.source and job.spec.image is job.image else b""
     source = twin_source(job.spec.scenario, job.spec.seed, job.spec.image, firmware)
     robots = job.spec.scenario.networks[0].robots
     with (

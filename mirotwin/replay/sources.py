@@ -10,20 +10,9 @@ import msgspec
 from miro_exact.bad_input import amount
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
-from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import shown
+from mirotwin.replay.difference import ComparedRun
 from mirotwin.replay.lockstep.fields import Record
-
-
-class RunOrigin(msgspec.Struct, frozen=True):
-    """`image` None: what was recorded is none. `state`: the form of the states, "" where it is not known."""
-
-    scenario: Scenario
-    seed: int
-    firmware_sha256: str
-    image: Image | None
-    plugins: tuple[str, ...] = ()
-    state: str = ""
 
 
 class SourceDifference(Record, frozen=True):
@@ -34,22 +23,23 @@ class SourceDifference(Record, frozen=True):
     b: str
 
 
-def source_differences(one: RunOrigin, other: RunOrigin) -> Iterator[SourceDifference]:
+def source_differences(one: ComparedRun, other: ComparedRun) -> Iterator[SourceDifference]:
     """Seed, firmware, and the keys of the scenario that differ, those that a scenario leaves out included."""
-    if one.seed != other.seed:
-        yield SourceDifference("seed", str(one.seed), str(other.seed))
-    if one.firmware_sha256 != other.firmware_sha256:
-        hashes = (origin.firmware_sha256 or "nothing" for origin in (one, other))
-        yield SourceDifference("firmware", *hashes)
-        if one.image is not None and other.image is not None:
-            yield _first_byte(one.image, other.image)
-    keys, others = (dict(_flat("", msgspec.to_builtins(origin.scenario))) for origin in (one, other))
+    spec, other_spec = one.ways[0], other.ways[0]
+    if spec.seed != other_spec.seed:
+        yield SourceDifference("seed", str(spec.seed), str(other_spec.seed))
+    if spec.image.sha256 != other_spec.image.sha256:
+        yield SourceDifference(
+            "firmware", spec.image.sha256 or "nothing", other_spec.image.sha256 or "nothing"
+        )
+        yield _first_byte(spec.image, other_spec.image)
+    keys, others = (dict(_flat("", msgspec.to_builtins(each.scenario))) for each in (spec, other_spec))
     for key in {**keys, **others}:
         here, there = shown(keys.get(key)), shown(others.get(key))
         if here != there:
             yield SourceDifference(key, here, there)
     if one.plugins != other.plugins:
-        yield SourceDifference("plug-ins", *("; ".join(origin.plugins) or "none" for origin in (one, other)))
+        yield SourceDifference("plug-ins", *("; ".join(run.plugins) or "none" for run in (one, other)))
     if one.state and other.state and one.state != other.state:
         yield SourceDifference("form of the state", one.state[:12], other.state[:12])
 

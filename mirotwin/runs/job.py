@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 from msgspec.structs import replace
@@ -42,9 +41,6 @@ from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import image_beside
 from mirotwin.verify.checks.expect import expectations_of
-
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
 
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND
@@ -174,52 +170,6 @@ def image_of(recording: Recording, path: str | Path) -> Image:
     return replace(image, symbols=symbols)
 
 
-def image_if_any(recording: Recording, path: str | Path) -> Image | None:
-    """The same, or None for what is no image."""
-    try:
-        return image_of(recording, path)
-    except BadInput:
-        return None
-
-
-def world_of(recording: Recording, path: str, image: Image | None = None, scripted: bool = False) -> World:
-    """A world at tick 0 with the recorded scenario and seed, and the recorded image unless another is given.
-
-    `scripted`: its hosts send what was recorded; else they compute it again. What was done to robots and radios is
-    done again. Raises ValueError for what no caller can have done.
-    """
-    source = recording.source
-    spec = RunSpec(
-        scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
-        image=image or image_of(recording, path),
-        seed=source.seed,
-        script=script_of(recording.periods) if scripted else None,
-    )
-    world = spec.world()
-    if not scripted:
-        for action in (action for period in recording.periods for action in period.actions):
-            world.do(action)
-    return world
-
-
-def repeating(recording: Recording, path: str, period: int, scripted: bool) -> World | None:
-    """A world that repeats the recording, at the start of control period `period`; see `world_of`.
-
-    None: a run that was resumed, or it does not give the recorded digests up to there. Another version of this program
-    made the recording, input was put in beside a controller, or it was edited.
-    """
-    if recording.source.resumed:
-        return None
-    try:
-        world = world_of(recording, path, scripted=scripted)
-    except ValueError:
-        return None
-    world.run_to(period * CONTROL_PERIOD_TICKS)
-    recorded = recording.periods[:period]
-    same = not recorded or recorded[-1].digest == world.digest
-    return world if same and world.index == period else None
-
-
 class Case(msgspec.Struct, frozen=True):
     """What a case says of itself: the check's line, and where that run ended (0: with its scenario). `changed`: it is
     to run with other firmware or other settings.
@@ -235,9 +185,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
 
     `spec`: the run, on the image to play it to. `image`: the one that was recorded, None where it is none. `state`: the
     form of the states whose digests were recorded, if a replay computes the same states, else empty: a controller's
-    states are not computed again. `origin`: "port" where the answers that were recorded are those of real robots.
-    `firmware`: the recorded file. `notes`: what there is to know of the file, a line each. `as_recorded`: a recording's
-    run without other settings, seed or firmware.
+    states are not computed again. `source`: what the recording was made from. `notes`: what there is to know of the
+    file, a line each. `as_recorded`: a recording's run without other settings, seed or firmware.
     """
 
     spec: RunSpec
@@ -245,10 +194,14 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     image: Image | None = None
     state: str = ""
     case: Case = Case()
-    origin: str = ""
-    firmware: bytes = b""
+    source: RunSource | None = None
     notes: Sequence[str] = ()
     as_recorded: RunSpec | None = None
+
+    @property
+    def origin(self) -> str:
+        """ "port" where the answers that were recorded are those of real robots."""
+        return self.source.origin if self.source is not None else ""
 
     @property
     def end_tick(self) -> int:
@@ -278,6 +231,12 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
         said = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
         return replace(result, verdict=said.verdict, said=said.said, failures=said.failures)
+
+    def judge_case(self, progress: Callable[[int], object] = lambda tick: None) -> Result:
+        """Runs a case, or a stream that expects nothing, to its verdict. Raises BadInput."""
+        if self.case.verdict:
+            self.check_case()
+        return self.result_of_case(self.run(self.case.end_tick or None, progress))
 
     def run(
         self,
@@ -311,11 +270,8 @@ def load_job(
         recording = parse(data, file)
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
-        if firmware is None:
-            image = image_of(recording, file)
-            return _job_of_recording(recording, file, settings, image, image, seed)
-        runs_on = load_firmware(firmware, stack_from=stack_from)
-        return _job_of_recording(recording, file, settings, image_if_any(recording, file), runs_on, seed)
+        runs_on = None if firmware is None else load_firmware(firmware, stack_from=stack_from)
+        return _job_of_recording(recording, file, settings, runs_on, seed)
     given = _stream(data, file)
     header = given.header
     image = load_firmware(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
@@ -328,12 +284,28 @@ def load_job(
     return replace(_job_of_stream(given, file, settings, image, seed), notes=notes)
 
 
-def plugin_notes(file: str, source: RunSource) -> list[str]:
-    """A line for each plug-in that a run used and that is another one here."""
-    return [
-        f"{file}: {one_line(shortened(text))}: run again, it may do something else"
-        for text in plugin_differences(source.plugins)
+def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
+    """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
+    source = recording.source
+    return RunSpec(
+        scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
+        image=image or image_of(recording, path),
+        seed=source.seed,
+        script=script_of(recording.periods),
+        resumed=source.resumed,
+        origin=path,
+    )
+
+
+def recording_notes(recording: Recording, path: str) -> list[str]:
+    """Where it was broken off, and which plug-ins that its run used are other ones here, a line each."""
+    notes = [
+        f"{path}: {one_line(shortened(text))}: run again, it may do something else"
+        for text in plugin_differences(recording.source.plugins)
     ]
+    if recording.broken_off:
+        notes.insert(0, f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+    return notes
 
 
 def load_stream(file: str, firmware: str | None) -> Job:
@@ -363,45 +335,36 @@ def _stream(data: bytes, path: str) -> stream.StreamFile:
 
 
 def _job_of_recording(
-    recording: Recording,
-    path: str,
-    settings: Sequence[str],
-    image: Image | None,
-    runs_on: Image,
-    seed: int | None,
+    recording: Recording, path: str, settings: Sequence[str], runs_on: Image | None, seed: int | None
 ) -> Job:
+    """`runs_on` None: the recorded image."""
     source = recording.source
+    image: Image | None = None
+    try:
+        image = image_of(recording, path)
+    except BadInput:
+        if runs_on is None:
+            raise
+    as_recorded = recorded_spec(recording, path, image or runs_on)
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
-    script = script_of(recording.periods)
-    check_script(script, path, scenario)
+    check_script(as_recorded.script or (), path, scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
-    notes = plugin_notes(path, source)
-    if recording.broken_off:
-        notes.insert(0, f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-    spec = RunSpec(
+    spec = replace(
+        as_recorded,
         scenario=scenario,
-        image=runs_on,
+        image=runs_on or as_recorded.image,
         seed=source.seed if seed is None else seed,
-        script=script,
-        resumed=source.resumed,
         expected=expectations_of(scenario, path),
-        origin=path,
     )
     return Job(
         spec=spec,
         recorded=recording.periods,
         image=image,
         state=source.state if as_it_was and silent else "",
-        origin=source.origin,
-        firmware=source.firmware,
-        notes=notes,
-        as_recorded=replace(
-            spec,
-            scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
-            image=image or runs_on,
-            seed=source.seed,
-        ),
+        source=source,
+        notes=recording_notes(recording, path),
+        as_recorded=as_recorded,
     )
 
 

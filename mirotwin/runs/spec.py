@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     """A world and how it is driven and judged. `script`: what is sent and done instead of what its hosts do.
 
+    `computed`: its hosts compute what they send, and of the script only the actions are done.
+
     `resumed`: the saved world with which it begins. `expected`: the checks; None: those of the scenario. `steps`: what
     is done on the way. `until_tick`: where it ends, perhaps beyond its scenario; None: with that. `cut`: it may be
     ended before it is over. `origin`: the file that messages name.
@@ -33,6 +35,7 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     image: Image
     seed: int = 0
     script: Sequence[ScriptItem] | None = None
+    computed: bool = False
     resumed: bytes = b""
     expected: Expected | None = None
     steps: Sequence[Step] = ()
@@ -46,21 +49,24 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
         """
         from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
-        script = () if self.resumed else self.script
+        scripted = not self.resumed and not self.computed
+        script = self.script if scripted else None if self.computed else ()
         world = World(self.scenario, self.seed, image or self.image, script)
-        if not self.resumed:
-            return world
+        if self.resumed:
+            self._load(world)
+        for item in () if scripted else self.script or ():
+            if not isinstance(item, Transmission):
+                world.do(item)
+            elif self.resumed:
+                world.inject(item.data, item.network, item.tick, item.bad_stop)
+        return world
+
+    def _load(self, world: World) -> None:
         try:
             world.load(self.resumed)
         except ValueError as error:
             what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
             raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
-        for one in self.script or ():
-            if isinstance(one, Transmission):
-                world.inject(one.data, one.network, one.tick, one.bad_stop)
-            else:
-                world.do(one)
-        return world
 
 
 @lru_cache(64)

@@ -61,8 +61,7 @@ class CaseTests:
         return replace(result, again=replay_line(path, self.firmware, check))
 
     def _run(self, path: str) -> Result:
-        job = load_stream(path, self.firmware)
-        return _as_test(path, job.result_of_case(job.run(job.case.end_tick or None)))
+        return _as_test(path, load_stream(path, self.firmware).judge_case())
 
     def _run_bare(self, path: str, check: str | None) -> Result:
         from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
