@@ -27,7 +27,7 @@ from mirotwin.recording.theory.figures import (
     Theory,
 )
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
+from mirotwin.runs.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 
 TEXTS = ("verdict", "error", "failure", "digest")
 OWN = ("run", "draw", "seed", *TEXTS)

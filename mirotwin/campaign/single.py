@@ -18,10 +18,10 @@ from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import summarise
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
+from mirotwin.runs.summary import summarise
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
 from mirotwin.shell.verdicts import judge

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from miro_exact.bad_input import amount
 from mirotwin.ports.radio_port import RadioPort
-from mirotwin.report.summary import Plug
+from mirotwin.runs.summary import Plug
 
 BUFFER_BYTES = 65_536
 """68 s of a robot that sends all the time."""

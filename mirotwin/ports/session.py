@@ -15,7 +15,7 @@ from selectors import BaseSelector
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
-from mirotwin.report.summary import LiveFigures
+from mirotwin.runs.summary import LiveFigures
 
 FASTEST = 1000.0
 """Virtual seconds in one, at most."""

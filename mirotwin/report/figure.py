@@ -7,8 +7,8 @@ from pathlib import Path
 
 from miro_exact.clock import seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, Tracks
-from mirotwin.report.summary import rms_name, settling_text, tracking_of
 from mirotwin.report.svg import COLOURS, Drawing, Panel, PanelBox, Stroke
+from mirotwin.runs.summary import rms_name, settling_text, tracking_of
 
 ERRORS = (
     ("(b)  x_e", "x_e [cm]", "x_cm", SETTLED_CM, "cm"),

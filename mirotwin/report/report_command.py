@@ -16,10 +16,10 @@ from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
-from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, run_page
-from mirotwin.report.summary import Summary
+from mirotwin.report.page.watched_run import WatchedRun, run_again
 from mirotwin.runs.job import Job, load_job
+from mirotwin.runs.summary import Summary
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
@@ -132,7 +132,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         place = f"--from {window(wanted.from_time, wanted.to_time)[0]}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-    again = reproduce(job, end_tick, wanted.quiet)
+    again = run_again(job, end_tick, wanted.quiet)
     extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
     notes, what = [], "This page's own run of it"
@@ -164,7 +164,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
 def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     _, to_tick = window(wanted.from_time, wanted.to_time)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
-    again = reproduce(job, min(ends, default=None), wanted.quiet)
+    again = run_again(job, min(ends, default=None), wanted.quiet)
     report = Path(job.spec.origin).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     return Material(
@@ -194,7 +194,7 @@ def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
     )
 
 
-def _said(job: Job, again: Reproduction) -> list[str]:
+def _said(job: Job, again: WatchedRun) -> list[str]:
     """What became of a case's verdict."""
     verdict = job.case.verdict
     if not verdict or verdict in map(str, again.failures):

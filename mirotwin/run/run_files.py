@@ -27,9 +27,9 @@ from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
-from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
-from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
+from mirotwin.runs.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.runs.run import Run
+from mirotwin.runs.summary import LiveFigures, StepResults, Summary, summarise, to_json
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.progress import ProgressBar

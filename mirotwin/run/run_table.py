@@ -7,9 +7,9 @@ from pathlib import Path
 from miro_exact.bad_input import amount
 from mirotwin.recording.theory.figures import theory_text
 from mirotwin.recording.track import Tracks
-from mirotwin.report.learnt import calibration_text, wheels_text
-from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
+from mirotwin.runs.learnt import calibration_text, wheels_text
 from mirotwin.runs.result import expectations_text
+from mirotwin.runs.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
 from mirotwin.shell.console import facts_table, show
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.scenario.file import load
 from mirotwin.recording.track import ErrorSample, Tracks, error_of, wrapped
-from mirotwin.report.summary import off_pitch_text, rms_name, settling_text, summarise, to_json, tracking_of
+from mirotwin.runs.summary import off_pitch_text, rms_name, settling_text, summarise, to_json, tracking_of
 from tests.mirotwin.synthetic import periods
 
 KEYS = {

@@ -7,7 +7,7 @@ import pytest
 
 from miro_protocol.decoder import Decoder, Received
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import tracking_of
+from mirotwin.runs.summary import tracking_of
 from tests.sim.theory_in_the_loop import run
 from tests.sim.world.rig import world_of
 

@@ -24,10 +24,10 @@ from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import coverage_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
-from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
-from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
+from mirotwin.report.page.watched_run import WatchedRun
 from mirotwin.runs.job import Job
+from mirotwin.runs.summary import StepResults, rms_name, settling_text, tracking_of
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.case import tables_of
@@ -47,7 +47,7 @@ class Material(msgspec.Struct, frozen=True, kw_only=True):
 
     kind: str
     job: Job
-    again: Reproduction
+    again: WatchedRun
     periods: Sequence[Period]
     sources: Sources
     command: str

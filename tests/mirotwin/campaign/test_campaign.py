@@ -15,7 +15,7 @@ from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import summarise, tracking_of
+from mirotwin.runs.summary import summarise, tracking_of
 from mirotwin.runs.test_file import run_test
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows
 

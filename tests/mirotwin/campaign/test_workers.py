@@ -33,7 +33,7 @@ from mirotwin.campaign.worker import RunOutcome, work
 from mirotwin.campaign.workers import Processes, Workers, processes
 from mirotwin.recording.reader import read
 from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import tracking_of
+from mirotwin.runs.summary import tracking_of
 from tests import children
 from tests.mirotwin import program
 from tests.mirotwin.campaign.conftest import SHORT, InThisProcess, plan_of, rows

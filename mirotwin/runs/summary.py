@@ -13,7 +13,7 @@ from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.theory.figures import SlidingGains, Theory, gains_of, rms, theory_of
 from mirotwin.recording.track import ErrorSample, Tracks
-from mirotwin.report.learnt import LearntCalibration, LearntWheels
+from mirotwin.runs.learnt import LearntCalibration, LearntWheels
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.checks.interface import Expectation
 

@@ -25,7 +25,7 @@ from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.checks.interface import Expectation, Failure
 
 
-class Reproduction(msgspec.Struct, frozen=True):
+class WatchedRun(msgspec.Struct, frozen=True):
     """Its result. `verdict`: of all checks; `faults`: network, slot and fault. `image` has its debug files where they
     are; `robot`: whose processor was watched.
     """
@@ -43,7 +43,7 @@ class Reproduction(msgspec.Struct, frozen=True):
     counts: Counts
 
 
-def reproduce(job: Job, until_tick: int | None, quiet: bool) -> Reproduction:
+def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
     """Runs it to `until_tick` (None: to its end), and on to the end of that control period. Raises BadInput."""
     spec = msgspec.structs.replace(job.spec, until_tick=until_tick)
     with plain_parameters(spec.origin, "replayed"):
@@ -60,7 +60,7 @@ def reproduce(job: Job, until_tick: int | None, quiet: bool) -> Reproduction:
             world.run_to(world.period_end)
     image = with_debug_files(world.image)
     place = world.networks[0].index, world.networks[0].robots[0].slot
-    return Reproduction(
+    return WatchedRun(
         periods=again.periods,
         digest=world.digest,
         verdict=again.checks.verdict(),
