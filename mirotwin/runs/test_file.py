@@ -14,6 +14,8 @@ from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.world.machine import NotObservable
+from mirotwin.desk.guard import DeskOptions
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
@@ -37,25 +39,22 @@ def run_test(
     settings: Sequence[str] = (),
     artifacts: Path | None = None,
     again: Callable[[bool], str] = lambda saves: "",
+    desk: DeskOptions | None = None,
 ) -> Result:
     """Runs a file to its verdict; whatever cannot be run is a result, too.
 
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
     file that saves needs one. `again`: makes the command that gives the verdict again, told whether the file saves.
+    `desk`: the port of the robots that are tested, if not their twin.
     """
-    return result_of(path, artifacts, lambda folder: _run(path, image, seed, settings, folder, again), seed)
-
-
-def result_of(
-    path: str, artifacts: Path | None, run: Callable[[Path | None], Result], seed: int = 0
-) -> Result:
-    """What `run` makes of the file and of its folder below `artifacts`, which holds nothing of an earlier run."""
     folder = None if artifacts is None else folder_of(artifacts, path)
     if folder is not None:
         with suppress(OSError, BadInput):  # who leaves something there says why nothing can be left
             clear(folder, SCENARIO)
     try:
-        return run(folder)
+        return _run(path, image, seed, settings, folder, again, desk)
+    except NotObservable as error:
+        return Result(path=path, verdict="not observable", said=[("not observable", f"{error}")], seed=seed)
     except (DomainError, PluginError, OSError) as error:
         show_traceback(error)
         return cannot_be_run(path, BadInput(path, "", f"cannot be run: {error}"), seed)
@@ -75,8 +74,13 @@ def _run(
     settings: Sequence[str],
     folder: Path | None,
     again: Callable[[bool], str],
+    desk: DeskOptions | None,
 ) -> Result:
     text = load(path, settings, everything)
+    if desk is not None and desk.port:
+        from mirotwin.runs.at_port import play_at_port  # loads pyserial
+
+        return replace(play_at_port(text, path, image, desk, folder), again=again(False))
     steps = steps_of(text.scenario, path)
     saving = [step for step in steps if step.VERB == "save"]
     if saving and folder is None:

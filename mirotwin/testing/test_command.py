@@ -128,12 +128,7 @@ def run_scenario(options: TestOptions, file: str) -> Result:
     """Runs a scenario file as a test: in the twin, or at a port."""
     image, again = load_firmware(options.firmware), partial(options.line_for, file)
     settings = (*options.settings, *as_settings(options.expected))
-    if options.desk.port:
-        from mirotwin.testing.port_test import run_port_test  # loads pyserial
-
-        result = run_port_test(file, image, options.desk, settings, options.artifacts)
-    else:
-        result = run_test(file, image, options.seed, settings, options.artifacts, again)
+    result = run_test(file, image, options.seed, settings, options.artifacts, again, options.desk)
     return replace(result, again=result.again or again())
 
 

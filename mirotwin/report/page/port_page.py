@@ -10,11 +10,11 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from mirotwin.desk.compare import ANSWERS, FIELDS, PortComparison, compare
-from mirotwin.recording.compare import CompareRule
+from mirotwin.desk.compare import FIELDS
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.sequences import LogEntry, Pair
 from mirotwin.report.page.document import render
+from mirotwin.runs.at_port import beside_twin
 from mirotwin.runs.job import Job
 from mirotwin.shell.progress import ProgressBar
 
@@ -24,18 +24,12 @@ SHOWN = {"left moved": "counts", "right moved": "counts", "flags": "", "accepted
 """Channels that are drawn, and their units: flags as they are, others from the first answer on."""
 
 
-def beside_twin(job: Job, quiet: bool, rule: CompareRule = ANSWERS) -> PortComparison:
-    """Runs the twin with what was sent at the port; the recorded answers beside its own."""
-    end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
-    with ProgressBar("running the twin", end_tick, quiet) as bar:
-        again = job.run(end_tick, bar.to)
-    return compare(job.recorded, again.periods, job.spec.scenario.networks[0].robots, rule)
-
-
 def port_page(job: Job, quiet: bool) -> bytes:
     """The page of a recording made at a port. Raises BadInput where Bokeh is not installed."""
-    end_s = seconds(len(job.recorded) * CONTROL_PERIOD_TICKS)
-    found = beside_twin(job, quiet)
+    end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
+    end_s = seconds(end_tick)
+    with ProgressBar("running the twin", end_tick, quiet) as bar:
+        found = beside_twin(job, progress=bar.to)
     figures = {
         f"plot-{slot}-{channel.replace(' ', '-')}": _figure(
             pairs, channel, end_s, _marks(found.differences, slot, channel)
