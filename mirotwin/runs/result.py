@@ -49,6 +49,15 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         """The exit code."""
         return VERDICTS[self.verdict].code
 
+    def facts(self) -> dict[str, str]:
+        """What names the run, as JUnit has it."""
+        return {
+            "seed": f"{self.seed}",
+            "digest": self.digest,
+            "firmware_sha256": self.firmware_sha256,
+            "reproduce": self.again,
+        }
+
     @property
     def texts(self) -> tuple[str, ...]:
         """All lines."""

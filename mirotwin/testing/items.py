@@ -8,22 +8,23 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
+from mirotwin.runs.result import Result
 from mirotwin.shell.command import shell_line
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.rig_options import rig_options
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import case_lines, clear, leave, nothing_left, report_line
 from mirotwin.verify.cases.replay_line import foreign_path
-from mirotwin.verify.checks.interface import Failure, at
+from mirotwin.verify.checks.interface import at
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
@@ -42,19 +43,14 @@ def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
 
 def judge(item: pytest.Item) -> None:
     """Fails the test by the checks that failed, and by those that it names and that had no occasion."""
-    rig = item.stash[RIG]
     try:
-        said = [f"check failed: {one}" for one in rig.judge()]
+        result = item.stash[RIG].judge()
     except BadInput as error:  # a check of the user's own that breaks
         pytest.fail(f"{error}", pytrace=False)
-    for one in rig.unjudged():
-        line = f"check {one.verdict}: {one.name}: {one.reason}"
-        if one.verdict == "not observable":
-            item.add_report_section("call", "mirotwin", line)
-        else:
-            said.append(line)
-    if said:
-        pytest.fail("\n".join(said), pytrace=False)
+    for line in result.notes:
+        item.add_report_section("call", "mirotwin", line)
+    if result.lines:
+        pytest.fail("\n".join(result.lines), pytrace=False)
 
 
 def at_the_tests_line(item: pytest.Item, error: ValueError | TimeoutError) -> BaseException:
@@ -85,20 +81,26 @@ def tell(
     nodeid = item.nodeid.replace(f"-seed{seed}]", "]").replace(f"[seed{seed}]", "")
     file, _, name = nodeid.partition("::")
     file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
-    again = test_line(f"{file}::{name}", seed, _relative(item.config, firmware))
-    failures = _judged(rig) if report.failed else ()
-    facts: dict[str, Any] = {**rig.facts(), "mirotwin_reproduce": again}
-    report.user_properties += list(facts.items())
-    item.user_properties += list(facts.items())  # JUnit takes them with the report of the teardown
+    again = test_line(f"{file}::{name}", seed, _relative(item.config, firmware) if firmware else None)
+    if report.failed:
+        with suppress(BadInput):
+            rig.judge()
+    result = replace(rig.run.result(), again=again)
+    facts = {"scenario": rig.world.scenario.name, **result.facts()}
+    properties = [(f"mirotwin_{key}", value) for key, value in facts.items()]
+    report.user_properties += properties
+    item.user_properties += properties  # JUnit takes them with the report of the teardown
     folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
     text = ""
     if report.failed:
-        text = story(rig, failures, [again], _failed_at(item, report, caught, failures))
+        failed_at = _failed_at(item, report, caught, result)
+        text = story(rig, result, failed_at, [again])
     if folder is not None:
         try:
             clear(folder, SUMMARY)
             if report.failed:
-                text = _leave(item, report, caught, folder, [again], failures)
+                case = case_of(rig, None if caught is None else caught.value)
+                text = _leave(rig, result, failed_at, case, folder, _relative(item.config, folder), facts)
         except (OSError, BadInput) as error:  # the failure is shown, whatever becomes of its files
             text = f"{text}\n{nothing_left(folder, error)}"
             with suppress(OSError, BadInput):
@@ -116,23 +118,21 @@ def tell(
 
 
 def _leave(
-    item: pytest.Item,
-    report: pytest.TestReport,
-    caught: pytest.ExceptionInfo[BaseException] | None,
+    rig: Rig,
+    result: Result,
+    failed_at: Sequence[str],
+    case: str | None,
     folder: Path,
-    lines: Sequence[str],
-    failures: Sequence[Failure],
+    where: str,
+    facts: Mapping[str, str],
 ) -> str:
     """Writes the folder of a failed test; the story, with the commands that read it. Raises OSError."""
-    rig = item.stash[RIG]
-    case = case_of(rig, failures, None if caught is None else caught.value)
-    where = f"{_relative(item.config, folder)}"
     more = [] if case is None else case_lines(where, foreign_path(rig.world.image) is None)
-    text = story(rig, failures, [*lines, *more], _failed_at(item, report, caught, failures))
+    text = story(rig, result, failed_at, [result.again, *more])
     if not rig.written:
         text += f"\n{report_line(where)}"
     sent = None if rig.written else rig.run.stream()
-    summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
+    summary = {**facts, "tick": rig.tick, "failed": result.lines}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
     leave(folder, text + "\n", case, sent, rig.world.image, others)
     return text
@@ -144,19 +144,10 @@ def let_go(item: pytest.Item) -> None:
         del item.stash[RIG]
 
 
-def _judged(rig: Rig) -> Any:
-    try:
-        return rig.judge()
-    except BadInput:
-        return ()
-
-
-def _relative(config: pytest.Config, firmware: Path | None) -> str | None:
+def _relative(config: pytest.Config, path: Path) -> str:
     """The path as one types it where pytest was called."""
-    if firmware is None:
-        return None
     here = Path(config.invocation_params.dir)
-    return str(firmware.relative_to(here) if firmware.is_relative_to(here) else firmware)
+    return f"{path.relative_to(here) if path.is_relative_to(here) else path}"
 
 
 SUMMARY = "summary.json"
@@ -178,13 +169,12 @@ def _failed_at(
     item: pytest.Item,
     report: pytest.TestReport,
     caught: pytest.ExceptionInfo[BaseException] | None,
-    failures: Sequence[Failure],
+    result: Result,
 ) -> list[str]:
-    """The assertion that failed and its place; of what `judge` says, which has none, all but the failed checks."""
+    """The assertion that failed and its place; of what `judge` says, what is in no line of the result."""
     error = None if caught is None else caught.value
     if isinstance(error, pytest.fail.Exception) and not error.pytrace:
-        told = {f"check failed: {one}" for one in failures}  # they stand in the story
-        return [line for line in f"{error}".splitlines() if line not in told]
+        return [line for line in f"{error}".splitlines() if line not in result.lines]
     crash = getattr(report.longrepr, "reprcrash", None)
     if crash is None:
         return [f"failed: {report.longreprtext}"]
@@ -192,7 +182,7 @@ def _failed_at(
     return [f"failed: {place}:{crash.lineno}: {crash.message}"]
 
 
-def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str], failed_at: Sequence[str] = ()) -> str:
+def story(rig: Rig, result: Result, failed_at: Sequence[str], lines: Sequence[str]) -> str:
     """The section of a report: what ran, what failed where, the last events, and `lines` to reproduce it."""
     image, world = rig.world.image, rig.world
     text = [
@@ -200,7 +190,7 @@ def story(rig: Rig, failures: Sequence[Failure], lines: Sequence[str], failed_at
         f"firmware {image.path.name}, {image.sha256[:12]}",
         f"digest {world.digest}",
         *failed_at,
-        *(f"check failed: {one}" for one in failures),
+        *result.lines,
         "last events:",
         *(f"  {line}" for line in rig.last_events() or ["nothing"]),
         "to reproduce:",
@@ -215,7 +205,7 @@ def folder_of(artifacts: Path, nodeid: str) -> Path:
     return artifacts / f"{name}-{hashlib.sha256(os.fsencode(nodeid)).hexdigest()[:8]}"
 
 
-def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None) -> str | None:
+def case_of(rig: Rig, caught: BaseException | None) -> str | None:
     """The case of a failed test; None where no check can judge what failed, or its test wrote into a robot's memory."""
     if rig.written:
         return None
@@ -223,4 +213,4 @@ def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None)
         case = rig.run.case_of_expect(caught.expect)
         if case is not None:
             return case
-    return rig.run.case() if failures else None
+    return rig.run.case() if rig.run.failures else None

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import msgspec
 
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
+from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.testing.link import Link
@@ -15,7 +14,6 @@ from mirotwin.testing.rig_options import RigOptions
 from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
 from mirotwin.verify.cases.case import Trace
-from mirotwin.verify.checks.interface import Expectation, Failure
 
 LAST_EVENTS = 240
 LAST_LINES = 12
@@ -39,33 +37,22 @@ class Rig:
         """Where the test ended, -1 while it runs."""
         return self.run.tick
 
-    def judge(self) -> Sequence[Failure]:
-        """What the checks have found when the test is over; lets a control period end first."""
+    def judge(self) -> Result:
+        """What came of the test's run, which is over; lets a control period end first.
+
+        Raises BadInput for a check that breaks.
+        """
         if self.tick < 0:
             self.run.tick = self.world.tick
             if not self.world.stopped and (self.world.in_period or not self.world.finished):
                 self.world.run_to(self.world.period_end)
             self.run.finish()
-        return self.run.failures
-
-    def unjudged(self) -> list[Expectation]:
-        """The checks that were named and could not judge, by the reason that each has."""
-        checks = self.run.checks
-        return [one for one in checks.verdicts() if one.reason and one.name in checks.named]
+        return self.run.result()
 
     @property
     def written(self) -> bool:
         """Whether the test has put something into a robot's memory by itself."""
         return any(robot.written for robot in self.robots)
-
-    def facts(self) -> dict[str, str | int]:
-        """What names a run: for the report and for JUnit."""
-        return {
-            "mirotwin_seed": self.world.seed,
-            "mirotwin_scenario": self.world.scenario.name,
-            "mirotwin_firmware": self.world.image.sha256,
-            "mirotwin_digest": self.world.digest,
-        }
 
     def last_events(self) -> list[str]:
         """The last things that happened up to the end of the test, a line each."""

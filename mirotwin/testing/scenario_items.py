@@ -57,13 +57,7 @@ class ScenarioItem(pytest.Item):
             raise ScenarioFailed("\n".join((*result.lines, *result.notes, f"again: {result.again}", *left)))
 
     def _note(self, result: Result) -> None:
-        facts = {
-            "mirotwin_seed": result.seed,
-            "mirotwin_digest": result.digest,
-            "mirotwin_firmware_sha256": result.firmware_sha256,
-            "mirotwin_reproduce": result.again,
-        }
-        self.user_properties += list(facts.items())
+        self.user_properties += [(f"mirotwin_{name}", value) for name, value in result.facts().items()]
         if result.notes:
             self.add_report_section("call", "mirotwin", "\n".join(result.notes))
 

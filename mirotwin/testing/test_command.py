@@ -241,10 +241,5 @@ def _test_case(result: Result, time_s: float) -> TestCase:
         time_s=time_s,
         verdict=VERDICTS[result.verdict].junit,
         lines=(*result.lines, *result.notes),
-        properties={
-            "seed": str(result.seed),
-            "digest": result.digest,
-            "firmware_sha256": result.firmware_sha256,
-            "reproduce": result.again,
-        },
+        properties=result.facts(),
     )

@@ -118,7 +118,7 @@ def test_a_marker_names_checks_as_a_scenario_does(firmware, tmp_path, expected, 
     )
     done = session(tmp_path, *option(firmware[name], "--mirotwin-firmware"), tests=tests)
     assert done.returncode == (verdict.junit == "failure")
-    assert (f"check not judged: {key}: " in done.stdout) == (verdict.line == "NOT JUDGED")
+    assert (f"expectation not judged: {key}: " in done.stdout) == (verdict.line == "NOT JUDGED")
 
 
 @pytest.mark.parametrize(("expected", "name"), GIVEN)

@@ -77,7 +77,7 @@ def test_each_test_has_its_verdict(mixed):
     "line",
     [
         "E       mirotwin.testing.waiting.WaitFailed: no answer within 40 ms, from tick",
-        "check failed: frames_accepted_min: net0/robot0: tick 1601600 (66.733 ms): wanted at least 9 frames accepted,",
+        "expectation failed: frames_accepted_min: net0/robot0: tick 1601600 (66.733 ms): wanted at least 9",
         "test_mine.py::test_has_a_marker_with_a_mistake: @pytest.mark.mirotwin: there is no key 'scnario'; did you",
         "test_mine.py::test_has_no_firmware: gone.ihx: there is no such file; build it, or give the path",
         "last_lef: there is no such variable; did you mean last_left",
@@ -105,7 +105,7 @@ def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed):
     facts = named["test_passes"]
     assert facts["mirotwin_seed"] == "0"
     assert re.fullmatch("[0-9a-f]{64}", str(facts["mirotwin_digest"]))
-    assert re.fullmatch("[0-9a-f]{64}", str(facts["mirotwin_firmware"]))
+    assert re.fullmatch("[0-9a-f]{64}", str(facts["mirotwin_firmware_sha256"]))
     assert named["test_is_judged[1]"]["mirotwin_reproduce"] == (
         "pytest 'test_mine.py::test_is_judged[1]' --mirotwin-seed 4"
     )
@@ -118,8 +118,8 @@ def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixe
     assert not [name for name in folders if "passes" in name or "needs_no" in name]
     (judged,) = [path for path in (mixed / "left").iterdir() if "is_judged" in path.name]
     summary = json.loads((judged / "summary.json").read_text())
-    assert summary["mirotwin_seed"] == 4
-    assert summary["checks_failed"][0].startswith("frames_accepted_min: net0/robot0")
+    assert summary["seed"] == "4"
+    assert summary["failed"][0].startswith("expectation failed: frames_accepted_min: net0/robot0")
     report = (judged / "report.txt").read_text()
     assert "sent 23 characters" in report
     assert report.strip() in (mixed / "out.txt").read_text()

@@ -55,7 +55,7 @@ def test_the_story_of_a_failed_assertion_has_it_and_its_place(tmp_path):
     (folder,) = (tmp_path / "left").iterdir()
     lines = (folder / "report.txt").read_text().splitlines()
     assert "failed: test_mine.py:8: AssertionError: the answer" in lines
-    assert json.loads((folder / "summary.json").read_text())["checks_failed"] == []
+    assert json.loads((folder / "summary.json").read_text())["failed"] == []
 
 
 def test_the_story_of_a_test_that_checks_fail_has_no_place_in_our_own_files(tmp_path):
@@ -66,8 +66,8 @@ def test_the_story_of_a_test_that_checks_fail_has_no_place_in_our_own_files(tmp_
     """
     session(tmp_path, "--mirotwin-artifacts=left", tests=dedent(tests))
     story = next((tmp_path / "left").rglob("report.txt")).read_text()
-    assert story.count("check failed: frames_accepted_min") == 1
-    assert "\ncheck not judged: moves_only_when_fresh: the run had no occasion for it\n" in story
+    assert story.count("expectation failed: frames_accepted_min") == 1
+    assert "\nexpectation not judged: moves_only_when_fresh: the run had no occasion for it\n" in story
     assert "items.py" not in story
 
 
