@@ -1,6 +1,7 @@
 """The error of input that cannot be used, one line `FILE: PLACE: what; remedy`, and words for such lines."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from typing import Any
 
@@ -36,6 +37,16 @@ class BadInput(ValueError):
     def __reduce__(self) -> tuple[Any, ...]:
         """What a process hands to another: a base class, because a derived one may be made of other parts."""
         return BadInput, (self.path, self.place, self.what, self.remedy)
+
+
+@contextmanager
+def of_file(path: str | PathLike[str]) -> Iterator[None]:
+    """Within it, input that cannot be used came from `path`: what is wrong with a text need not know where it stood."""
+    try:
+        yield
+    except BadInput as error:
+        whole = f"{path}: {error.path}" if f"{error.path}" else path
+        raise BadInput(whole, error.place, error.what, error.remedy) from error.__cause__
 
 
 def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput, one_line, shortened
+from miro_exact.bad_input import BadInput, of_file, one_line, shortened
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_exact.installed import differences as plugin_differences
@@ -29,7 +29,7 @@ from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
-from mirotwin.recording.recorder import RunSource
+from mirotwin.recording.recorder import SCENARIO_ATTACHMENT, RunSource
 from mirotwin.recording.writer import MAGIC
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
 from mirotwin.runs.run import Run, replaying
@@ -65,7 +65,7 @@ def sent_in(script: Iterable[ScriptItem]) -> list[Transmission]:
     return [one for one in script if isinstance(one, Transmission) and one.direction == DOWN]
 
 
-def check_script(script: Sequence[ScriptItem], path: str, scenario: Scenario | None = None) -> None:
+def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None) -> None:
     """Raises BadInput for transmissions of a network that overlap, and for a network or robot that is not there.
 
     Without a scenario any robot of as many networks as there can be.
@@ -75,18 +75,18 @@ def check_script(script: Sequence[ScriptItem], path: str, scenario: Scenario | N
     for one in script:
         if one.network >= networks:
             what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
-            raise BadInput(path, f"tick {one.tick}", what)
+            raise BadInput("", f"tick {one.tick}", what)
         if isinstance(one, Transmission):
             last = before.get(one.network)
             if last is not None and one.tick < last.end_tick:
                 what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
-                raise BadInput(path, f"tick {one.tick}", what, "move it back")
+                raise BadInput("", f"tick {one.tick}", what, "move it back")
             before[one.network] = one
         elif isinstance(one, Reset | Power) and scenario is not None:
             slots = [robot.slot for robot in scenario.networks[one.network].robot]
             if one.slot not in slots:
                 there = f"there is {', '.join(map(str, slots))}"
-                raise BadInput(path, f"tick {one.tick}", f"no robot in slot {one.slot}; {there}")
+                raise BadInput("", f"tick {one.tick}", f"no robot in slot {one.slot}; {there}")
 
 
 def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
@@ -95,7 +95,7 @@ def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
     return 5 if counts[5] > counts[3] else 3
 
 
-def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | None = None) -> Scenario:
+def scenario_of_stream(sent: Sequence[ScriptItem], header: Header | None = None) -> Scenario:
     """The scenario that the header names or holds; without one the default scenario with an ideal link.
 
     Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
@@ -103,26 +103,27 @@ def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | N
     """
     if header is not None and header.bare is not None:
         what = "is for a bare processor and not for the robot"
-        raise BadInput(path, "header: bare", what, "`mirotwin replay FILE --firmware IMAGE.ihx` plays it")
+        raise BadInput("", "header: bare", what, "`mirotwin replay FILE --firmware IMAGE.ihx` plays it")
     script = script_of_stream(sent)
     if header is None or header.scenario is None:
         if not script:
-            raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")
-        check_script(script, path)
-        return _default_scenario(script, path)
-    scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
-    check_script(script, path, scenario)
+            raise BadInput("", "", "no line from host to robot", "nothing can be replayed")
+        check_script(script)
+        return _default_scenario(script)
+    scenario = _scenario_of_header(header.scenario)
+    check_script(script, scenario)
     end_tick = scenario.end_tick
     for one in script:
         # What was recorded may still be on the air when its run ends.
         last_tick = one.end_tick if isinstance(one, Transmission) and header.end_tick is None else one.tick
         if last_tick > end_tick:
             what = f"ends at tick {last_tick}, but the scenario ends at tick {end_tick}"
-            raise BadInput(path, f"tick {one.tick}", what, "raise its duration_s")
+            raise BadInput("", f"tick {one.tick}", what, "raise its duration_s")
     return scenario
 
 
-def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenario:
+def _scenario_of_header(scenario: str | dict[str, object]) -> Scenario:
+    place = "header: scenario"
     if not isinstance(scenario, str):
         return of_table(scenario, place)
     if scenario not in builtin_names():
@@ -131,7 +132,7 @@ def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenar
     return load(scenario, ["expect={}"]).scenario  # which its own controller is to fulfil
 
 
-def _default_scenario(script: Sequence[ScriptItem], path: str) -> Scenario:
+def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
     """The default one with ideal links, and its robot in every slot of each network's layout, all at one start.
 
     Runs for a second longer than the stream, so that the failsafe is seen.
@@ -140,7 +141,7 @@ def _default_scenario(script: Sequence[ScriptItem], path: str) -> Scenario:
     end_tick = max(ends) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
         last = max(one.tick for one in script)
-        raise BadInput(path, f"tick {last}", "more than a day", "let the stream start near tick 0")
+        raise BadInput("", f"tick {last}", "more than a day", "let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
     settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it, or is said of it
     base = load(DEFAULT_SCENARIO, settings).scenario
@@ -287,8 +288,10 @@ def load_job(
 def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
     """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
     source = recording.source
+    with of_file(f"{path}: {SCENARIO_ATTACHMENT}"):
+        scenario = parse_scenario(source.scenario_text, "")
     return RunSpec(
-        scenario=parse_scenario(source.scenario_text, f"{path}: scenario.toml"),
+        scenario=scenario,
         image=image or image_of(recording, path),
         seed=source.seed,
         script=script_of(recording.periods),
@@ -346,8 +349,11 @@ def _job_of_recording(
         if runs_on is None:
             raise
     as_recorded = recorded_spec(recording, path, image or runs_on)
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
-    check_script(as_recorded.script or (), path, scenario)
+    with of_file(f"{path}: {SCENARIO_ATTACHMENT}"):
+        scenario = parse_scenario(source.scenario_text, "", settings, expectations_of)
+        expected = expectations_of(scenario, "")
+    with of_file(path):
+        check_script(as_recorded.script or (), scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
     spec = replace(
@@ -355,7 +361,7 @@ def _job_of_recording(
         scenario=scenario,
         image=runs_on or as_recorded.image,
         seed=source.seed if seed is None else seed,
-        expected=expectations_of(scenario, path),
+        expected=expected,
     )
     return Job(
         spec=spec,
@@ -373,18 +379,21 @@ def _job_of_stream(
 ) -> Job:
     header, sent = given.header, given.script()
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
-    written = scenario_of_stream(sent, path, header)
-    scenario = changed(written, path, [*keys, *settings], expectations_of)
     script, own = script_of_stream(sent), header.seed or 0
-    check_script(script, path, scenario)
+    with of_file(path):
+        written = scenario_of_stream(sent, header)
+        scenario = changed(written, "", [*keys, *settings], expectations_of)
+        expected = expectations_of(scenario, "")
+        check_script(script, scenario)
+        as_written = changed(written, "", keys, expectations_of) if settings else scenario
     other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
-    other = other or (bool(settings) and scenario != changed(written, path, keys, expectations_of))
+    other = other or scenario != as_written
     spec = RunSpec(
         scenario=scenario,
         image=image,
         seed=own if seed is None else seed,
         script=script,
-        expected=expectations_of(scenario, path),
+        expected=expected,
         origin=path,
     )
     return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))

@@ -91,6 +91,8 @@ def test_a_recording_names_no_file_at_all(folder, tmp_path):
             recorder.write(period)
     with pytest.raises(BadInput, match="scenario: stands in a file that depends on no other one"):
         load_job(str(path))
+    said = mirotwin("export", path, "--as", "foxglove", "--out", tmp_path / "scene.mcap")[2]
+    assert f"{path}: scenario: stands in a file that depends on no other one" in said
 
 
 def test_a_text_in_python_may_name_a_file_beside_the_place_it_is_said_to_stand(folder):

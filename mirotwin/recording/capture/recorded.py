@@ -72,7 +72,7 @@ def _take_layouts(messages: Messages, robots: dict[int, int]) -> None:
     text = messages.attachments.pop(SCENARIO_ATTACHMENT, None)
     if text is not None:
         try:
-            scenario = parse(text.decode("utf-8"), messages.path)
+            scenario = parse(text.decode("utf-8"), "")
         except (ScenarioError, UnicodeDecodeError):
             return
         robots.update({index: network.robots for index, network in enumerate(scenario.networks)})

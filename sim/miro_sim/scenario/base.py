@@ -8,7 +8,6 @@ The words are those of a stream file's header. The result is a whole scenario, w
 depends on no other file.
 """
 
-import os
 from collections.abc import Callable
 from typing import Any
 
@@ -25,7 +24,8 @@ NETWORK = "network"
 def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tuple[Table, list[Setting]]:
     """The tables of a whole scenario, and the settings of the file's `set` that were made in them.
 
-    `tables_of` gives the tables of the scenario with a name or path. Raises ScenarioError.
+    `tables_of` gives the tables of the scenario with a name or path. `origin` "": the tables stand in no file, and may
+    name none. Raises ScenarioError.
     """
     if SCENARIO not in raw:
         return raw, []
@@ -38,7 +38,7 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     if not isinstance(settings, dict):
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
     _check_no_part_of_network(own.get(NETWORK), origin, name)
-    if is_path(name) and ": " in origin and not os.path.exists(origin):
+    if is_path(name) and not origin:
         what = "stands in a file that depends on no other one"
         raise ScenarioError(origin, SCENARIO, what, "name a built-in scenario, or record the run again")
     try:

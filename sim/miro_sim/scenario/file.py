@@ -118,7 +118,8 @@ def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = not
 
     `also` checks what this package does not know: what `mirotwin.verify.checks` makes of `[expect]`.
 
-    Raises ScenarioError (and nothing else) naming `origin` and the place.
+    Raises ScenarioError (and nothing else) naming `origin` and the place. A text that stands in no file (`origin` "")
+    may name no other one.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
     return _parsed(text, origin, settings, also, [])[1]
