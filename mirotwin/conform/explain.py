@@ -19,7 +19,7 @@ from mirotwin.conform.observed import Observed, within
 from mirotwin.conform.probe import listen
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.trial import trial_of
-from mirotwin.conform.trial_script import Expectation
+from mirotwin.conform.trial_script import TrialExpectation
 from mirotwin.verify.checks.orders import Orders
 
 Row = tuple[int, str, str]
@@ -62,7 +62,7 @@ def _collapsed(rows: list[Row]) -> Iterator[Row]:
         yield same[0][0], what, text + more
 
 
-def _verdict(expected: Expectation, observed: Observed) -> Row:
+def _verdict(expected: TrialExpectation, observed: Observed) -> Row:
     """An expectation that failed stands where it failed, one that was fulfilled where it was over."""
     found = expected.found(observed)
     if found is None:

@@ -25,7 +25,7 @@ READING = frozenset(command.opcode for command in BY_NAME.values() if command.wo
 """Commands that only read."""
 
 Words = tuple[int, ...]
-T = TypeVar("T", Event, Order, "Answer")
+T = TypeVar("T", Event, Order, "ReceivedAnswer")
 
 
 def within(found: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
@@ -33,7 +33,7 @@ def within(found: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
     return [one for one in found if after_tick < one.tick <= until_tick]
 
 
-class Answer(msgspec.Struct, frozen=True):
+class ReceivedAnswer(msgspec.Struct, frozen=True):
     """A valid answer that the PC had heard whole at `tick`; `said` is None where its content is nothing known."""
 
     tick: int
@@ -58,7 +58,7 @@ class Observed:
         self.events: list[Event] = []
         self.commands: list[Event] = []
         self.heard: list[Event] = []
-        self.answers: list[Answer] = []
+        self.answers: list[ReceivedAnswer] = []
         self.periods: list[tuple[int, RobotPeriod]] = []
         self.samples: list[tuple[int, int, int]] = []  # when looked at; next samples of left and right
 
@@ -76,7 +76,7 @@ class Observed:
             except ContentError:
                 said = None
             assert said is None or isinstance(said, TelemetryFrame)
-            self.answers.append(Answer(event.tick, event.frame, said))
+            self.answers.append(ReceivedAnswer(event.tick, event.frame, said))
 
     def forget(self, data: bytes) -> None:
         """Takes back what was heard last of these characters: another robot said them."""

@@ -20,7 +20,7 @@ from miro_sim.scenario.file import of_table
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin.conform.rule import Rule, Topology
-from mirotwin.conform.trial_script import Expectation, TrialScript
+from mirotwin.conform.trial_script import TrialExpectation, TrialScript
 from mirotwin.verify.checks.interface import Subject
 
 MOST_FAULTS = 1000
@@ -42,13 +42,13 @@ class Trial:
 
     scenario: Scenario
     script: tuple[ScriptItem, ...]
-    expected: tuple[tuple[Expectation, ...], ...]
+    expected: tuple[tuple[TrialExpectation, ...], ...]
 
     def transmissions_of(self, network: int) -> list[Transmission]:
         """What the host of a network says."""
         return [one for one in self.script if isinstance(one, Transmission) and one.network == network]
 
-    def expected_of(self, subject: Subject) -> list[Expectation]:
+    def expected_of(self, subject: Subject) -> list[TrialExpectation]:
         """What is expected of a robot."""
         return [one for one in self.expected[subject.network] if subject.slot in one.slots]
 

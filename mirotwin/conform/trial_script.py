@@ -40,7 +40,7 @@ from mirotwin.conform.hints import (
     payload_of,
     wheels_instead,
 )
-from mirotwin.conform.observed import Answer, Observed, Words, within
+from mirotwin.conform.observed import Observed, ReceivedAnswer, Words, within
 from mirotwin.conform.rule import Topology
 from mirotwin.verify.checks.orders import Order, saturated
 
@@ -56,7 +56,7 @@ Pairs = tuple[tuple[int, int], ...]
 Found = Iterator[tuple[int, str]]
 """What is wrong: since which tick, and what was found instead. The first one counts."""
 Test = Callable[[Observed], Found]
-Says = Callable[[TelemetryFrame, Answer, Observed], str]
+Says = Callable[[TelemetryFrame, ReceivedAnswer, Observed], str]
 """What is wrong with what an answer says, or ""."""
 
 
@@ -87,7 +87,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Expectation:
+class TrialExpectation:
     """`test` says what is wrong. It is over at `tick`: later events change nothing in it.
 
     `slots`: of the robots that it concerns. `by_answers`: what the PC hears is all that it needs.
@@ -137,7 +137,7 @@ class TrialScript:
         self.seq = 20 + network
         self.said: list[Transmission] = []
         self.done: list[Action] = []
-        self.expected: list[Expectation] = []
+        self.expected: list[TrialExpectation] = []
         self._words = 0
         self._before: Pairs = ()
 
@@ -263,7 +263,9 @@ class TrialScript:
         """Stands before the test of an expectation."""
 
         def keep(test: Test) -> Test:
-            self.expected.append(Expectation(tick, wanted, test, slots or self.topology.slots, by_answers))
+            self.expected.append(
+                TrialExpectation(tick, wanted, test, slots or self.topology.slots, by_answers)
+            )
             return test
 
         return keep
@@ -353,7 +355,7 @@ def _told_late(observed: Observed, frame: Frame) -> int | None:
     return None
 
 
-def who(answer: Answer) -> str:
+def who(answer: ReceivedAnswer) -> str:
     """Who says it, for people."""
     said = answer.said
     return "unknown contents" if said is None else f"an answer of robot {said.slot} to question {said.seq}"

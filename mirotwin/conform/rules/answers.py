@@ -11,7 +11,7 @@ from miro_protocol.table import BITS_PER_CHARACTER, ROBOT_BIT_TICKS, SYNC, TELEM
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.conform.hints import characters, in_a_row, no_answer, number
-from mirotwin.conform.observed import Answer, Observed, within
+from mirotwin.conform.observed import Observed, ReceivedAnswer, within
 from mirotwin.conform.rule import BOTH, FRAME, FRESHNESS, RECEPTION, THREE, TURNS, Chapter, Topology
 from mirotwin.conform.trial_script import Found, Frame, How, Says, TrialScript, ms, over_by
 
@@ -193,7 +193,7 @@ def _run_away(script: TrialScript) -> None:
         script.team(script.same(16000, 50), gap_ms=30.0)
 
 
-def _status(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+def _status(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
     for side, (one, other), others, found in (
@@ -206,7 +206,7 @@ def _status(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     return ""
 
 
-def _around(answer: Answer, observed: Observed) -> tuple[RobotPeriod, RobotPeriod]:
+def _around(answer: ReceivedAnswer, observed: Observed) -> tuple[RobotPeriod, RobotPeriod]:
     """The robot at the start of the last control period before an answer was asked for, and of the first after it."""
     begun = answer.frame.start_tick - ms(14.0)
     before = [record for tick, record in observed.periods if tick <= begun]
@@ -238,7 +238,7 @@ def _stands(script: TrialScript) -> None:
     script.answered(question, f"the real positions in the answer to {question.what}", _positions)
 
 
-def _positions(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+def _positions(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left = (before.left.real_position, after.left.real_position)
     right = (before.right.real_position, after.right.real_position)
@@ -255,7 +255,7 @@ def _positions(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
     return ""
 
 
-def _read_at_once(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+def _read_at_once(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
     for side, found in (("left", said.position_left), ("right", said.position_right)):
         read = observed.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
-from mirotwin.conform.observed import Answer, Observed
+from mirotwin.conform.observed import Observed, ReceivedAnswer
 from mirotwin.conform.rule import FRAME, PORT, POWER_ON, Chapter
 from mirotwin.conform.rules.answers import flagged
 from mirotwin.conform.rules.sound import nothing_refused
@@ -63,7 +63,7 @@ def _tells_of_them(script: TrialScript) -> None:
                 yield tick, f"the {side} one driven"
 
 
-def _free(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+def _free(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     if said.status_left & _BUSY or said.status_right & _BUSY:
         return f"status {said.status_left:02X}h and {said.status_right:02X}h, read while busy (01h)"
     return flagged(0, Flags.INIT_FAILED)(said, answer, observed)

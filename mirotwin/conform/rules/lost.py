@@ -6,7 +6,7 @@ A trial has neither. It sets the filter gains to 0, so that a wheel stands while
 from __future__ import annotations
 
 from miro_protocol.frames import TelemetryFrame
-from mirotwin.conform.observed import Answer, Observed
+from mirotwin.conform.observed import Observed, ReceivedAnswer
 from mirotwin.conform.rule import FRESHNESS, Chapter
 from mirotwin.conform.rules.boot import keeps_off
 from mirotwin.conform.trial_script import Frame, TrialScript, ms
@@ -55,5 +55,5 @@ def _told_in_vain(script: TrialScript, left: int, right: int) -> Frame:
     return first
 
 
-def _shows_error(said: TelemetryFrame, answer: Answer, observed: Observed) -> str:
+def _shows_error(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     return "" if said.status_left & _POSITION_ERROR else f"{said.status_left:02X}h"

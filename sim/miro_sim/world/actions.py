@@ -26,7 +26,7 @@ _EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio"}
 _MOST_WAITING = 1 << 16
 
 
-class Waiting(NamedTuple):
+class WaitingAction(NamedTuple):
     """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state."""
 
     tick: int
@@ -48,7 +48,7 @@ class Actions:
                 ("B", 0, 2),
             ),
             split=tuple,
-            make=lambda cells: Waiting(*cells),
+            make=lambda cells: WaitingAction(*cells),
             ordered=True,
         )
     }
@@ -56,7 +56,7 @@ class Actions:
 
     def __init__(self, network: int) -> None:
         self.network = network
-        self.waiting: list[Waiting] = []
+        self.waiting: list[WaitingAction] = []
         self.done: list[Action] = []
 
     @property
@@ -77,12 +77,12 @@ class Actions:
             raise ValueError(f"net{self.network}: {len(self.waiting)} actions wait; at most {_MOST_WAITING}")
         if isinstance(action, RadioState):
             value = LINK_STATES.index(action.state)
-            self.waiting.append(Waiting(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
-            self.waiting.append(Waiting(action.tick, RADIO_UP, 0, value))
+            self.waiting.append(WaitingAction(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
+            self.waiting.append(WaitingAction(action.tick, RADIO_UP, 0, value))
         elif isinstance(action, Reset):
-            self.waiting.append(Waiting(action.tick, RESET, action.slot, action.level))
+            self.waiting.append(WaitingAction(action.tick, RESET, action.slot, action.level))
         else:
-            self.waiting.append(Waiting(action.tick, POWER, action.slot, action.on))
+            self.waiting.append(WaitingAction(action.tick, POWER, action.slot, action.on))
         self.waiting.sort(key=lambda one: one.tick)
 
     def do_due(self, network: Network, tick: int) -> None:
@@ -100,7 +100,7 @@ class Actions:
             )
             network.log.note(event)
 
-    def _do(self, network: Network, one: Waiting) -> Action:
+    def _do(self, network: Network, one: WaitingAction) -> Action:
         if one.what == RADIO_UP:
             network.uplink.band.link_state = one.value
             return RadioState(one.tick, self.network, LINK_STATES[one.value])
