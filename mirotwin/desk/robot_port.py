@@ -37,6 +37,7 @@ from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import NetworkSpec, Scenario
 from miro_sim.world.conditions import Condition, answer_of
+from miro_sim.world.device import Device
 from miro_sim.world.events import Cursor, Event, HostLog
 from miro_sim.world.machine import Feature, NotObservable, require
 from miro_sim.world.robot import Robot
@@ -116,6 +117,11 @@ class PortNetwork(msgspec.Struct, frozen=True):
     log: HostLog
     index: int = 0
     robots: tuple[Robot, ...] = ()
+    devices: tuple[Device, ...] = ()
+
+    @property
+    def first_slot(self) -> int:
+        return min(robot.slot for robot in self.spec.robot)
 
 
 class RobotPort:
@@ -133,6 +139,7 @@ class RobotPort:
     clock = TICKS_PER_SECOND
     image = None
     robots: tuple[Robot, ...] = ()
+    devices: tuple[Device, ...] = ()
     in_period = stopped = False
 
     def __init__(self, desk: DeskOptions, scenario: Scenario, name: str = "", note: Note = _ignore) -> None:
@@ -144,7 +151,7 @@ class RobotPort:
         self.recorder: Recorder | None = None
         spec = scenario.networks[0]
         self.log = HostLog(0, lambda tick: tick, spec.robots)
-        self.networks = (PortNetwork(spec, self.log),)
+        self.networks = self.lines = (PortNetwork(spec, self.log),)
         self.waits = Waits(self)
         self.observers: list[Callable[[Period], object]] = []
         self.wire: list[Transmission] = []
@@ -270,8 +277,10 @@ class RobotPort:
     def do(self, action: Action) -> NoReturn:
         raise NotObservable(f"{type(action).__name__}: not observable {LACKS['switch']}")
 
-    def robot(self, network: int = 0, slot: int = 0) -> NoReturn:
+    def device(self, network: int = 0, slot: int = 0) -> NoReturn:
         raise NotObservable(f"net{network}/robot{slot}: not observable {LACKS['inside']}")
+
+    robot = device
 
     def play(self, sent: Iterable[Transmission], each: Callable[[int], object] = lambda tick: None) -> None:
         """Sends these at their ticks, and reads meanwhile and a little longer; `each` is told how far it is."""

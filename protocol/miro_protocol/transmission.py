@@ -69,14 +69,20 @@ def follows(last_tick: int, tick: int) -> bool:
     return _FOLLOWS_FROM <= tick - last_tick <= _FOLLOWS_TO
 
 
-def of_symbols(symbols: Iterable[Symbol], direction: str, network: int = 0) -> list[Transmission]:
-    """Received characters as transmissions; a pause begins a new one."""
+def of_symbols(
+    symbols: Iterable[Symbol], direction: str, network: int = 0, spacing_ticks: int = SPACING_TICKS
+) -> list[Transmission]:
+    """Received characters as transmissions; a pause begins a new one.
+
+    `spacing_ticks`: from one start bit to the next without a pause.
+    """
+    tolerance_ticks = SPACING_TOLERANCE_TICKS * spacing_ticks // SPACING_TICKS
     found: list[Transmission] = []
     data = bytearray()
     bad_stop: list[int] = []
     start_tick = last_tick = 0
     for byte, stop_good, tick in symbols:
-        if data and not _FOLLOWS_FROM <= tick - last_tick <= _FOLLOWS_TO:
+        if data and abs(tick - last_tick - spacing_ticks) > tolerance_ticks:
             found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
             data, bad_stop = bytearray(), []
         if not data:

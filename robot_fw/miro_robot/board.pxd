@@ -1,27 +1,21 @@
 cimport cython
-from miro_robot.event_log cimport EventLog
 from miro_robot.lm629.bus_timing cimport BusTiming
 from miro_robot.lm629.chip cimport Lm629
-from miro_robot.mcs51.bus cimport Bus
-from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.plant cimport Plant
 from miro_robot.probe cimport Probe
+from miro_robot.processor_board cimport ProcessorBoard
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
 cdef int _CS, _BOTH_STROBES, _CHIP_PINS, _ALL_PINS, _BOTH_RST, _WR, _RD, _BEHIND_TICKS
-cdef int RESET_PULSE, PORTS, FAULT, REACHED, RECEIVED, SENT, REPLAN
+cdef int RESET_PULSE, PORTS, FAULT, REPLAN
 cdef long long CYCLE_TICKS, RESET_PULSE_TICKS, NEVER_TICK
 
 
-cdef class Board(Bus):
-    cdef public object wiring, faults
+cdef class Board(ProcessorBoard):
+    cdef public object wiring
     cdef public Probe probe
-    cdef readonly object symbols
-    cdef readonly Cpu cpu
     cdef readonly Lm629 left, right
     cdef readonly Plant plant
-    cdef readonly EventLog log
-    cdef public bint stop_on_fault
     cdef public long long fault_count
     cdef long long horizon
     cdef int strobed, reset_pins
@@ -53,7 +47,6 @@ cdef class Board(Bus):
     @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int)
     cdef _resolve_outputs(self, wiring)
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
-    cpdef int run(self, long long until_tick) except -1
     cpdef int go_on(self, long long until_tick) except -1
     @cython.final
     cdef inline long long _next_interrupt(self, Lm629 chip) noexcept

@@ -20,16 +20,15 @@ from __future__ import annotations
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
-from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
+from miro_robot.event_log import FAULT
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
-from miro_robot.image import Image, Symbols
 from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
-from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.cpu import BREAKPOINT, REPLAN, Cpu
+from miro_robot.mcs51.cpu import REPLAN
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
+from miro_robot.processor_board import ProcessorBoard
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 MAIN_LOOP_LIMIT_CYCLES = 20_000
@@ -49,7 +48,7 @@ _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be be
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
-class Board(Bus):
+class Board(ProcessorBoard):
     """A robot's electronics, from RXD to the pins of the L298.
 
     `slot` (0..robots-1) and `robots` (3 or 5) are set by straps. `plant` is what the bridge drives and the encoders
@@ -57,7 +56,6 @@ class Board(Bus):
     """
 
     STATE = {
-        "cpu": Cpu,
         "left": Lm629,
         "right": Lm629,
         "plant": Plant,
@@ -75,8 +73,7 @@ class Board(Bus):
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_pins", "hi_seen", "forced",
-        "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log", "horizon", "strobed",
-        "reset_pins",
+        "probe", "on_movx_bus", "horizon", "strobed", "reset_pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -90,20 +87,16 @@ class Board(Bus):
         options: Lm629Options | None = None,
         stop_on_fault: bool = True,
     ) -> None:
+        ProcessorBoard.__init__(self, stop_on_fault)
         self.wiring = wiring
         self.plant = plant
-        self.cpu = Cpu(self)
         self.cpu.main_loop_limit = MAIN_LOOP_LIMIT_CYCLES
-        self.log = EventLog()
         self.left = Lm629(options or Lm629Options())
         self.right = Lm629(options or Lm629Options())
         self.left.tell(self.log, 0)
         self.right.tell(self.log, 1)
         self.left_timing = BusTiming()
         self.right_timing = BusTiming()
-        self.stop_on_fault = stop_on_fault
-        self.faults: list[FirmwareFault] = []
-        self.symbols: Symbols | None = None
         self.fault_count = 0
         self.probe: Probe | None = None
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
@@ -164,12 +157,6 @@ class Board(Bus):
         for port in range(PORTS):
             self.cpu.set_external(port, self.external[port], 0)
 
-    def load(self, image: Image) -> None:
-        """Puts the firmware into the CPU's flash; its symbols name the places of faults."""
-        self.cpu.load(image.code, image.used)
-        self.cpu.bound_stack(*image.symbols.stack)
-        self.symbols = image.symbols
-
     # ---- time ----------------------------------------------------------------------------------------------
 
     def run(self, until_tick: int) -> int:
@@ -199,23 +186,6 @@ class Board(Bus):
                 stopped = 0
         self.horizon = -1
         return stopped
-
-    def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
-        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and goes on."""
-        cpu = self.cpu
-        while True:
-            cpu.mark(addresses)
-            try:
-                stopped = self.run(until_tick)
-            finally:
-                cpu.unmark(addresses)
-            if stopped != BREAKPOINT:
-                return stopped
-            self.log.note(REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
-            # Past the marked instruction, at which the next run would end at once.
-            stopped = self.run(cpu.cycles * CYCLE_TICKS + 1)
-            if stopped or cpu.cycles * CYCLE_TICKS >= until_tick:
-                return stopped
 
     def _next_interrupt(self, chip: Lm629) -> int:
         """The next tick at which HI may change by itself: an unmasked sample, the end of reset, or its own end."""
@@ -320,16 +290,6 @@ class Board(Bus):
             if levels != self.external[port]:
                 self.external[port] = levels
                 self.cpu.set_external(port, levels, tick)
-
-    # ---- what the serial port did --------------------------------------------------------------------------
-
-    def byte_received(self, value: int, stop: int, tick: int) -> None:
-        """Tells the log of a character that the serial port delivered."""
-        self.log.note(RECEIVED, tick, stop, value)
-
-    def byte_sent(self, value: int, tick: int) -> None:
-        """Tells the log of a character that the serial port sent."""
-        self.log.note(SENT, tick, 0, value)
 
     # ---- from CPU to chip ---------------------------------------------------------------------------------
 

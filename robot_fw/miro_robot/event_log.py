@@ -11,13 +11,14 @@ The log is no state: it changes no bit of a run, and a board that is restored be
     TRUE        -                          - (a predicate of the caller's)
     START_LOST  side                       - (a warning: an STT replaced one that no sample had executed)
     WHEEL_LOST  side                       - (a position error made this LM629 switch its motor off)
+    ENDED       -                          address of the instruction (no input can make the program go on)
 
 Parts of a board run ahead of each other, so the log is in the order of noting, not of ticks: sort it by tick.
 """
 
 from __future__ import annotations
 
-RECEIVED, SENT, COMMAND, FAULT, REACHED, TRUE, START_LOST, WHEEL_LOST = 0, 1, 2, 3, 4, 5, 6, 7
+RECEIVED, SENT, COMMAND, FAULT, REACHED, TRUE, START_LOST, WHEEL_LOST, ENDED = range(9)
 CAPACITY = 2048
 _MASK = 2047
 _COMMAND = COMMAND

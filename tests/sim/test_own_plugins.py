@@ -97,7 +97,7 @@ def test_the_memory_of_a_law_is_part_of_the_digest():
     one, other = world(LeakyParameters()), world(LeakyParameters())
     for each in (one, other):
         each.run_to(10 * CONTROL_PERIOD_TICKS)
-    other.networks[0].robots[0].pilot.law.periods += 1
+    other.lines[0].devices[0].pilot.law.periods += 1
     assert finish(one) != finish(other)
 
 
@@ -160,7 +160,7 @@ def test_a_law_that_fails_names_robot_and_tick_and_leaves_no_nan_in_the_state():
     assert snapshot(one)
 
 
-ROBOT = "networks[0].robots[0]"
+ROBOT = "lines[0].devices[0]"
 
 
 @pytest.mark.parametrize(
@@ -169,12 +169,12 @@ ROBOT = "networks[0].robots[0]"
         (f"{ROBOT}.pilot.law.error_m", struct.pack("<d", math.nan), "error_m is NaN"),
         (f"{ROBOT}.pilot.law.error_m", struct.pack("<d", math.inf), "'error_m' is inf"),
         (
-            "networks[0].telemetry.last",
+            "lines[0].telemetry.last",
             struct.pack("<I", 2) + 2 * NOTHING_HEARD,
             "of 2 robots where 3 belong",
         ),
         (
-            "networks[0].telemetry.last",
+            "lines[0].telemetry.last",
             struct.pack("<I", 3) + struct.pack("<q", 1 << 40) + NOTHING_HEARD[8:] + 2 * NOTHING_HEARD,
             "last answer came after tick 4000000",
         ),

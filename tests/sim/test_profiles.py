@@ -227,5 +227,5 @@ def test_what_is_off_is_not_in_the_state():
     assert not [path for path in plain if "slicer" in path or "overheard" in path]
     everything = world(ALL + "\nchannel = 1", "channel = 1")
     paths = set(everything.state.decode(everything.state.save()))
-    assert "networks[0].downlink.listeners[0].slicer.mean" in paths
-    assert "networks[0].downlink.overheard[0].transmissions" in paths
+    assert "lines[0].downlink.listeners[0].slicer.mean" in paths
+    assert "lines[0].downlink.overheard[0].transmissions" in paths

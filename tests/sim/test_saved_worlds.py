@@ -21,7 +21,7 @@ def saved():
     return saved_worlds()[2]
 
 
-CPU = "networks[0].robots[0].board.cpu"
+CPU = "lines[0].devices[0].board.cpu"
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ CPU = "networks[0].robots[0].board.cpu"
         (f"{CPU}.peripherals.shift.number", struct.pack("<i", 9)),
         (f"{CPU}.peripherals.ports.pending", struct.pack("<IqBB", 1, 1 << 30, 4, 0)),
         (f"{CPU}.peripherals.uart.rxd.ticks", struct.pack("<I", 1 << 23) + bytes(8)),
-        ("networks[0].telemetry.decoder._data", struct.pack("<I", 4161) + bytes(4161)),
+        ("lines[0].telemetry.decoder._data", struct.pack("<I", 4161) + bytes(4161)),
     ],
 )
 def test_what_compiled_code_takes_for_an_index_or_a_divisor_is_checked_by_name(saved, path, data):
@@ -49,11 +49,11 @@ def test_what_compiled_code_takes_for_an_index_or_a_divisor_is_checked_by_name(s
     [
         ("tick", 1 << 40),
         (f"{CPU}.cycles", 5),
-        ("networks[0].downlink.settled_tick", 1 << 41),
-        ("networks[0].downlink.free_tick", 1 << 61),
-        ("networks[0].uplink.now", 1 << 40),
-        ("networks[0].robots[1].board.left.next_tick", 1),
-        ("networks[0].robots[1].board.plant.tick", 1),
+        ("lines[0].downlink.settled_tick", 1 << 41),
+        ("lines[0].downlink.free_tick", 1 << 61),
+        ("lines[0].uplink.now", 1 << 40),
+        ("lines[0].devices[1].board.left.next_tick", 1),
+        ("lines[0].devices[1].board.plant.tick", 1),
         (f"{CPU}.peripherals.uart.rxd.settled_tick", 1 << 61),
     ],
 )
@@ -66,7 +66,7 @@ def test_a_part_that_does_not_stand_where_the_world_does_is_refused_without_a_ch
 
 
 def test_characters_that_wait_for_a_busy_transmitter_are_refused(saved):
-    path, busy = "networks[0].downlink.free_tick", 1 << 40
+    path, busy = "lines[0].downlink.free_tick", 1 << 40
     with pytest.raises(ValueError, match=f"characters wait, but the transmitter is busy until tick {busy}"):
         fresh().load(with_field(fresh(), saved, path, struct.pack("<q", busy)))
 

@@ -1,7 +1,7 @@
 """Two worlds side by side: the first tick at which their states differ, and the fields that do.
 
     found = mirotwin.replay.first_difference(one, other)
-    print(found)       # tick 1203 (0.000050 s): networks[0].robots[0].board.cpu.iram[35h] ..
+    print(found)       # tick 1203 (0.000050 s): lines[0].devices[0].board.cpu.iram[35h] ..
 
 States are compared every millisecond, then within the first one that differs in shorter steps, down to a tick. What
 differs and is the same again between two looks is not seen: a register, say, that is overwritten at once.

@@ -24,7 +24,7 @@ from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
-from miro_sim.world.events import Cursor, Event, RobotLog
+from miro_sim.world.events import BoardLog, Cursor, Event
 from miro_sim.world.world import World
 
 OF_PC = ("answer", "reset", "power", "radio")
@@ -56,7 +56,7 @@ class Arrival(NamedTuple):
 class Arrivals:
     """What the serial port of one of `robots` delivers, and when each character came."""
 
-    def __init__(self, log: RobotLog, robots: int) -> None:
+    def __init__(self, log: BoardLog, robots: int) -> None:
         self.all: list[Arrival] = []
         self._log = Cursor(log)
         self._robots = robots

@@ -11,8 +11,8 @@ from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, TeamFrame
 from miro_protocol.robot_rules import NO_WORD, DrivingRule, OriginRule
 from miro_sim.periods import RobotPeriod
+from miro_sim.world.device import COUNTERS
 from miro_sim.world.events import Event
-from miro_sim.world.robot import COUNTERS
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
 from mirotwin.verify.checks.orders import OrdersMonitor, saturated

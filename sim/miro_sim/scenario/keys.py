@@ -26,6 +26,7 @@ from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import Chassis, DriveParams
 from miro_sim.radio.params import Radio
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.camera_keys import Camera, PitchCm, PixelCamera
 
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
@@ -172,6 +173,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             )
 
     @property
+    def clock(self) -> int:
+        """Of the world's clock."""
+        return TICKS_PER_SECOND
+
+    @property
     def periods(self) -> int:
         """Control periods of a run, which ends by itself with the one in which its duration does."""
         return max(1, -(-ticks(self.duration_s) // CONTROL_PERIOD_TICKS))
@@ -181,8 +187,10 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return self.periods * CONTROL_PERIOD_TICKS
 
 
-def without_expectations(scenario: Scenario) -> Scenario:
+def without_expectations(scenario: Scenario | BoardScenario) -> Scenario | BoardScenario:
     """The same scenario, of which nothing is expected, without steps: all that a world depends on."""
+    if isinstance(scenario, BoardScenario):
+        return msgspec.structs.replace(scenario, expect={})
     networks = []
     for network in scenario.networks:
         robots = tuple(msgspec.structs.replace(robot, expect={}) for robot in network.robot)

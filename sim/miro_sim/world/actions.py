@@ -17,7 +17,7 @@ from miro_sim.radio.params import LINK_STATES
 from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
-    from miro_sim.world.network import Network
+    from miro_sim.world.medium import Medium
 
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
@@ -36,7 +36,7 @@ class WaitingAction(NamedTuple):
 
 
 class Actions:
-    """Those of one network. `done`: the actions of the control period that is under way, a record."""
+    """Those of one line. `done`: the actions of the control period that is under way, a record."""
 
     STATE = {
         "waiting": Rows(
@@ -85,26 +85,25 @@ class Actions:
             self.waiting.append(WaitingAction(action.tick, POWER, action.slot, action.on))
         self.waiting.sort(key=lambda one: one.tick)
 
-    def do_due(self, network: Network, tick: int) -> None:
+    def do_due(self, medium: Medium, tick: int) -> None:
         """Does what is due at `tick`, and notes what robots and PC can notice."""
         while self.waiting and self.waiting[0].tick <= tick:
             one = self.waiting.pop(0)
             if one.what == RADIO_DOWN:
-                for listener in network.downlink.listeners.values():
-                    listener.link_state = one.value
+                medium.set_radio(one.value, up=False)
                 continue
             slot = PC if one.what == RADIO_UP else one.slot
-            self.done.append(self._do(network, one))
+            self.done.append(self._do(medium, one))
             event = Event(
                 tick=one.tick, what=_EVENTS[one.what], network=self.network, slot=slot, value=one.value
             )
-            network.log.note(event)
+            medium.log.note(event)
 
-    def _do(self, network: Network, one: WaitingAction) -> Action:
+    def _do(self, medium: Medium, one: WaitingAction) -> Action:
         if one.what == RADIO_UP:
-            network.uplink.band.link_state = one.value
+            medium.set_radio(one.value, up=True)
             return RadioState(one.tick, self.network, LINK_STATES[one.value])
-        board = network.robot(one.slot).board
+        board = medium.device(one.slot).board
         if one.what == RESET:
             board.set_reset(one.value)
             return Reset(one.tick, self.network, one.slot, one.value)

@@ -220,7 +220,7 @@ class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
     def met_by(self, event: Event) -> bool:
         return event.what == "true"
 
-    def predicate(self, robot: Robot) -> bool:
+    def predicate(self, robot: Any) -> bool:
         """Whether the wheels are so fast now."""
         sides = zip((self.left_m_s, self.right_m_s), speeds_of(robot), strict=True)
         return all(wanted is None or abs(found - wanted) <= self.tolerance_m_s for wanted, found in sides)
@@ -266,6 +266,10 @@ class Fault(AtRobot, frozen=True, kw_only=True, tag="fault"):
     """The firmware does what it must not."""
 
 
+class Ended(AtRobot, frozen=True, kw_only=True, tag="ended"):
+    """The program of a board alone has ended: no input can make it do anything more, and all is sent."""
+
+
 class Touch(Condition, frozen=True, kw_only=True, tag="touch"):
     """A robot of the network touches another robot on the pitch, seen on the contact grid of 1 ms."""
 
@@ -273,12 +277,14 @@ class Touch(Condition, frozen=True, kw_only=True, tag="touch"):
 
 
 class When(AtRobot, frozen=True, kw_only=True, tag="when"):
-    """`predicate(robot)` is true, asked at each sample of the robot's left LM629, or after each instruction.
+    """`predicate(device)` is true, asked at each sample of the robot's left LM629, or after each instruction.
 
-    `at = "instruction"` is some 70 times slower. The predicate reads the robot and changes nothing.
+    A board alone is asked each millisecond.
+
+    `at = "instruction"` is some 70 times slower. The predicate reads the device and changes nothing.
     """
 
-    predicate: Callable[[Robot], object]
+    predicate: Callable[[Any], object]
     at: Literal["sample", "instruction"] = "sample"
 
     def met_by(self, event: Event) -> bool:

@@ -11,6 +11,7 @@ command     an LM629 has taken the last byte of a command                 side, 
 start_lost  an LM629 has accepted an STT before the sample of another     side
 fault       the firmware did what it must not                             value (the kind), address
 reached     the instruction at an address is next                         address
+ended       no input can make the program go on, and all is sent         address
 edge        a pin changes                                                 pin, value (the new level)
 true        a predicate is true                                           -
 wheel_lost  a position error makes an LM629 switch its motor off          side
@@ -81,7 +82,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.side}"
         if self.what == "edge":
             return f" {self.pin} to {self.value}"
-        if self.what in ("reached", "fault"):
+        if self.what in ("reached", "fault", "ended"):
             return f" {self.address:#06x}"
         if self.what in ("reset", "power"):
             return f" {self.value}"
@@ -168,8 +169,8 @@ def _kind(one: Event | Transmission | Received | Symbol) -> str:
     return "answer" if isinstance(one, Received) else "heard"
 
 
-class RobotLog:
-    """The events of a robot's board, read as those of a PC are."""
+class BoardLog:
+    """The events of a board, read as those of a PC are."""
 
     NOT_STATE = ("*",)
 
@@ -205,6 +206,7 @@ _KINDS = {
     event_log.TRUE: "true",
     event_log.START_LOST: "start_lost",
     event_log.WHEEL_LOST: "wheel_lost",
+    event_log.ENDED: "ended",
 }
 
 
@@ -213,7 +215,7 @@ class Cursor:
 
     NOT_STATE = ("*",)
 
-    def __init__(self, log: HostLog | RobotLog) -> None:
+    def __init__(self, log: HostLog | BoardLog) -> None:
         self.log = log
         self.next = log.end
 
@@ -236,7 +238,7 @@ def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: in
         return Event(tick=tick, what=what, network=network, slot=slot, side=side, opcode=opcode, data=data)
     if what in ("start_lost", "wheel_lost"):
         return Event(tick=tick, what=what, network=network, slot=slot, side=SIDES[code])
-    if what in ("fault", "reached"):
+    if what in ("fault", "reached", "ended"):
         return Event(tick=tick, what=what, network=network, slot=slot, value=code, address=value)
     good = what != "received" or code == 1
     return Event(tick=tick, what=what, network=network, slot=slot, value=value, good_stop=good)

@@ -16,6 +16,7 @@ from miro_sim.scenario.keys import NetworkSpec, Scenario
 if TYPE_CHECKING:
     from miro_robot.image import Image
     from miro_sim.world.conditions import Condition
+    from miro_sim.world.device import Device
     from miro_sim.world.events import Event, HostLog
     from miro_sim.world.robot import Robot
     from miro_sim.world.waits import Waits
@@ -28,15 +29,24 @@ class NotObservable(Exception):
     """What this machine can neither show nor do."""
 
 
-class MachineNetwork(Protocol):
-    """One network of a machine. `robots`: those whose inside it shows."""
+class MachineLine(Protocol):
+    """One line of a machine. `devices`: those whose inside it shows; `first_slot`: of all that are on it."""
 
-    @property
-    def spec(self) -> NetworkSpec: ...
     @property
     def index(self) -> int: ...
     @property
     def log(self) -> HostLog: ...
+    @property
+    def devices(self) -> Sequence[Device]: ...
+    @property
+    def first_slot(self) -> int: ...
+
+
+class MachineNetwork(MachineLine, Protocol):
+    """One network of a machine. `robots`: those whose inside it shows."""
+
+    @property
+    def spec(self) -> NetworkSpec: ...
     @property
     def robots(self) -> Sequence[Robot]: ...
 
@@ -56,7 +66,11 @@ class Machine(Protocol):
     @property
     def image(self) -> Image | None: ...
     @property
+    def lines(self) -> Sequence[MachineLine]: ...
+    @property
     def networks(self) -> Sequence[MachineNetwork]: ...
+    @property
+    def devices(self) -> Sequence[Device]: ...
     @property
     def robots(self) -> Sequence[Robot]: ...
     @property
@@ -72,6 +86,7 @@ class Machine(Protocol):
     @property
     def earliest_action_tick(self) -> int: ...
 
+    def device(self, network: int = 0, slot: int = 0) -> Device: ...
     def robot(self, network: int = 0, slot: int = 0) -> Robot: ...
     def run_to(self, tick: int) -> None: ...
     def run_for(self, ticks: int) -> None: ...

@@ -3,57 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from itertools import permutations
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_exact.rng import Stream
-from miro_exact.state import TICK, Rows
+from miro_exact.state import TICK
 from miro_host.pilot import WheelCommand
 from miro_host.station import Station
 from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_host.wheels import Wheels, wheel_command
-from miro_protocol.decoder import Received, Symbol
+from miro_protocol.actions import Action, RadioState, ScriptItem
+from miro_protocol.decoder import Received
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
-from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import LINK_STATES
 from miro_sim.radio.uplink import Uplink
 from miro_sim.scenario import keys as sc
-from miro_sim.world.actions import SETTLE_TICKS, Actions
+from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.events import HostLog
-from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
+from miro_sim.world.medium import LONGEST_TRANSMISSION_TICKS, Medium, sent_to
+from miro_sim.world.outbox import Outbox
 from miro_sim.world.robot import Robot
-from miro_sim.world.sight import Sight, sight_of
-
-LONGEST_TRANSMISSION_TICKS = 1 << 40
-"""Twelve hours: no saved transmission ends later than so long after now."""
+from miro_sim.world.sight import PixelSight, Sight, sight_of
 
 
-class Network:
+class Network(Medium):
     """Station, radio and robots of one frequency. `script` replaces what the station would send.
 
     `host` is who sends: the PC's "controller", once a control period; a "script"; "silent", only who injects.
     """
 
     STATE = {
-        "robots": [Robot],
         "sight": Sight,
         "station": Station,
         "downlink": Downlink,
         "uplink": Uplink,
         "telemetry": TelemetryReceiver,
         "frames_sent": TICK,
-        "outbox": Outbox,
-        "actions": Actions,
-        "heard": Rows(1 << 20, "B", "?", TICK),
     }
-    NOT_HASHED = ("outbox", "actions", "heard")
-    """They depend on when input was announced and where the world stopped."""
-    NOT_STATE = (
-        *("spec", "index", "host", "compute_ticks", "draws"),
-        *("sent", "seen", "log"),  # records
-    )
+    NOT_STATE = ("spec", "compute_ticks", "draws")
 
     def __init__(
         self,
@@ -64,34 +54,46 @@ class Network:
         image: Image,
         script: Sequence[Transmission] | None,
     ) -> None:
-        self.spec = spec
-        self.index = index
-        self.compute_ticks = ticks(scenario.host.compute_s)
-        self.robots = [
+        robots = [
             Robot(robot, scenario, index, spec.robots, seed, image)
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
         ]
-        self.sight: Sight = sight_of(scenario.camera, self.robots, seed)
-        self.draws = [Stream(seed, f"net{index}/robot{robot.slot}/control") for robot in self.robots]
-        self.station = Station(spec.robots, telemetry=spec.radio.telemetry)
         radio = spec.radio
+        self.spec = spec
+        self.compute_ticks = ticks(scenario.host.compute_s)
+        self.sight: Sight = sight_of(scenario.camera, robots, seed)
+        self.draws = [Stream(seed, f"net{index}/robot{robot.slot}/control") for robot in robots]
+        self.station = Station(spec.robots, telemetry=radio.telemetry)
         self.downlink = Downlink(radio, seed, f"net{index}/down")
         self.uplink = Uplink(radio, seed, f"net{index}/up")
-        for robot in self.robots:
+        for robot in robots:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
             self.uplink.band.add(robot.spec.slot, robot.board.cpu.txd)
         self.telemetry = TelemetryReceiver(spec.robots)
-        self.host: str = "script" if script is not None else spec.host
-        self.actions = Actions(index)
-        self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
+        self.frames_sent = 0
+        Medium.__init__(
+            self,
+            index,
+            "script" if script is not None else spec.host,
+            robots,
+            Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index),
+            HostLog(index, self.uplink.known_tick, spec.robots),
+            self.downlink.sender.latency,
+        )
         for sent in script or ():
             check_bad_stop(sent.bad_stop, len(sent.data))
             self.outbox.inject(sent, 0)
-        self.frames_sent = 0
-        self.heard: list[Symbol] = []  # in this period so far
-        self.sent: list[Transmission] = []
-        self.seen: list[RobotPeriod] = []
-        self.log = HostLog(index, self.uplink.known_tick, spec.robots)
+
+    @property
+    def robots(self) -> list[Robot]:
+        """By slot."""
+        return self.devices
+
+    def robot(self, slot: int) -> Robot:
+        """The robot in `slot`. Raises ValueError where there is none."""
+        robot = self.device(slot)
+        assert isinstance(robot, Robot)
+        return robot
 
     def begin_period(self, tick: int) -> None:
         """Camera, PC and station, in this order."""
@@ -99,67 +101,35 @@ class Network:
         self.sent = []
         steered = self.host == "controller"
         commands: list[WheelCommand | None] = []
-        for place, robot in enumerate(self.robots):
+        for place, robot in enumerate(self.devices):
             answer = self.telemetry.last[robot.slot]
             commands.append(robot.steer(measured[place], answer, tick) if steered else None)
         if steered:
             self._transmit(tick + self.compute_ticks + self.outbox.lead_ticks, commands)
         self.seen = []
-        for place, robot in enumerate(self.robots):
+        for place, robot in enumerate(self.devices):
             self.seen.append(robot.record(tick, measured[place], commands[place]))
-
-    def robot(self, slot: int) -> Robot:
-        """The robot in `slot`. Raises ValueError where there is none."""
-        for robot in self.robots:
-            if robot.spec.slot == slot:
-                return robot
-        there = ", ".join(str(robot.spec.slot) for robot in self.robots)
-        raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
-
-    def send_due(self, rendezvous_tick: int) -> None:
-        """Puts on the air what may come up before the tick up to which it is settled next, and nothing else: what may
-        still be announced at the rendezvous is not in the state there, whenever it was announced.
-        """
-        for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS - self.downlink.sender.latency):
-            self.downlink.send(sent.tick, sent.data, sent.bad_stop)
-            self.frames_sent += 1
-            self.sent.append(sent)
-            self.log.note(sent)
-
-    def settle(self, rendezvous_tick: int) -> None:
-        """All networks have sent: the line is known up to where the robots stop next."""
-        self.downlink.settle(rendezvous_tick + SETTLE_TICKS)
-
-    def earliest_tick(self, now: int) -> int:
-        """The earliest first start bit of characters that are injected at tick `now`."""
-        return max(0, now + SETTLE_TICKS + self.outbox.lead_ticks - self.downlink.sender.latency)
-
-    def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
-        """See `World.inject`."""
-        earliest = self.earliest_tick(now)
-        if not 0 < len(data) <= LONGEST_BYTES:
-            raise ValueError(f"net{self.index}: {len(data)} characters; give 1 to {LONGEST_BYTES}")
-        if at_tick is not None and not earliest <= at_tick <= LATEST_TICK:
-            limits = f"the earliest is {earliest}, the latest {LATEST_TICK} (a day)"
-            raise ValueError(f"net{self.index}: tick {at_tick} is out of range; {limits}")
-        free_tick = self.downlink.free_tick
-        tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
-        try:
-            check_bad_stop(bad_stop, len(data))
-            self.outbox.inject(Transmission(tick, DOWN, bytes(data), self.index, bad_stop), free_tick)
-        except ValueError as error:
-            raise ValueError(f"net{self.index}: {error}") from None
-        return tick
 
     def _transmit(self, start_tick: int, commands: Sequence[WheelCommand | None]) -> None:
         wheels = [(0, 0)] * self.spec.robots
-        for place, robot in enumerate(self.robots):
+        for place, robot in enumerate(self.devices):
             command = commands[place]
             if command is not None:
                 bounds, draws = self.spec.control_noise, self.draws[place]
                 wheels[robot.slot] = noisy(command, bounds, robot.pilot.wheels, draws, self.sight.frame)
         sent = Transmission(start_tick, DOWN, self.station.frame(wheels), self.index)
         self.outbox.post(sent, self.downlink.free_tick)
+
+    def send(self, sent: Transmission) -> None:
+        self.downlink.send(sent.tick, sent.data, sent.bad_stop)
+        self.frames_sent += 1
+
+    def settle(self, rendezvous_tick: int) -> None:
+        """All networks have sent: the line is known up to where the robots stop next."""
+        self.downlink.settle(rendezvous_tick + SETTLE_TICKS)
+
+    def free_tick(self) -> int:
+        return self.downlink.free_tick
 
     def run(self, tick: int) -> bool:
         """Runs every robot to `tick`, one after the other; true when a firmware fault stopped one.
@@ -170,7 +140,7 @@ class Network:
         """
         while True:
             stopped = False
-            for robot in self.robots:
+            for robot in self.devices:
                 stopped = robot.run(tick) == STOPPED or stopped
             if stopped:
                 return True
@@ -196,6 +166,19 @@ class Network:
         self.heard = []
         return found
 
+    def check_action(self, action: Action) -> None:
+        if not isinstance(action, RadioState):
+            Medium.check_action(self, action)
+        elif action.state not in LINK_STATES:
+            raise ValueError(f"net{self.index}: a radio {action.state!r}; give {', '.join(LINK_STATES)}")
+
+    def set_radio(self, state: int, up: bool) -> None:
+        if up:
+            self.uplink.band.link_state = state
+            return
+        for listener in self.downlink.listeners.values():
+            listener.link_state = state
+
     @property
     def bit_errors(self) -> int:
         """Bits that the radio turned over so far, down at every listener and up."""
@@ -204,57 +187,41 @@ class Network:
             down += listener.bit_errors
         return down + self.uplink.bit_errors
 
-    def records(self) -> list[Any]:
-        """What observers take away and no snapshot holds, to go back to with `put_back`."""
-        boards = [robot.board for robot in self.robots]
-        return [
-            list(self.sent),
-            list(self.actions.done),
-            self.log.end,
-            [(list(b.left.commands), list(b.right.commands), list(b.faults), b.log.end) for b in boards],
-        ]
+    def link_counts(self) -> tuple[int, int]:
+        return self.frames_sent, self.bit_errors
 
-    def put_back(self, records: list[Any]) -> None:
-        """Takes back what `records` gave; nothing but more of the same may have happened since."""
-        sent, done, log_end, boards = records
-        self.sent = list(sent)
-        self.actions.done = list(done)
-        self.log.cut(log_end)
-        for robot, (left, right, faults, end) in zip(self.robots, boards, strict=True):
-            robot.board.left.commands[:] = left
-            robot.board.right.commands[:] = right
-            robot.board.faults[:] = faults
-            robot.board.log.cut(end)
+    def vision_counts(self) -> dict[str, int]:
+        return self.sight.counts()
 
     def check_times(self, begun_tick: int, tick: int) -> None:
-        """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
-
-        A part that is far behind would need hours to catch up.
-        """
         settled_tick = self.downlink.settled_tick
         if settled_tick != tick + SETTLE_TICKS and settled_tick + tick != 0:
             raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
         if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
-        if max(self.downlink.free_tick, self.downlink.busy_tick) > tick + LONGEST_TRANSMISSION_TICKS:
+        if self.downlink.busy_tick > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
-        if self.actions.next_tick < tick - SETTLE_TICKS:
-            raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
-        self.actions.check([robot.slot for robot in self.robots])
-        if self.outbox.waiting and self.outbox.waiting[0].sent.tick < self.downlink.free_tick:
-            raise ValueError(
-                f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"
-            )
+        Medium.check_times(self, begun_tick, tick)
         if any(answer is not None and answer.tick > tick for answer in self.telemetry.last):
             raise ValueError(f"a robot's last answer came after tick {tick}")
-        for robot in self.robots:
-            cpu = robot.board.cpu
-            if not begun_tick - CONTROL_PERIOD_TICKS <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
-                raise ValueError(f"a CPU is at cycle {cpu.cycles}, at tick {tick}")
-            if cpu.rxd.settled_tick != settled_tick or cpu.rxd.last_tick() >= max(settled_tick, 1):
-                raise ValueError(
-                    f"RXD is settled up to tick {cpu.rxd.settled_tick}, the radio up to {settled_tick}"
-                )
+        self.check_rxd(settled_tick)
+
+
+def networks_of(
+    scenario: sc.Scenario, seed: int, image: Image, script: Sequence[ScriptItem] | None
+) -> list[Network]:
+    """The networks of a scenario. Networks on one frequency hear each other; a picture shows all robots."""
+    networks = [
+        Network(spec, scenario, index, seed, image, sent_to(index, script))
+        for index, spec in enumerate(scenario.networks)
+    ]
+    for one, other in permutations(networks, 2):
+        if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
+            one.downlink.overhear(other.downlink)
+    for network in networks:
+        if isinstance(network.sight, PixelSight):
+            network.sight.everyone = [robot for each in networks for robot in each.robots]
+    return networks
 
 
 def noisy(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import msgspec
 
-from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.clock import HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_exact.state import TICK, Rows
 from miro_protocol.transmission import DOWN, Transmission
 
@@ -49,7 +49,8 @@ def _made(cells: tuple[int, int, int, bytes]) -> Waiting:
 class Outbox:
     """Transmissions of the host of `network` that wait, in order. `lead_ticks`: key-up of the carrier.
 
-    `dropped`: frames of the station that found the transmitter busy.
+    `character_ticks`: how long each of their characters takes. `dropped`: frames of the station that found the
+    transmitter busy.
     """
 
     STATE = {
@@ -61,9 +62,12 @@ class Outbox:
         ),
         "dropped": TICK,
     }
-    NOT_STATE = ("lead_ticks", "network")
+    NOT_STATE = ("lead_ticks", "network", "character_ticks")
 
-    def __init__(self, lead_ticks: int, network: int = 0) -> None:
+    def __init__(
+        self, lead_ticks: int, network: int = 0, character_ticks: int = HOST_CHARACTER_TICKS
+    ) -> None:
+        self.character_ticks = character_ticks
         self.lead_ticks = lead_ticks
         self.network = network
         self.waiting: list[Waiting] = []
@@ -78,7 +82,7 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        if sent.tick < free_tick or [one for one in self.waiting if _overlap(one.sent, sent)]:
+        if sent.tick < free_tick or [one for one in self.waiting if self._overlap(one.sent, sent)]:
             self.dropped += 1
             return False
         self.waiting.append(Waiting(sent, STATION))
@@ -93,18 +97,18 @@ class Outbox:
         if sent.tick < free_tick:
             raise ValueError(f"tick {sent.tick}: the transmitter is busy until tick {free_tick}")
         count = len(self.waiting)
-        if not count or self.waiting[count - 1].sent.end_tick <= sent.tick:  # a long script comes in order
+        if not count or self._end(self.waiting[count - 1].sent) <= sent.tick:  # a long script comes in order
             self.waiting.append(Waiting(sent, INJECTED))
             return
         for one in self.waiting:
             old = one.sent
-            if _overlap(old, sent) and (one.origin == INJECTED or old.tick < sent.tick):
-                busy = f"is busy from tick {old.tick} to {old.end_tick}"
+            if self._overlap(old, sent) and (one.origin == INJECTED or old.tick < sent.tick):
+                busy = f"is busy from tick {old.tick} to {self._end(old)}"
                 size = len(sent.data)
                 raise ValueError(
-                    f"tick {sent.tick}: the transmitter {busy}; {size} characters end at tick {sent.end_tick}"
+                    f"tick {sent.tick}: the transmitter {busy}; {size} characters end at tick {self._end(sent)}"
                 )
-        kept = [one for one in self.waiting if not _overlap(one.sent, sent)]
+        kept = [one for one in self.waiting if not self._overlap(one.sent, sent)]
         self.dropped += len(self.waiting) - len(kept)
         self.waiting = kept
         self.waiting.append(Waiting(sent, INJECTED))
@@ -113,7 +117,7 @@ class Outbox:
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free after everything that waits."""
         count = len(self.waiting)  # in order, and none overlaps another: the last one ends last
-        return max(free_tick, self.waiting[count - 1].sent.end_tick) if count else free_tick
+        return max(free_tick, self._end(self.waiting[count - 1].sent)) if count else free_tick
 
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
@@ -133,12 +137,15 @@ class Outbox:
                 raise ValueError(
                     f"{len(sent.data)} characters wait for tick {sent.tick}, behind tick {free_tick}"
                 )
-            free_tick = sent.end_tick
+            free_tick = self._end(sent)
             self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), one.origin)
 
+    def _end(self, sent: Transmission) -> int:
+        """When the last stop bit is over."""
+        return sent.tick + len(sent.data) * self.character_ticks
 
-def _overlap(one: Transmission, other: Transmission) -> bool:
-    return one.tick < other.end_tick and other.tick < one.end_tick
+    def _overlap(self, one: Transmission, other: Transmission) -> bool:
+        return one.tick < self._end(other) and other.tick < self._end(one)
 
 
 def _tick(one: Waiting) -> int:

@@ -1,26 +1,22 @@
+cimport cython
 from miro_host.pilot cimport Pilot
 from miro_robot.board cimport Board
 from miro_robot.lm629.chip cimport Lm629
 from miro_sim.plant.drive cimport DifferentialDrive
+from miro_sim.world.device cimport Device
 
-cdef long long CYCLE_TICKS, GRID_TICKS
+cdef long long GRID_TICKS
 
 
-cdef class Robot:
-    cdef readonly object spec, network, slot, reference, log
-    cdef readonly Board board
+cdef class Robot(Device):
+    cdef readonly object spec, reference
     cdef readonly Pilot pilot
     cdef readonly DifferentialDrive drive
-    cdef readonly list counter_addresses
-    cdef public tuple marks
-    cdef public list asked, noted
+    cdef public list noted
     cdef public long long grid_tick
 
     cpdef note_from(self, long long tick)
-    cpdef int run(self, long long tick) except -1
-    cdef int _run(self, long long tick) except -1
     cpdef steer(self, measured, telemetry, long long tick)
-    cpdef counter(self, int index)
     cpdef record(self, long long tick, measured, command)
 
 

@@ -62,10 +62,10 @@ class Waits:
         self.reached: dict[tuple[int, int], int] = {}
         self.decoders: dict[tuple[int, int], Decoder] = {}  # made by the first wait
         self.states: list[Flat] = []
-        for index, network in enumerate(self.world.networks):
-            self.cursors[index, PC] = Cursor(network.log)
-            for robot in network.robots:
-                self.cursors[index, robot.spec.slot] = Cursor(robot.log)
+        for index, line in enumerate(self.world.lines):
+            self.cursors[index, PC] = Cursor(line.log)
+            for device in line.devices:
+                self.cursors[index, device.slot] = Cursor(device.log)
 
     def collect(self) -> None:
         """Takes over what the logs hold, which is not for ever: for who moves the world without a wait."""
@@ -165,9 +165,9 @@ class Waits:
     def _gather(self, watch: Watch) -> None:
         """Reads what is new in all logs; a frame is an event right after its last character."""
         if not self.decoders:
-            for index, network in enumerate(self.world.networks):
-                for robot in network.robots:
-                    self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
+            for index, line in enumerate(self.world.lines):
+                for device in line.devices if line.log.robots else ():
+                    self.decoders[index, device.slot] = Decoder(line.log.robots)
             self.states = [Flat(decoder) for decoder in self.decoders.values()]
         for source, cursor in self.cursors.items():
             for serial, event in cursor.read():
@@ -175,7 +175,7 @@ class Waits:
                     continue  # a wait has ended before this instruction already
                 key = (event.tick, *source, serial)
                 self.backlog.append((key, event))
-                if event.what != "received":
+                if event.what != "received" or source not in self.decoders:
                     continue
                 symbol = (event.value, event.good_stop, event.tick)
                 for result in self.decoders[source].feed_symbols([symbol]):

@@ -15,6 +15,7 @@ from miro_protocol.toml_text import struct_of
 from miro_robot.board import Board
 from miro_robot.inspect.tap import PLACES, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
+from miro_robot.processor_board import ProcessorBoard
 from miro_sim.world.conditions import CONDITIONS, PORT_PINS, Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
 
@@ -46,17 +47,17 @@ class Watch:
         for robot_id, condition in self.conditions:
             if isinstance(condition, Reached):
                 assert condition.address is not None
-                robot = self.world.robot(*robot_id)
-                robot.marks = (*robot.marks, condition.address)
+                device = self.world.device(*robot_id)
+                device.marks = (*device.marks, condition.address)
             elif isinstance(condition, When | WheelSpeeds):
-                self.world.robot(*robot_id).asked.append((condition.predicate, condition.at))
+                self.world.device(*robot_id).asked.append((condition.predicate, condition.at))
         self.pick_up()
         return self
 
     def __exit__(self, *raised: object) -> None:
-        for robot in self.world.robots:
-            robot.marks = ()
-            robot.asked = []
+        for device in self.world.devices:
+            device.marks = ()
+            device.asked = []
         self._close_pins()
 
     def wants(self, event: Event) -> bool:
@@ -76,7 +77,7 @@ class Watch:
             if isinstance(condition, Edge):
                 pins.setdefault(robot_id, set()).add(condition.pin)
         self.pins = [
-            PinWatch(robot_id, self.world.robot(*robot_id).board, pins[robot_id]) for robot_id in pins
+            PinWatch(robot_id, self.world.device(*robot_id).board, pins[robot_id]) for robot_id in pins
         ]
 
     def edges(self, beyond: bool = False) -> list[Entry]:
@@ -103,7 +104,7 @@ class Watch:
             ((tick, network, slot, _TRUE), Event(tick=tick, what="true", network=network, slot=slot))
             for (network, slot), condition in self.conditions
             if isinstance(condition, When | WheelSpeeds)
-            and condition.predicate(self.world.robot(network, slot))
+            and condition.predicate(self.world.device(network, slot))
         ]
 
     # What the conditions mean
@@ -112,12 +113,12 @@ class Watch:
         """Network and slot at which it happens. Raises ValueError for values that no file may give."""
         if type(condition) in CONDITIONS.values():
             struct_of(msgspec.to_builtins(condition), type(condition))
-        networks = self.world.networks
-        if not 0 <= condition.network < len(networks):
-            raise ValueError(f"there is no network {condition.network}; the last one is {len(networks) - 1}")
-        slot = condition.at_slot(min(robot.slot for robot in networks[condition.network].spec.robot))
+        lines = self.world.lines
+        if not 0 <= condition.network < len(lines):
+            raise ValueError(f"there is no network {condition.network}; the last one is {len(lines) - 1}")
+        slot = condition.at_slot(lines[condition.network].first_slot)
         if slot != PC:
-            self.world.robot(condition.network, slot)
+            self.world.device(condition.network, slot)
         return condition.network, slot
 
     def _with_address(self, condition: Condition) -> Condition:
@@ -132,11 +133,11 @@ class Watch:
 class PinWatch:
     """Edges of some `pins` of a robot with exact ticks, from now until `close`. It costs the CPU its fast loop."""
 
-    def __init__(self, robot_id: tuple[int, int], board: Board, pins: set[str]) -> None:
+    def __init__(self, robot_id: tuple[int, int], board: ProcessorBoard, pins: set[str]) -> None:
         self.robot_id = robot_id
         self.board = board
         self.pins = sorted(pins)
-        self.tap = CpuTap(board, lambda: None)
+        self.tap = CpuTap(board if isinstance(board, Board) else None, lambda: None)
         attach(board.cpu, self.tap)
         self._levels = list(self.tap.start)
         self._shown = {pin: self._level(pin) for pin in self.pins}

@@ -1,12 +1,12 @@
 cimport cython
-from miro_sim.world.network cimport Network
+from miro_sim.world.medium cimport Medium
 
 cdef long long CONTROL_PERIOD_TICKS
 
 
 cdef class World:
-    cdef readonly object scenario, seed, image, periods
-    cdef readonly list networks
+    cdef readonly object scenario, seed, image, periods, clock
+    cdef readonly list lines
     cdef public long long tick, index
     cdef public object in_period, stopped, chain, last, bodies, waits, _state, _own, _opened
     cdef public list observers
@@ -14,11 +14,11 @@ cdef class World:
     cpdef step(self)
     cpdef run_to(self, tick)
     cdef int _run_to(self, long long tick) except -1
-    @cython.locals(network=Network)
+    @cython.locals(line=Medium)
     cpdef begin_period(self)
-    @cython.locals(network=Network, next_tick=cython.longlong, action_tick=cython.longlong)
+    @cython.locals(line=Medium, next_tick=cython.longlong, action_tick=cython.longlong)
     cpdef long long rendezvous(self, long long tick) except -1
-    @cython.locals(network=Network)
+    @cython.locals(line=Medium)
     cpdef run_piece(self, long long tick)
-    @cython.locals(network=Network)
+    @cython.locals(line=Medium)
     cpdef end_period(self)

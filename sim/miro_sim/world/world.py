@@ -1,4 +1,4 @@
-"""The world: every robot, radio and pilot of a scenario, moved on by one integer clock.
+"""The world: every robot, radio and pilot of a scenario, or a board on a wire, moved on by one integer clock.
 
 Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
 compute, the station composes its frame. Then everything runs piece by piece from rendezvous to rendezvous: the end of
@@ -13,12 +13,11 @@ from __future__ import annotations
 import hashlib
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from itertools import permutations
 from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_exact.domain import MAX_SEED
 from miro_exact.engine import check_arithmetic
 from miro_exact.state import TICK, Flat, Octets
@@ -27,21 +26,21 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period, RobotPeriod
-from miro_sim.radio.params import LINK_STATES, LinkState
+from miro_sim.radio.params import LinkState
+from miro_sim.scenario.board import MOST_PERIODS, BoardScenario
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.bodies import Bodies, Pair
 from miro_sim.world.conditions import Condition
+from miro_sim.world.device import Device
 from miro_sim.world.events import Event
 from miro_sim.world.machine import Feature
-from miro_sim.world.network import Network
+from miro_sim.world.medium import Medium
+from miro_sim.world.network import Network, networks_of
 from miro_sim.world.robot import Robot
 from miro_sim.world.saved import Identity, opened, sealed
-from miro_sim.world.sight import PixelSight
 from miro_sim.world.waits import Waits
-
-MOST_PERIODS = 1 << 34
-"""Ticks up to then fit into 64 bits, and so do the products that are made of them."""
+from miro_sim.world.wire import Wire
 
 
 class Mark(NamedTuple):
@@ -55,6 +54,9 @@ class Mark(NamedTuple):
 class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
+    `lines` have the devices on them: radio networks with robots, or a wire with a board. A control period of a board
+    has as many ticks as that of the robots; `clock`: ticks per second.
+
     `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network,
     and actions (`do`). Raises ValueError for those that do, that are of no host, or of a network or robot that the
     scenario does not have.
@@ -67,16 +69,16 @@ class World:
         "in_period": "?",
         "stopped": "?",
         "chain": Octets(32),
-        "networks": [Network],
+        "lines": [Medium],
     }
     NOT_STATE = (
-        "scenario", "seed", "image", "periods", "last", "bodies", "waits", "observers", "_state", "_own",
-        "_opened",
+        "scenario", "seed", "image", "periods", "clock", "last", "bodies", "waits", "observers", "_state",
+        "_own", "_opened",
     )  # fmt: skip
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | BoardScenario,
         seed: int,
         image: Image,
         script: Sequence[ScriptItem] | None = None,
@@ -84,32 +86,16 @@ class World:
         check_arithmetic()  # again: a plug-in that was loaded since the start may have changed it
         if not 0 <= seed <= MAX_SEED:
             raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
-        sending = [one for one in script or () if isinstance(one, Transmission)]
-        for sent in sending:
-            if sent.direction != DOWN or not 0 <= sent.network < len(scenario.networks):
-                sender = f"{sent.direction!r} of network {sent.network}"
-                raise ValueError(f"tick {sent.tick}: {sender} is none of the {len(scenario.networks)} hosts")
-        self.scenario = scenario
+        self.scenario: Any = scenario
         self.seed = seed
         self.image = image
         self.periods = scenario.periods
-        self.networks = [
-            Network(
-                network,
-                scenario,
-                index,
-                seed,
-                image,
-                None if script is None else [sent for sent in sending if sent.network == index],
-            )
-            for index, network in enumerate(scenario.networks)
-        ]
-        for one, other in permutations(self.networks, 2):
-            if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
-                one.downlink.overhear(other.downlink)
-        for network in self.networks:
-            if isinstance(network.sight, PixelSight):
-                network.sight.everyone = self.robots
+        self.clock = scenario.clock
+        _check_senders(script or (), 1 if isinstance(scenario, BoardScenario) else len(scenario.networks))
+        if isinstance(scenario, BoardScenario):
+            self.lines: list[Medium] = [Wire(scenario, 0, image, script)]
+        else:
+            self.lines = [*networks_of(scenario, seed, image, script)]
         self.tick = 0
         self.index = 0
         self.in_period = False
@@ -137,24 +123,29 @@ class World:
         return {}
 
     @property
-    def clock(self) -> int:
-        """Ticks per second."""
-        return TICKS_PER_SECOND
-
-    @property
     def finished(self) -> bool:
         """Whether the scenario's duration has passed, or a firmware fault has stopped the run."""
         return self.stopped or self.index >= self.periods
 
     @property
+    def networks(self) -> list[Network]:
+        """The lines that are radio networks."""
+        return [line for line in self.lines if isinstance(line, Network)]
+
+    @property
+    def devices(self) -> list[Device]:
+        """By line and slot."""
+        return [device for line in self.lines for device in line.devices]
+
+    @property
     def robots(self) -> list[Robot]:
-        """By network and slot."""
-        return [robot for network in self.networks for robot in network.robots]
+        """The devices that are robots."""
+        return [device for device in self.devices if isinstance(device, Robot)]
 
     @property
     def faults(self) -> list[FirmwareFault]:
-        """Firmware faults of all robots, in robot order."""
-        return [fault for robot in self.robots for fault in robot.board.faults]
+        """Firmware faults of all devices, in their order."""
+        return [fault for device in self.devices for fault in device.board.faults]
 
     def step(self) -> Period:
         """Runs to the end of the control period that is under way and returns what it left behind."""
@@ -209,20 +200,27 @@ class World:
         then, and indices of no characters.
         """
         at_tick = None if at_tick is None else _whole(at_tick)
-        return self._network(network).inject(data, at_tick, self.tick, tuple(bad_stop))
+        return self._line(network).inject(data, at_tick, self.tick, tuple(bad_stop))
 
     def earliest_tick(self, network: int = 0) -> int:
         """The earliest tick for the first start bit of what is injected now."""
-        return self._network(network).earliest_tick(self.tick)
+        return self._line(network).earliest_tick(self.tick)
 
-    def _network(self, index: int) -> Network:
-        if not 0 <= index < len(self.networks):
-            raise ValueError(f"there is no network {index}; the last one is {len(self.networks) - 1}")
-        return self.networks[index]
+    def _line(self, index: int) -> Medium:
+        if not 0 <= index < len(self.lines):
+            raise ValueError(f"there is no network {index}; the last one is {len(self.lines) - 1}")
+        return self.lines[index]
+
+    def device(self, network: int = 0, slot: int = 0) -> Device:
+        """The device in `slot` of line `network`. Raises ValueError where there is none."""
+        return self._line(network).device(slot)
 
     def robot(self, network: int = 0, slot: int = 0) -> Robot:
         """The robot in `slot` of `network`. Raises ValueError where there is none."""
-        return self._network(network).robot(slot)
+        device = self.device(network, slot)
+        if not isinstance(device, Robot):
+            raise ValueError(f"net{network} is a wire with a board, and no robot")
+        return device
 
     def do(self, action: Action) -> int:
         """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`; returns the tick.
@@ -254,26 +252,17 @@ class World:
         return self.do(RadioState(self.earliest_action_tick, network, state))
 
     def _slot(self, network: int, slot: int | None) -> int:
-        return self._network(network).robots[0].slot if slot is None else slot
+        return self._line(network).first_slot if slot is None else slot
 
     def _announce(self, action: Action, earliest_tick: int) -> None:
-        network = self._network(action.network)
+        line = self._line(action.network)
         _whole(action.tick)
         if not earliest_tick <= action.tick < NEVER_TICK:
             raise ValueError(
                 f"net{action.network}: tick {action.tick} of an action; the earliest is {earliest_tick}"
             )
-        if isinstance(action, RadioState):
-            if action.state not in LINK_STATES:
-                raise ValueError(
-                    f"net{action.network}: a radio {action.state!r}; give {', '.join(LINK_STATES)}"
-                )
-        else:
-            network.robot(action.slot)
-            level = action.level if isinstance(action, Reset) else action.on
-            if level not in (0, 1):
-                raise ValueError(f"net{action.network}/robot{action.slot}: level {level!r}; give 0 or 1")
-        network.actions.announce(action)
+        line.check_action(action)
+        line.actions.announce(action)
 
     # Pieces of a control period, for `run_to` and `waits`
 
@@ -285,55 +274,55 @@ class World:
     def begin_period(self) -> None:
         """The camera frame, unless the period has begun already."""
         if not self.in_period:
-            for network in self.networks:
-                network.begin_period(self.tick)
+            for line in self.lines:
+                line.begin_period(self.tick)
             self.in_period = True
 
     def rendezvous(self, tick: int) -> int:
         """Where everything meets next, going to `tick`."""
         next_tick = min(tick, (self.index + 1) * CONTROL_PERIOD_TICKS)
-        for network in self.networks:
-            if network.actions.waiting:
-                action_tick = network.actions.next_after(self.tick)
+        for line in self.lines:
+            if line.actions.waiting:
+                action_tick = line.actions.next_after(self.tick)
                 next_tick = min(next_tick, action_tick)
         return next_tick
 
     def run_piece(self, tick: int) -> None:
         """Everything on to `tick`, which is no later than the end of the period."""
-        for network in self.networks:
-            if network.actions.waiting:
-                network.actions.do_due(network, self.tick)
-        for network in self.networks:
-            network.send_due(tick)
-        for network in self.networks:
-            network.settle(tick)
+        for line in self.lines:
+            if line.actions.waiting:
+                line.actions.do_due(line, self.tick)
+        for line in self.lines:
+            line.send_due(tick)
+        for line in self.lines:
+            line.settle(tick)
         if self.bodies.pairs:
             self.bodies.begin(self.tick, tick)
         self.tick = tick
-        for network in self.networks:
-            self.stopped = network.run(tick) or self.stopped
-        for network in self.networks:
-            network.hear(tick)
+        for line in self.lines:
+            self.stopped = line.run(tick) or self.stopped
+        for line in self.lines:
+            line.hear(tick)
         if self.bodies.pairs:
             for touch_tick, one, other in self.bodies.look():
                 there = (other.network, other.slot)
                 touch = Event(tick=touch_tick, what="touch", network=one.network, value=one.slot, other=there)
-                self.networks[one.network].log.note(touch)
+                self.lines[one.network].log.note(touch)
 
     def end_period(self) -> None:
         """The records of the period that is over, and its link in the digest chain."""
         wire: list[Transmission] = []
         robots: list[RobotPeriod] = []
-        for network in self.networks:
-            wire += network.end_period()
-            robots += network.seen
+        for line in self.lines:
+            wire += line.end_period()
+            robots += line.seen
         index = self.index
         self.in_period = False
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
         actions: list[Action] = []
-        for network in self.networks:
-            actions += network.actions.take()
+        for line in self.lines:
+            actions += line.actions.take()
         begun = index * CONTROL_PERIOD_TICKS
         self.last = Period(index, begun, tuple(robots), tuple(wire), self.chain.hex(), tuple(actions))
         for observer in self.observers:
@@ -341,35 +330,36 @@ class World:
 
     def mark(self) -> Mark:
         """Where the world is, to go back to within the same period."""
-        records = [network.records() for network in self.networks]
+        records = [line.records() for line in self.lines]
         return Mark(self.state.save(), records, self.bodies.touching)
 
     def go_back(self, mark: Mark) -> None:
         """To where `mark` was given."""
         self.state.load(mark.state)
-        for network, records in zip(self.networks, mark.records, strict=True):
-            network.put_back(records)
+        for line, records in zip(self.lines, mark.records, strict=True):
+            line.put_back(records)
         self.bodies.start_again(mark.touching)
 
     def counters(self) -> dict[str, dict[str, int | None]]:
         """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
-        robots = self.robots
-        cpus = [robot.board.cpu for robot in robots]
-        seen = [network.sight.counts() for network in self.networks]  # by cameras of one kind
+        devices = self.devices
+        cpus = [device.board.cpu for device in devices]
+        seen = [line.vision_counts() for line in self.lines]  # by cameras of one kind
+        links = [line.link_counts() for line in self.lines]
         return {
             "link": {
-                "frames_sent": _total([network.frames_sent for network in self.networks]),
-                "frames_accepted": _total([robot.counter(0) for robot in robots]),
-                "frames_rejected": _total([robot.counter(1) for robot in robots]),
-                "frames_stale": _total([robot.counter(2) for robot in robots]),
-                "bit_errors": _total([network.bit_errors for network in self.networks]),
+                "frames_sent": _total([sent for sent, _ in links]),
+                "frames_accepted": _total([device.counter(0) for device in devices]),
+                "frames_rejected": _total([device.counter(1) for device in devices]),
+                "frames_stale": _total([device.counter(2) for device in devices]),
+                "bit_errors": _total([errors for _, errors in links]),
             },
             "vision": {name: _total([one[name] for one in seen]) for name in seen[0]},
             "firmware": {
                 "instructions": _total([cpu.instructions for cpu in cpus]),
                 "machine_cycles": _total([cpu.cycles for cpu in cpus]),
                 "idle_cycles": _total([cpu.idle_cycles for cpu in cpus]),
-                "faults": _total([robot.board.fault_count for robot in robots]),
+                "faults": _total([device.board.fault_count for device in devices]),
             },
         }
 
@@ -409,21 +399,28 @@ class World:
             raise ValueError(f"the world is at tick {self.tick}, but period {self.index} begins at {begun}")
         if len(self.chain) != (hashlib.sha256().digest_size if self.index else 0):
             raise ValueError(f"the digest has {len(self.chain)} bytes after {self.index} periods")
-        for network in self.networks:
-            network.check_times(begun, self.tick)
+        for line in self.lines:
+            line.check_times(begun, self.tick)
 
     def identity(self) -> Identity:
         """What a saved world must belong to so that this one can load it."""
         if self._own is None:
-            scenario = hashlib.sha256(
-                msgspec.json.encode(without_expectations(self.scenario), order="sorted")
-            ).hexdigest()
+            bare = without_expectations(self.scenario)
+            scenario = hashlib.sha256(msgspec.json.encode(bare, order="sorted")).hexdigest()
             firmware = self.image.sha256 or hashlib.sha256(self.image.code).hexdigest()  # "": not from a file
             self._own = Identity(self.state.tables(), scenario, firmware, self.seed)
         return self._own
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
+
+
+def _check_senders(script: Sequence[ScriptItem], hosts: int) -> None:
+    """Raises ValueError for a transmission of no host."""
+    for item in script:
+        if isinstance(item, Transmission) and (item.direction != DOWN or not 0 <= item.network < hosts):
+            sender = f"{item.direction!r} of network {item.network}"
+            raise ValueError(f"tick {item.tick}: {sender} is none of the {hosts} hosts")
 
 
 def _total(values: Sequence[int | None]) -> int | None:

@@ -58,7 +58,7 @@ def test_what_they_were_made_from_is_told_first_key_by_key(mirotwin, finished, r
     assert lines[1].split() == ["network.0.robot.0.controller.gamma1_per_s", "1.7", "0.5"]
     assert lines[2] == ""
     assert "the recordings differ in control period 1, tick 800800 (0.033367 s), /net0/robot0/control" in err
-    where = "tick 800801 (0.033367 s), control period 1: networks[0].robots[0].pilot"
+    where = "tick 800801 (0.033367 s), control period 1: lines[0].devices[0].pilot"
     assert f"their states differ from {where}" in err
 
 

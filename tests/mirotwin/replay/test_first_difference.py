@@ -23,7 +23,7 @@ from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 from tests.mutants.draw import SOURCE
 
 LAST_LEFT = own_image().symbols.names["_last_left"].address
-BODY = "networks[0].robots[0].board.plant.body"
+BODY = "lines[0].devices[0].board.plant.body"
 
 
 def flipped(address, bit=0):
@@ -54,10 +54,10 @@ def test_a_bit_in_ram_is_named_by_tick_address_and_variable():
     found = first_difference(world(), planted_world(1_234_567, flipped(LAST_LEFT + 1)))
     assert (found.tick, found.period) == (1_234_567, 1)
     (field,) = found.fields
-    assert field.path == f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
+    assert field.path == f"lines[0].devices[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
     assert field.symbol == "_last_left+1"
     assert field.one ^ field.other == 1
-    where = "tick 1234567 (0.051440 s), control period 1: networks[0].robots[0].board.cpu"
+    where = "tick 1234567 (0.051440 s), control period 1: lines[0].devices[0].board.cpu"
     assert str(found).startswith(where)
 
 
@@ -77,7 +77,7 @@ def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick, bit):
     one, other = world(), planted_world(tick, flipped(0xF0, bit))  # deep in the stack
     found = first_difference(one, other)
     assert found.tick == one.tick == other.tick == tick
-    assert [field.path for field in found.fields] == ["networks[0].robots[0].board.cpu.iram[F0h]"]
+    assert [field.path for field in found.fields] == ["lines[0].devices[0].board.cpu.iram[F0h]"]
     assert found.fields[0].symbol == "stack"
 
 
@@ -94,7 +94,7 @@ def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough():
         other.run_to(tick - 10)
         found = first_difference(one, other, tick + 1000, look_ticks)
         assert found.tick == tick
-        assert [field.path for field in found.fields] == ["networks[0].robots[0].board.cpu.a"]
+        assert [field.path for field in found.fields] == ["lines[0].devices[0].board.cpu.a"]
 
 
 def test_worlds_that_differ_from_the_beginning_differ_at_tick_0():
@@ -126,7 +126,7 @@ def test_a_step_that_is_none_is_refused(step):
 def test_its_json_holds_tick_path_and_both_values():
     found = first_difference(world(), planted_world(24_000, flipped(LAST_LEFT + 1)))
     document = found.as_json()
-    path = f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
+    path = f"lines[0].devices[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
     assert document["tick"] == 24_000
     assert document["fields"] == [{"path": path, "symbol": "_last_left+1", "values": [0, 1]}]
 

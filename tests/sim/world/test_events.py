@@ -7,14 +7,14 @@ from miro_protocol.frames import TelemetryFrame, encode, seal
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import Transmission
 from miro_robot.event_log import START_LOST, EventLog
-from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
+from miro_sim.world.events import KEPT, BoardLog, Cursor, Event, HostLog
 
 RECEIVED, SENT, REACHED = 0, 1, 4  # of a board's log, which keeps 2048 events
 CAPACITY = 2048
 
 
 def robot_log():
-    return RobotLog(EventLog(), 0, 2)
+    return BoardLog(EventLog(), 0, 2)
 
 
 def host_log():

@@ -1,0 +1,73 @@
+"""What every board with a processor has: a log of its events, the faults of its firmware, and runs to marks.
+
+What is wired to the processor is a subclass's: `board.py` has the robot's two LM629, `empty_board.py` external RAM.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_exact.clock import CYCLE_TICKS
+from miro_robot.event_log import REACHED, RECEIVED, SENT, EventLog
+from miro_robot.faults import FirmwareFault
+from miro_robot.image import Image, Symbols
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
+
+
+class ProcessorBoard(Bus):
+    """A processor on a board. `faults`: the first of `fault_count`, which is a field of the subclass, in its table."""
+
+    STATE: dict[str, Any] = {"cpu": Cpu}
+    NOT_STATE: tuple[str, ...] = ("log", "faults", "symbols", "stop_on_fault")
+    fault_count = 0
+
+    def __init__(self, stop_on_fault: bool) -> None:
+        self.cpu = Cpu(self)
+        self.log = EventLog()
+        self.stop_on_fault = stop_on_fault
+        self.faults: list[FirmwareFault] = []
+        self.symbols: Symbols | None = None
+
+    def load(self, image: Image) -> None:
+        """Puts the firmware into the CPU's flash; its symbols name the places of faults."""
+        self.cpu.load(image.code, image.used)
+        self.cpu.bound_stack(*image.symbols.stack)
+        self.symbols = image.symbols
+
+    def run(self, until_tick: int) -> int:
+        """Moves everything on to `until_tick`. Returns 0, or the CPU's reason for stopping early."""
+        raise NotImplementedError
+
+    def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
+        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and goes on."""
+        cpu = self.cpu
+        while True:
+            cpu.mark(addresses)
+            try:
+                stopped = self.run(until_tick)
+            finally:
+                cpu.unmark(addresses)
+            if stopped != BREAKPOINT:
+                return stopped
+            self.log.note(REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
+            # Past the marked instruction, at which the next run would end at once.
+            stopped = self.run(cpu.cycles * CYCLE_TICKS + 1)
+            if stopped or cpu.cycles * CYCLE_TICKS >= until_tick:
+                return stopped
+
+    def set_reset(self, level: int) -> None:
+        """The level of the CPU's RST pin from now on, between two instructions: 1 holds it in reset."""
+        raise NotImplementedError
+
+    def set_power(self, on: int) -> None:
+        """Switches the supply off or on, between two instructions."""
+        raise NotImplementedError
+
+    def byte_received(self, value: int, stop: int, tick: int) -> None:
+        """Notes a character that the serial port delivered."""
+        self.log.note(RECEIVED, tick, stop, value)
+
+    def byte_sent(self, value: int, tick: int) -> None:
+        """Notes a character that the serial port sent."""
+        self.log.note(SENT, tick, 0, value)

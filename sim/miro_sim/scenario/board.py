@@ -1,0 +1,55 @@
+"""A run of a board alone: what is done around it, and when it is over."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.board_spec import BoardSpec
+from miro_sim.scenario.terminal import TerminalSpec
+
+MOST_PERIODS = 1 << 34
+"""Ticks up to then fit into 64 bits, and so do the products that are made of them."""
+FASTEST_BIT_TICKS = 32
+"""A bit of the fastest receiver there is: mode 2 with SMOD."""
+
+
+class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`board` on a wire. A tick is a period of its crystal.
+
+    The wire's host is the `terminal`, or who injects, or a script. `bit_ticks`: length of the host's bits, 0 for those
+    of the board's receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before an instruction at
+    one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first firmware fault.
+    Raises ValueError for values out of range.
+    """
+
+    board: BoardSpec = BoardSpec()
+    duration_ticks: int | None = None
+    stop_on_fault: bool = True
+    stop_at: tuple[int, ...] = ()
+    stop_at_end: bool = False
+    bit_ticks: int = 0
+    terminal: TerminalSpec | None = None
+    expect: dict[str, Any] = {}
+
+    def __post_init__(self) -> None:
+        if self.bit_ticks and not FASTEST_BIT_TICKS <= self.bit_ticks <= self.board.crystal_hz:
+            limits = f"{FASTEST_BIT_TICKS}..{self.board.crystal_hz}"
+            raise ValueError(f"a bit of {self.bit_ticks} ticks is outside {limits}")
+
+    @property
+    def name(self) -> str:
+        return self.board.name
+
+    @property
+    def clock(self) -> int:
+        return self.board.crystal_hz
+
+    @property
+    def periods(self) -> int:
+        """Digest periods of a run, which ends by itself with the one in which its duration does."""
+        if self.duration_ticks is None:
+            return MOST_PERIODS
+        return max(1, -(-self.duration_ticks // CONTROL_PERIOD_TICKS))

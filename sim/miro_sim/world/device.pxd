@@ -1,0 +1,16 @@
+from miro_robot.processor_board cimport ProcessorBoard
+
+cdef long long CYCLE_TICKS
+cdef int TRUE
+
+
+cdef class Device:
+    cdef readonly ProcessorBoard board
+    cdef readonly object network, slot, log
+    cdef readonly list counter_addresses
+    cdef public tuple marks
+    cdef public list asked
+
+    cpdef int run(self, long long tick) except -1
+    cpdef long long sample_tick(self) except -1
+    cpdef counter(self, int index)

@@ -1,0 +1,83 @@
+"""A device on a line of the world: a board with a processor, how it runs, and what a wait looks for on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from miro_exact.clock import CYCLE_TICKS
+from miro_robot.event_log import TRUE
+from miro_robot.image import Image
+from miro_robot.processor_board import ProcessorBoard
+from miro_sim.world.events import BoardLog
+
+COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
+
+
+class Device:
+    """`network` and `slot` name it in records: the line, and its place there.
+
+    `marks`, `asked`: addresses and predicates of a wait.
+    """
+
+    STATE: dict[str, Any] = {"board": ProcessorBoard}
+    NOT_STATE: tuple[str, ...] = ("network", "slot", "log", "marks", "asked", "counter_addresses")
+
+    def __init__(self, board: ProcessorBoard, network: int, slot: int, image: Image) -> None:
+        self.board = board
+        self.network = network
+        self.slot = slot
+        self.log = BoardLog(board.log, network, slot)
+        self.marks: tuple[int, ...] = ()
+        self.asked: list[tuple[Callable[[Any], object], str]] = []
+        self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
+
+    def run(self, tick: int) -> int:
+        """Runs the board to `tick`, watching out for what a wait asked for; not 0 when it stopped early."""
+        if self.asked:
+            return self._run_asking(tick)
+        if self.marks:
+            return self.board.run_to_any(self.marks, tick)
+        return self.board.run(tick)
+
+    def _run_asking(self, tick: int) -> int:
+        """The same in steps, with the predicates asked after each."""
+        board = self.board
+        stopped = 0
+        while not stopped and board.cpu.cycles * CYCLE_TICKS < tick:
+            now = board.cpu.cycles * CYCLE_TICKS
+            sample_tick = self.sample_tick()
+            step_tick = now + 1 if any(at == "instruction" for _, at in self.asked) else sample_tick
+            step_tick = min(step_tick, tick)
+            stopped = board.run_to_any(self.marks, step_tick)
+            reached = board.cpu.cycles * CYCLE_TICKS if step_tick == now + 1 else step_tick
+            for predicate, at in self.asked:
+                if (at == "instruction" or step_tick == sample_tick) and predicate(self):
+                    board.log.note(TRUE, reached, 0, 0)
+        return stopped
+
+    def sample_tick(self) -> int:
+        """The next tick at which predicates are asked that are not asked after each instruction."""
+        raise NotImplementedError
+
+    def counter(self, index: int) -> int | None:
+        """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
+        address = self.counter_addresses[index]
+        if address is None:
+            return None
+        cpu = self.board.cpu
+        return cpu.peek_iram(address) | cpu.peek_iram(address + 1) << 8
+
+    def records(self) -> list[Any]:
+        """What observers take away and no snapshot holds, to go back to with `put_back`."""
+        return [list(self.board.faults), self.board.log.end]
+
+    def put_back(self, records: list[Any]) -> None:
+        """Takes back what `records` gave; nothing but more of the same may have happened since."""
+        self.board.faults[:] = records[0]
+        self.board.log.cut(records[1])
+
+
+def _iram_address(image: Image, name: str) -> int | None:
+    symbol = image.symbols.find(name)
+    return symbol.address if symbol is not None and symbol.space == "iram" else None

@@ -1,0 +1,205 @@
+"""What devices and a PC hear each other by: the base class of the radio network and of the wire.
+
+     outbox ──> send ──> devices' RXD      the host's transmissions, as soon as they must be known
+PC <── hear <─────────── devices' TXD      what the devices sent
+     actions ──────────> RST, supply       what somebody does to the devices
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
+from miro_exact.state import TICK, Rows
+from miro_protocol.actions import Action, RadioState, Reset, ScriptItem
+from miro_protocol.decoder import Symbol
+from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
+from miro_sim.periods import RobotPeriod
+from miro_sim.world.actions import SETTLE_TICKS, Actions
+from miro_sim.world.device import Device
+from miro_sim.world.events import HostLog
+from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
+
+LONGEST_TRANSMISSION_TICKS = 1 << 40
+"""Twelve hours: no saved transmission ends later than so long after now."""
+
+
+class Medium:
+    """Line `index` of a world, with `devices` in the order of their slots.
+
+    `sent`, `seen`, `heard`: the host's transmissions, robots, and characters from the devices, in the period that is
+    under way. `latency`: ticks from the host to the devices.
+    """
+
+    STATE: dict[str, Any] = {
+        "devices": [Device],
+        "outbox": Outbox,
+        "actions": Actions,
+        "heard": Rows(1 << 20, "B", "?", TICK),
+    }
+    NOT_HASHED: tuple[str, ...] = ("outbox", "actions", "heard")
+    """They depend on when input was announced and where the world stopped."""
+    NOT_STATE: tuple[str, ...] = ("index", "host", "latency", "log", "sent", "seen")
+
+    def __init__(
+        self, index: int, host: str, devices: list[Any], outbox: Outbox, log: HostLog, latency: int = 0
+    ) -> None:
+        self.index = index
+        self.host = host
+        self.devices = devices
+        self.latency = latency
+        self.actions = Actions(index)
+        self.outbox = outbox
+        self.log = log
+        self.heard: list[Symbol] = []
+        self.sent: list[Transmission] = []
+        self.seen: list[RobotPeriod] = []
+
+    @property
+    def first_slot(self) -> int:
+        """That of its first device."""
+        return int(self.devices[0].slot)
+
+    def device(self, slot: int) -> Device:
+        """The device in `slot`. Raises ValueError where there is none."""
+        for device in self.devices:
+            if device.slot == slot:
+                found: Device = device
+                return found
+        there = ", ".join(str(device.slot) for device in self.devices)
+        raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
+
+    # Pieces of a control period
+
+    def begin_period(self, tick: int) -> None:
+        """What happens when a control period begins."""
+        self.sent = []
+
+    def send_due(self, rendezvous_tick: int) -> None:
+        """Sends what may come up before the tick up to which the line is settled next, and nothing else: what may
+        still be announced at the rendezvous is not in the state there, whenever it was announced.
+        """
+        for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS - self.latency):
+            self.send(sent)
+            self.sent.append(sent)
+            self.log.note(sent)
+
+    def send(self, sent: Transmission) -> None:
+        """Puts a transmission on the line."""
+        raise NotImplementedError
+
+    def settle(self, rendezvous_tick: int) -> None:
+        """All lines have sent: RXD is known up to where the devices stop next."""
+        raise NotImplementedError
+
+    def run(self, tick: int) -> bool:
+        """Runs every device to `tick`, one after the other; true when one of them stops the world."""
+        raise NotImplementedError
+
+    def hear(self, tick: int) -> None:
+        """The PC hears what the devices sent up to `tick`."""
+        raise NotImplementedError
+
+    def end_period(self) -> list[Transmission]:
+        """What the host sent and what it heard in the period that is over."""
+        raise NotImplementedError
+
+    # Input
+
+    def free_tick(self) -> int:
+        """When the transmitter is free of all that has been sent."""
+        raise NotImplementedError
+
+    def earliest_tick(self, now: int) -> int:
+        """The earliest first start bit of characters that are injected at tick `now`."""
+        return max(0, now + SETTLE_TICKS + self.outbox.lead_ticks - self.latency)
+
+    def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
+        """See `World.inject`."""
+        earliest = self.earliest_tick(now)
+        if not 0 < len(data) <= LONGEST_BYTES:
+            raise ValueError(f"net{self.index}: {len(data)} characters; give 1 to {LONGEST_BYTES}")
+        if at_tick is not None and not earliest <= at_tick <= LATEST_TICK:
+            limits = f"the earliest is {earliest}, the latest {LATEST_TICK} (a day)"
+            raise ValueError(f"net{self.index}: tick {at_tick} is out of range; {limits}")
+        free_tick = self.free_tick()
+        tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
+        try:
+            check_bad_stop(bad_stop, len(data))
+            self.outbox.inject(Transmission(tick, DOWN, bytes(data), self.index, bad_stop), free_tick)
+        except ValueError as error:
+            raise ValueError(f"net{self.index}: {error}") from None
+        return tick
+
+    def check_action(self, action: Action) -> None:
+        """Raises ValueError for an action that cannot be done here."""
+        if isinstance(action, RadioState):
+            raise ValueError(f"net{self.index}: is a wire, which has no radio")
+        self.device(action.slot)
+        level = action.level if isinstance(action, Reset) else action.on
+        if level not in (0, 1):
+            raise ValueError(f"net{self.index}/robot{action.slot}: level {level!r}; give 0 or 1")
+
+    def set_radio(self, state: int, up: bool) -> None:
+        """Another state of the link, up or down; only a radio has one."""
+
+    # For the summary
+
+    def link_counts(self) -> tuple[int, int]:
+        """Transmissions of the host, and bits that came out wrong on either way, so far."""
+        raise NotImplementedError
+
+    def vision_counts(self) -> dict[str, int]:
+        """What the camera of this network missed; nothing without a camera."""
+        return {}
+
+    # Going back, and loading
+
+    def records(self) -> list[Any]:
+        """What observers take away and no snapshot holds, to go back to with `put_back`."""
+        devices = [device.records() for device in self.devices]
+        return [list(self.sent), list(self.actions.done), self.log.end, devices]
+
+    def put_back(self, records: list[Any]) -> None:
+        """Takes back what `records` gave; nothing but more of the same may have happened since."""
+        sent, done, log_end, devices = records
+        self.sent = list(sent)
+        self.actions.done = list(done)
+        self.log.cut(log_end)
+        for device, one in zip(self.devices, devices, strict=True):
+            device.put_back(one)
+
+    def check_times(self, begun_tick: int, tick: int) -> None:
+        """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
+
+        A part that is far behind would need hours to catch up.
+        """
+        if self.actions.next_tick < tick - SETTLE_TICKS:
+            raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
+        self.actions.check([device.slot for device in self.devices])
+        free_tick = self.free_tick()
+        if free_tick > tick + LONGEST_TRANSMISSION_TICKS:
+            raise ValueError(f"the transmitter is busy until tick {free_tick}, at tick {tick}")
+        if self.outbox.waiting and self.outbox.waiting[0].sent.tick < free_tick:
+            raise ValueError(f"characters wait, but the transmitter is busy until tick {free_tick}")
+        for device in self.devices:
+            cpu = device.board.cpu
+            if not begun_tick - CONTROL_PERIOD_TICKS <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
+                raise ValueError(f"a CPU is at cycle {cpu.cycles}, at tick {tick}")
+
+    def check_rxd(self, settled_tick: int) -> None:
+        """Raises ValueError unless RXD of all devices is settled up to there, with no edge beyond."""
+        for device in self.devices:
+            rxd = device.board.cpu.rxd
+            if rxd.settled_tick != settled_tick or rxd.last_tick() >= max(settled_tick, 1):
+                raise ValueError(
+                    f"RXD is settled up to tick {rxd.settled_tick}, the radio up to {settled_tick}"
+                )
+
+
+def sent_to(index: int, script: Sequence[ScriptItem] | None) -> list[Transmission] | None:
+    """The transmissions of a script on line `index`."""
+    if script is None:
+        return None
+    return [item for item in script if isinstance(item, Transmission) and item.network == index]

@@ -1,0 +1,164 @@
+"""A wire between a PC, or a terminal, and a board alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
+from miro_exact.state import TICK
+from miro_protocol.actions import ScriptItem
+from miro_protocol.transmission import UP, Transmission, check_bad_stop, of_symbols
+from miro_robot.empty_board import EmptyBoard
+from miro_robot.image import Image
+from miro_robot.mcs51.cpu import STOPPED
+from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
+from miro_sim.world.actions import SETTLE_TICKS
+from miro_sim.world.device import Device
+from miro_sim.world.events import HostLog
+from miro_sim.world.medium import Medium, sent_to
+from miro_sim.world.outbox import Outbox
+from miro_sim.world.terminal import Terminal
+
+_STOP = CHARACTER_BITS - 1
+
+
+class BoardAlone(Device):
+    """A board with nothing around it."""
+
+    NOT_STATE = ("sample_ticks",)
+
+    def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
+        Device.__init__(self, board, network, 0, image)
+        self.board: EmptyBoard
+        self.sample_ticks = board.spec.crystal_hz // 1000
+
+    def sample_tick(self) -> int:
+        """Every millisecond."""
+        return (self.board.cpu.cycles * CYCLE_TICKS // self.sample_ticks + 1) * self.sample_ticks
+
+    def __repr__(self) -> str:
+        return f"BoardAlone({self.board!r})"
+
+
+class Wire(Medium):
+    """Line `index` with one board on it. `script`: what the host sends; without it and a terminal, who injects.
+
+    The PC hears a character when its stop bit begins.
+    """
+
+    STATE = {"terminal": Terminal, "bit_ticks": ("q", 0, 1 << 40), "busy_tick": TICK, "transmissions": TICK}
+    NOT_HASHED = ("bit_ticks",)
+    NOT_STATE = ("character_ticks",)
+
+    def __init__(
+        self, scenario: BoardScenario, index: int, image: Image, script: Sequence[ScriptItem] | None
+    ) -> None:
+        stops = (scenario.stop_on_fault, scenario.stop_at, scenario.stop_at_end)
+        board = EmptyBoard(scenario.board, image, *stops)
+        board.sent = self._sent
+        sending = sent_to(index, script)
+        self.terminal = None if scenario.terminal is None else Terminal(scenario.terminal, board)
+        host = "script" if sending is not None else "silent" if self.terminal is None else "terminal"
+        self.bit_ticks = scenario.bit_ticks  # 0: not known yet
+        self.busy_tick = 0
+        self.transmissions = 0
+        self.character_ticks = 0  # of the last one that the board sent
+        outbox = Outbox(0, index, CHARACTER_BITS * scenario.bit_ticks)
+        log = HostLog(index, lambda tick: tick, 0)
+        Medium.__init__(self, index, host, [BoardAlone(board, index, image)], outbox, log)
+        if sending and not self.bit_ticks:
+            raise ValueError(f"net{index}: how long a bit of the script is must be given (bit_ticks)")
+        if self.terminal is not None and script:
+            raise ValueError(f"net{index}: a terminal sends; no script can")
+        for sent in sending or ():
+            check_bad_stop(sent.bad_stop, len(sent.data))
+            self.outbox.inject(sent, 0)
+
+    @property
+    def board(self) -> EmptyBoard:
+        board: EmptyBoard = self.devices[0].board
+        return board
+
+    def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
+        """See `World.inject`."""
+        if self.terminal is not None:
+            raise ValueError(f"net{self.index}: a terminal sends; nothing else can")
+        if not self.bit_ticks:
+            self.bit_ticks = self.board.cpu.peripherals.bit_ticks()
+            self.outbox.character_ticks = CHARACTER_BITS * self.bit_ticks
+        if not self.bit_ticks:
+            raise ValueError(f"net{self.index}: the receiver is off, and no bit_ticks are given")
+        return Medium.inject(self, data, at_tick, now, bad_stop)
+
+    def send(self, sent: Transmission) -> None:
+        """Start bit, eight data bits, stop bit; a bad one is space for three quarters of a bit."""
+        bit, rxd, tick = self.bit_ticks, self.board.cpu.rxd, sent.tick
+        for place, value in enumerate(sent.data):
+            for number, level in enumerate((0, *(value >> data_bit & 1 for data_bit in range(8)))):
+                rxd.append(tick + number * bit, level)
+            stop_tick = tick + _STOP * bit
+            if place in sent.bad_stop:
+                rxd.append(stop_tick, 0)
+                stop_tick += 3 * bit // 4
+            rxd.append(stop_tick, 1)
+            tick += CHARACTER_BITS * bit
+        self.busy_tick = tick
+        self.transmissions += 1
+
+    def free_tick(self) -> int:
+        return self.busy_tick
+
+    def settle(self, rendezvous_tick: int) -> None:
+        if self.terminal is None:
+            self.board.cpu.rxd.settled_tick = rendezvous_tick + SETTLE_TICKS
+
+    def run(self, tick: int) -> bool:
+        """The board to `tick`, in pieces from one look of the terminal to the next."""
+        device, board, terminal = self.devices[0], self.board, self.terminal
+        if terminal is None:
+            return bool(device.run(tick) == STOPPED)
+        cpu = board.cpu
+        until_cycle = -(-tick // CYCLE_TICKS)
+        while cpu.cycles < until_cycle:
+            until_tick = tick
+            if not board.dead:  # nothing that comes in can make it go on
+                if cpu.cycles >= terminal.next_feed:
+                    terminal.feed()
+                until_tick = min(tick, CYCLE_TICKS * terminal.next_feed)
+            if device.run(until_tick) == STOPPED:
+                return True
+        return False
+
+    def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
+        """The board has sent a character of so many `bits`, whose stop bit begins at `tick`."""
+        if self.terminal is not None:
+            self.terminal.input.heard(value, tick)
+        self.character_ticks = (bits + 1) * bit_ticks
+        self.heard.append((value, True, max(0, tick - bits * bit_ticks)))
+        self.log.note_heard([(value, True, tick)])
+
+    def hear(self, tick: int) -> None:
+        """Everything was heard while the board ran."""
+
+    def end_period(self) -> list[Transmission]:
+        found = [*self.sent, *of_symbols(self.heard, UP, self.index, self.character_ticks)]
+        self.heard = []
+        return found
+
+    def link_counts(self) -> tuple[int, int]:
+        return self.transmissions, 0
+
+    def check_times(self, begun_tick: int, tick: int) -> None:
+        Medium.check_times(self, begun_tick, tick)
+        rxd = self.board.cpu.rxd
+        settled_tick = rxd.settled_tick
+        if self.terminal is None and settled_tick != tick + SETTLE_TICKS and tick:
+            raise ValueError(f"RXD is settled up to tick {settled_tick}, at tick {tick}")
+        if self.terminal is None and rxd.last_tick() > self.busy_tick:
+            raise ValueError(f"RXD changes at tick {rxd.last_tick()}, after all that was sent")
+
+    def after_load(self) -> None:
+        """Raises ValueError for bits that no receiver can follow."""
+        if self.bit_ticks and self.bit_ticks < FASTEST_BIT_TICKS:
+            raise ValueError(f"a bit has {self.bit_ticks} ticks")
+        self.outbox.character_ticks = CHARACTER_BITS * self.bit_ticks
