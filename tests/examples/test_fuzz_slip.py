@@ -100,7 +100,7 @@ def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
     from mirotwin.runs.bare_case import rerun_bare_case
 
     _, again = rerun_bare_case(path, images["dimmer"], CHECK)
-    assert again.failure is not None
+    assert again.failures
     assert again.texts[0].startswith("fails as recorded: ")
     assert again.code == (3 if "no_fault" in path.stem else 1)
     _, cured = rerun_bare_case(path, images["mended"], CHECK)
