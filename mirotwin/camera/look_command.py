@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_sim.scenario.file import load
-from miro_sim.world.robot import Robot
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, command_of
@@ -28,10 +26,9 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import check_new, whole_file
-from mirotwin.shell.program import complain, show_line, tell_notes
+from mirotwin.shell.program import report_lines, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
-from mirotwin.shell.verdicts import exit_code
 
 
 class LookOptions(Options, frozen=True, kw_only=True):
@@ -82,18 +79,11 @@ def look(options: LookOptions) -> int:
                 world.step()
                 bar.to(world.index)
         if world.finished:
-            return _told(world.robots)
+            return report_lines(fault_lines(world.robots))
         drawn: list[bytes] = []
         view.shows.append(lambda view: drawn.append(view.png(options.plain)))
         world.begin_period()
     with whole_file(out, "--out") as staging:
         staging.write_bytes(drawn[0])
     show_line(f"{out}")
-    return _told(world.robots)
-
-
-def _told(robots: Sequence[Robot]) -> int:
-    """Says what the firmware did wrong; the exit code."""
-    faults = list(fault_lines(robots))
-    complain(*(text for _, text in faults))
-    return exit_code(*(verdict for verdict, _ in faults))
+    return report_lines(fault_lines(world.robots))

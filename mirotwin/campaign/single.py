@@ -6,17 +6,16 @@ A process keeps images, and scenarios with their settings, so that a run costs l
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 
 from miro_exact.bad_input import BadInput
-from miro_sim.periods import Period, RobotId
+from miro_sim.periods import RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.worker import RunOutcome, Work
-from mirotwin.recording.recorder import Recorder, source_of
+from mirotwin.recording.recorder import source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
@@ -69,18 +68,11 @@ def _run(job: Work) -> RunOutcome:
     run = Run(spec)
     tracks = Tracks(delay_frames=text.scenario.camera.delay_frames)
     began_s = perf_counter()
-    with ExitStack() as files:
-        recorder = None
-        if job.recording:
-            stream = files.enter_context(Path(job.recording).open("wb"))
-            recorder = files.enter_context(Recorder(stream, source_of(text, run.world)))
-
-        def keep(period: Period) -> None:
-            tracks.add(period)
-            if recorder is not None:
-                recorder.write_theories(tracks.theories())
-
-        run.drive(recorder, on_period=keep)
+    if job.recording:
+        with Path(job.recording).open("wb") as stream:
+            run.record(stream, source_of(text, run.world), tracks)
+    else:
+        run.drive(on_period=tracks.add)
     wall_s = perf_counter() - began_s
     run.finish()
     result = run.result()

@@ -32,10 +32,9 @@ from mirotwin.shell.options import (
     plain_parameters,
     refuse_steps,
 )
-from mirotwin.shell.program import complain, tell_notes
+from mirotwin.shell.program import complain, report_lines, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
-from mirotwin.shell.verdicts import exit_code
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
@@ -126,9 +125,7 @@ def look(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
     if isinstance(run, RobotRun):
-        faults = list(fault_lines(run.world.robots))
-        complain(*(text for _, text in faults))
-        return exit_code(*(verdict for verdict, _ in faults))
+        return report_lines(fault_lines(run.world.robots))
     assert isinstance(run, BareRun)
     return report(run.machine, run.ended, options.bare)
 
@@ -151,7 +148,7 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         raise BadInput(options.subject, "", f"is no image, {option} does not apply to it", "leave it out")
     subject = options.subject
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
-    periods = job = None
+    end_tick, job = None, None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         text = load(subject, options.settings)
         tell_notes(text.notes)
@@ -163,11 +160,11 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         _refuse(options, "a recording or stream, which has its seed", "seed")
         job = load_job(subject, options.firmware, options.settings)
         complain(*job.notes)
-        periods = job.recorded[-1].index + 1 if job.recorded else job.case_periods
+        end_tick = job.end_tick
         with plain_parameters(subject):
             world = job.spec.world()
     network, index = _which_robot(world, options)
-    return RobotRun(world, network, index, periods, job)
+    return RobotRun(world, network, index, end_tick, job)
 
 
 def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, refuse_given
 from mirotwin.replay.text import SHOWN, difference_lines, difference_tables, frame_tables, response_table
 from mirotwin.runs.job import Job, load_job
-from mirotwin.runs.result import Result, expectation_lines, expectations_text, fault_lines
+from mirotwin.runs.result import Result, expectations_text
 from mirotwin.runs.run import Run
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
@@ -202,17 +202,14 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
             show(table)
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
-    complain(*(text for _, text in expectation_lines(again.checks)))
-    failed = exit_code(again.checks.verdict())
+    result = again.result()
+    complain(*result.texts)
     if options.shows and says_anything(job.spec.scenario):
-        show(expectations_text(again.checks.verdicts()))
-    wrong = list(fault_lines(again.world.robots, again.tick))
-    complain(*(text for _, text in wrong))
-    faults = exit_code(*(verdict for verdict, _ in wrong))
+        show(expectations_text(result.expectations))
     differs = _report_difference(found, recorded, again.periods, compare)
     if found.differences and options.shows:
         show(debug_line(job.spec.origin, options.firmware, found.differences[0].tick))
-    code = (faults or failed) if options.expects else (differs or faults or failed)
+    code = result.code if options.expects else differs or result.code
     if compare.as_json:
         print_json(_document(job, again, found, options) | {"exit_code": code})
     return code

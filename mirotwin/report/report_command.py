@@ -177,7 +177,7 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
         notes=[*([_played_with(job.spec.image, "case")] if job.case.changed else []), *_said(job, again)],
         name=(name or Path(job.spec.origin).absolute().parent.name) if text else "",
         report=text,
-        verdict="failed" if text and not again.failures else "",
+        verdict="failed" if text and not again.result.failures else "",
     )
 
 
@@ -197,9 +197,9 @@ def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
 def _said(job: Job, again: WatchedRun) -> list[str]:
     """What became of a case's verdict."""
     verdict = job.case.verdict
-    if not verdict or verdict in map(str, again.failures):
+    if not verdict or verdict in map(str, again.result.failures):
         return []
-    now = f"; now: {again.failures[0]}" if again.failures else " does not fail any more"
+    now = f"; now: {again.result.failures[0]}" if again.result.failures else " does not fail any more"
     return [f"What was recorded{now}. Recorded: {verdict}"]
 
 

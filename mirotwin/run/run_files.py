@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -145,31 +146,19 @@ class RunFiles:
         return summary
 
     def _record(self, bar: ProgressBar, hold: Hold) -> None:
-        began_s = time.perf_counter()
-        try:
-            with (
-                self.folder.part(RECORDING).open("wb", buffering=0) as stream,
-                Recorder(stream, self.source, hold) as recorder,
-            ):
-                recorder.flush()
-                self._simulate(recorder, bar, hold)
-        finally:
-            self._wall_s = time.perf_counter() - began_s
+        def begun(recorder: Recorder) -> None:
+            for view in self.views:
+                view.shows.append(partial(_keep_frame, recorder))
 
-    def _simulate(self, recorder: Recorder, bar: ProgressBar, hold: Hold) -> None:
-        def keep(period: Period) -> None:
-            self.tracks.add(period)
-            recorder.write_theories(self.tracks.theories())
-            recorder.flush_if_due()
+        def progress(period: Period) -> None:
             bar.to(self.tracks.count)
 
-        def keep_frame(view: View) -> None:
-            recorder.write_image(view.network, view.tick, view.png(plain=True))
-
-        for view in self.views:
-            view.shows.append(keep_frame)
-        with bar, hold.released():
-            self.run.drive(recorder, self.source.record == "full", keep, self.move)
+        began_s = time.perf_counter()
+        try:
+            with self.folder.part(RECORDING).open("wb", buffering=0) as stream, bar:
+                self.run.record(stream, self.source, self.tracks, hold, begun, progress, self.move)
+        finally:
+            self._wall_s = time.perf_counter() - began_s
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick
@@ -205,6 +194,10 @@ class RunFiles:
             f"the run broke off after {amount(self.tracks.count, 'control period')},"
             f" recorded in {self.folder.path / part_name(RECORDING)}"
         )
+
+
+def _keep_frame(recorder: Recorder, view: View) -> None:
+    recorder.write_image(view.network, view.tick, view.png(plain=True))
 
 
 def digest_in(folder: Path) -> str:

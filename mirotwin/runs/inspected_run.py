@@ -46,8 +46,8 @@ class Run:
 class RobotRun(Run):
     """The robot in place `index` of network `network` (slot order) of a world, which runs as a whole.
 
-    `periods`: after so many control periods it is over (default: as many as the scenario has). `job`: what it repeats,
-    if anything.
+    `end_tick`: it is over with the control period that goes on there (default: with the scenario). `job`: what it
+    repeats, if anything.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class RobotRun(Run):
         world: World,
         network: int = 0,
         index: int = 0,
-        periods: int | None = None,
+        end_tick: int | None = None,
         job: Job | None = None,
     ) -> None:
         board = world.networks[network].robots[index].board
-        end_tick = (periods or world.periods) * CONTROL_PERIOD_TICKS
-        super().__init__(board.cpu, world.image, end_tick, TICKS_PER_SECOND, board)
+        periods = world.periods if end_tick is None else -(-end_tick // CONTROL_PERIOD_TICKS)
+        super().__init__(board.cpu, world.image, periods * CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, board)
         self.world = world
         self.network = network
         self.index = index

@@ -212,11 +212,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
             return self.case.end_tick or scenario.end_tick
         return min(self.recorded[-1].index + 1, scenario.periods) * CONTROL_PERIOD_TICKS
 
-    @property
-    def case_periods(self) -> int | None:
-        """After so many control periods a case is over; None: with its scenario."""
-        return -(-self.case.end_tick // CONTROL_PERIOD_TICKS) or None
-
     def check_case(self) -> None:
         """Raises BadInput where the scenario does not expect the check that the case is about."""
         name = self.case.verdict.partition(":")[0]

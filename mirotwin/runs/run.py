@@ -8,8 +8,8 @@ run.result()                 its verdict and what there is to say
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager, nullcontext
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
 
@@ -19,10 +19,12 @@ from miro_protocol.actions import ScriptItem
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
-from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.recorder import Recorder, RunSource
+from mirotwin.recording.track import Tracks
 from mirotwin.runs import runner
 from mirotwin.runs.result import Result, expectation_lines, fault_lines
 from mirotwin.runs.spec import RunSpec, silent_scenario
+from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
@@ -71,6 +73,33 @@ class Run:
         if move is None and self.player is not None:
             move = self.player.run
         runner.run(self.world, recorder, full, on_period, move)
+
+    def record(
+        self,
+        stream: BinaryIO,
+        source: RunSource,
+        tracks: Tracks,
+        hold: Hold | None = None,
+        begun: Callable[[Recorder], object] = lambda recorder: None,
+        on_period: Callable[[Period], object] = lambda period: None,
+        move: Callable[[], object] | None = None,
+    ) -> None:
+        """The same, recorded to `stream` and in `tracks`, flushed several times a second. `begun` gets the recorder.
+
+        `hold` holds signals, except while the world is moved.
+        """
+
+        def keep(period: Period) -> None:
+            tracks.add(period)
+            recorder.write_theories(tracks.theories())
+            recorder.flush_if_due()
+            on_period(period)
+
+        with Recorder(stream, source, hold) as recorder:
+            recorder.flush()
+            begun(recorder)
+            with nullcontext() if hold is None else hold.released():
+                self.drive(recorder, source.record == "full", keep, move)
 
     def play(self, progress: Callable[[int], object] = lambda tick: None) -> Run:
         """To its end, which may be within a control period. `progress` is told the tick.

@@ -22,7 +22,15 @@ import click
 
 from miro_exact.bad_input import BadInput, did_you_mean, one_line, shortened
 from miro_exact.engine import EngineError, select
-from mirotwin.shell.verdicts import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED, SIGNALLED, SIGPIPE
+from mirotwin.shell.verdicts import (
+    BAD_INPUT,
+    DONE,
+    INTERNAL_ERROR,
+    INTERRUPTED,
+    SIGNALLED,
+    SIGPIPE,
+    exit_code,
+)
 
 
 def show_traceback(error: BaseException) -> None:
@@ -52,6 +60,13 @@ def complain(*messages: str) -> None:
 def tell_notes(notes: Iterable[str]) -> None:
     """What the settings of a scenario left out, on stderr."""
     complain(*(f"note: {note}" for note in notes))
+
+
+def report_lines(said: Iterable[tuple[str, str]]) -> int:
+    """Says on stderr what speaks for which verdict; returns the exit code of all together."""
+    lines = list(said)
+    complain(*(text for _, text in lines))
+    return exit_code(*(verdict for verdict, _ in lines))
 
 
 def show_line(text: str) -> None:

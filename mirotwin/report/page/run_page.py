@@ -71,7 +71,7 @@ def run_page(material: Material) -> bytes:
     tracks = tracks_of(material.periods, steered, delay_frames)
     add_samples(tracks, material.extras.samples)
     marks = [mark for mark in again.marks if tracks.shows(mark.start_tick)]
-    ticks = [*(one.tick for one in again.failures), *(fault.tick for _, _, fault in again.faults)]
+    ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
     figures = figures_of(tracks, marks, list(filter(tracks.shows, ticks)))
     kinds = {mark.kind for mark in marks}
     values = {
@@ -141,14 +141,17 @@ def _places(postures: Postures) -> list[tuple[float, float]]:
 def _verdict(material: Material) -> tuple[str, str]:
     """A word for the badge, and how many checks it comes from."""
     again, steps = material.again, material.steps
-    verdicts = [*again.verdicts, *(steps.expectations if steps else ())]
+    verdicts = [*again.result.expectations, *(steps.expectations if steps else ())]
     failed = [one for one in verdicts if one.verdict == "failed"]
     count = amount(len(verdicts), "check")
     of = f"{len(failed)} of {count} failed" if failed else count
     if material.verdict and not again.faults:
         return material.verdict, f"no check, but what its report says; {count}"
-    parts: list[str] = [again.verdict, *(one.verdict for one in verdicts[len(again.verdicts) :])]
-    parts += [*("fault" for _ in again.faults), *("failed" for _ in (steps.failed if steps else ""))]
+    parts = [again.result.verdict]
+    if again.faults:
+        parts.append("fault")
+    if steps is not None:
+        parts += ["failed" if steps.failed else "passed", *(one.verdict for one in steps.expectations)]
     verdict = judge(parts)
     if material.extras.broken_off and verdict not in ("fault", "failed"):
         return "broken off", of

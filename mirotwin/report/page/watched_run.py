@@ -17,24 +17,21 @@ from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period
 from mirotwin.report.page.link import LinkLog, LinkMark
 from mirotwin.runs.job import Job
+from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run, replaying
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.shell.verdicts import Verdict
-from mirotwin.verify.checks.interface import Expectation, Failure
 
 
 class WatchedRun(msgspec.Struct, frozen=True):
-    """Its result. `verdict`: of all checks; `faults`: network, slot and fault. `image` has its debug files where they
-    are; `robot`: whose processor was watched.
+    """`digest`: at the end of the last of `periods`; `faults`: network, slot, fault. `image` has its debug files where
+    they are; `robot`: whose processor was watched.
     """
 
+    result: Result
     periods: list[Period]
     digest: str
-    verdict: Verdict
-    verdicts: tuple[Expectation, ...]
-    failures: list[Failure]
     faults: list[tuple[int, int, FirmwareFault]]
     marks: list[LinkMark]
     image: Image
@@ -61,11 +58,9 @@ def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
     image = with_debug_files(world.image)
     place = world.networks[0].index, world.networks[0].robots[0].slot
     return WatchedRun(
+        result=again.result(),
         periods=again.periods,
         digest=world.digest,
-        verdict=again.checks.verdict(),
-        verdicts=again.checks.verdicts(),
-        failures=again.failures,
         faults=[(robot.network, robot.slot, one) for robot in world.robots for one in robot.board.faults],
         marks=log.marks(),
         image=image,
