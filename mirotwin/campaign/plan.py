@@ -20,9 +20,9 @@ from miro_sim.scenario.plugins import plugins_used
 from miro_sim.scenario.settings import OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value, as_kind, kind_of
-from mirotwin.campaign.single import prepared
+from mirotwin.campaign.single import image_of, prepared
 from mirotwin.campaign.versions import Versions, versions
-from mirotwin.campaign.worker import ImageFile, Work
+from mirotwin.campaign.worker import ImageCopy, Work
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.steps.keys import CheckStep
@@ -64,7 +64,7 @@ class Plan(msgspec.Struct, frozen=True):
     settings: tuple[tuple[str, str], ...] = ()
     allowed_failed_share: float = 0.0
     scenarios: Mapping[str, str] = {}
-    images: Mapping[str, ImageFile] = {}
+    images: Mapping[str, ImageCopy] = {}
     checks: tuple[str, ...] = ()
     versions: Versions = msgspec.field(default_factory=versions)
     notes: tuple[str, ...] = ()
@@ -157,7 +157,7 @@ def _tried(plan: Plan) -> Plan:
         job = plan.work_at(0, point)
         try:
             text, expected, steps = prepared(job.origin, job.text, job.settings)
-            check_symbols(steps, load_firmware(job.firmware.path), job.origin)
+            check_symbols(steps, image_of(job.firmware), job.origin)
         except BadInput as error:
             raise _placed(plan, places, error) from error.__cause__
         plugins.update(plugins_used(text.scenario))
@@ -191,12 +191,14 @@ def _scenarios(plan: Plan) -> dict[str, str]:
     return found
 
 
-def _images(plan: Plan) -> dict[str, ImageFile]:
+def _images(plan: Plan) -> dict[str, ImageCopy]:
     found = {}
     for name, place in _named(plan, plan.firmware, "firmware"):
         path = "" if name == OWN_IMAGE else name
         try:
-            found[name] = ImageFile(path, load_firmware(path).sha256 or "")
+            image = load_firmware(path)
+            names = {name: (at.address, at.space) for name, at in image.symbols.names.items()}
+            found[name] = ImageCopy(f"{image.path}", image.sha256, image.content, json_bytes(names))
         except BadInput as error:
             raise BadInput(plan.path, place, f"{error}") from None
     return found

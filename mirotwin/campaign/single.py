@@ -10,18 +10,20 @@ from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 
+import msgspec
+
 from miro_exact.bad_input import BadInput
+from miro_robot.image import Image, parse_hex
 from miro_sim.periods import RobotId
 from miro_sim.scenario.file import ScenarioText, of_text
 from mirotwin.campaign.columns import figures_of
-from mirotwin.campaign.worker import RunOutcome, Work
+from mirotwin.campaign.worker import ImageCopy, RunOutcome, Work
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.runs.summary import summarise
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import show_traceback
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.checks.expect import expectations_of
@@ -37,6 +39,13 @@ def prepared(
     """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
     found = of_text(text, origin, settings)
     return found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin)
+
+
+@lru_cache(maxsize=64)
+def image_of(firmware: ImageCopy) -> Image:
+    """The image with its names, as where the plan was made."""
+    names = msgspec.json.decode(firmware.names, type=dict[str, tuple[int, str]])
+    return parse_hex(firmware.content, Path(firmware.path), names=names)
 
 
 def run_single(job: Work) -> RunOutcome:
@@ -55,7 +64,7 @@ def run_single(job: Work) -> RunOutcome:
 
 
 def _run(job: Work) -> RunOutcome:
-    image = load_firmware(job.firmware.path)
+    image = image_of(job.firmware)
     text, expected, steps = prepared(job.origin, job.text, job.settings)
     spec = RunSpec(
         scenario=text.scenario,

@@ -17,11 +17,13 @@ from mirotwin.campaign.versions import Versions, versions_here
 Figure = float | int | bool | str | None
 
 
-class ImageFile(msgspec.Struct, frozen=True):
-    """An image by its path ("" for the robot's own), and the hash that its file has to have."""
+class ImageCopy(msgspec.Struct, frozen=True):
+    """An image that needs no file: the content of one, and where its names are, as JSON. `path` is for messages."""
 
     path: str
     sha256: str
+    content: bytes
+    names: bytes
 
 
 class Work(msgspec.Struct, frozen=True):
@@ -35,7 +37,7 @@ class Work(msgspec.Struct, frozen=True):
     text: str
     settings: tuple[str, ...]
     seed: int
-    firmware: ImageFile
+    firmware: ImageCopy
     engine: str
     versions: Versions
     recording: str = ""
@@ -62,9 +64,7 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
 
 def work(job: Work) -> RunOutcome:
     """Runs a job to its end, whatever happens to the run. Raises BadInput where this process is not as the job's."""
-    difference = (
-        job.versions.difference(versions_here(job.versions)) or _engine(job.engine) or _firmware(job.firmware)
-    )
+    difference = job.versions.difference(versions_here(job.versions)) or _engine(job.engine)
     if difference:
         worker = f"worker {socket.gethostname()} process {os.getpid()}"
         raise BadInput("", worker, f"has {difference}", "install there what runs here")
@@ -81,19 +81,4 @@ def _engine(name: str) -> str:
         engine.select(name)
     except BadInput as error:
         return f"{error}"
-    return ""
-
-
-@cache
-def _firmware(wanted: ImageFile) -> str:
-    """Why an image cannot be run here; its content does not travel, so it has to be the same file."""
-    from mirotwin.shell.firmware_image import load_firmware
-
-    try:
-        found = load_firmware(wanted.path).sha256
-    except (BadInput, OSError) as error:
-        return f"no firmware {wanted.path or 'of its own'}: {error}"
-    if found != wanted.sha256:
-        name = wanted.path or "the robot's own"
-        return f"another firmware ({name}: sha256 {(found or '')[:12]} instead of {wanted.sha256[:12]})"
     return ""

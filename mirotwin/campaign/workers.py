@@ -72,6 +72,8 @@ def processes(count: int, context: WorkerContext | None = None) -> ProcessPoolEx
 
 AHEAD = 4
 """Jobs for each worker that are handed over: enough to keep it busy, few enough to stop soon."""
+MANY_WORKERS = 64
+"""Workers of an executor that does not say how many it has, such as one of other machines."""
 
 
 class Workers:
@@ -86,7 +88,7 @@ class Workers:
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
-        self.ahead = AHEAD * int(getattr(executor, "_max_workers", cores()))
+        self.ahead = AHEAD * int(getattr(executor, "_max_workers", MANY_WORKERS))
 
     def start(self) -> Executor:
         return self._executor

@@ -115,7 +115,7 @@ def test_firmware_and_scenarios_are_factors_too(tmp_path):
     )
     works = [plan.work(run) for run in range(4)]
     assert [work.origin for work in works] == ["fig6", "fig6", "fig8", "fig8"]
-    assert [work.firmware.path for work in works] == ["", str(tmp_path / "mine.ihx")] * 2
+    assert [work.firmware.path for work in works] == [str(image_path()), str(tmp_path / "mine.ihx")] * 2
     assert len({work.firmware.sha256 for work in works}) == 1
     assert plan.varied(1)["firmware"] == "mine.ihx"
 
