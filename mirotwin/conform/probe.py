@@ -11,7 +11,6 @@ from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 from miro_sim.world.events import Event
-from miro_sim.world.world import World
 from mirotwin.conform.hints import characters
 from mirotwin.conform.observed import Observed
 from mirotwin.conform.rule import BOTH, Rule, Topology
@@ -20,7 +19,6 @@ from mirotwin.conform.sealing import MISTAKES
 from mirotwin.conform.trial import Trial, run_trial, trial_of
 from mirotwin.conform.trial_script import Frame, TrialScript, obeys
 from mirotwin.verify.checks.interface import Check, Monitor, Subject
-from mirotwin.verify.checks.monitors import Checks
 
 Listener = ObservingMonitor[Check]
 
@@ -36,11 +34,8 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
 
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
     """A listener for each robot of the trial, which is run to its end."""
-    world = World(trial.scenario, seed, image, trial.script)
-    checks = Checks(world, {(robot.network, robot.slot): [Listening()] for robot in world.robots})
-    run_trial(world)
-    checks.finish()
-    return [monitor for monitor in checks.monitors if isinstance(monitor, ObservingMonitor)]
+    monitors = run_trial(trial, Listening(), image, seed).checks.monitors
+    return [monitor for monitor in monitors if isinstance(monitor, ObservingMonitor)]
 
 
 _SETTLING_MS = 200.0

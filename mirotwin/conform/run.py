@@ -21,19 +21,17 @@ import msgspec
 
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
-from miro_sim.periods import RobotId
-from miro_sim.world.world import World
 from mirotwin.conform.probe import why_lost
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.rule_monitor import ConformsTo
 from mirotwin.conform.rules import presupposed, presupposed_first
 from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
+from mirotwin.runs.run import Run
 from mirotwin.shell.process_pool import spare_process
 from mirotwin.shell.verdicts import Verdict
-from mirotwin.verify.cases.case import SUFFIX, Trace, case_text
+from mirotwin.verify.cases.case import SUFFIX
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.monitors import Checks
 
 FAULTS_KEPT = 20
 """Of a robot in a trial."""
@@ -80,53 +78,45 @@ def case_names(rule: Rule) -> tuple[str, str]:
 
 def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Outcome:
     """Runs the rule's trial on `image`; with `keep`, what failed is there as cases."""
-    trial = trial_of(rule)
-    world = World(trial.scenario, seed, image, trial.script)
-    trace = Trace(world)
-    checks = Checks(world, {place: [ConformsTo(rule=rule.id)] for place in _robots(world)})
-    run_trial(world)
-    checks.finish()
-    failures = [one for one in checks.failures if not one.fault]
+    run = run_trial(trial_of(rule), ConformsTo(rule=rule.id), image, seed)
+    world = run.world
+    failures = [one for one in run.failures if not one.fault]
     faults = tuple(
         (robot.network, robot.slot, fault)
         for robot in world.robots
         for fault in robot.board.faults[:FAULTS_KEPT]
     )
-    if not failures and (not world.finished or checks.verdicts()[0].verdict != "passed"):
+    if not failures and (not world.finished or run.verdict_on("conforms_to") != "passed"):
         wanted = "a trial that can be judged"
         found = (
             "more events than the robot's log holds" if world.finished else f"{MOST_FAULTS} firmware faults"
         )
-        failures = [Failure("conforms_to", *_robots(world)[0], world.tick, wanted, found)]
-    cases = _cases(rule, world, trace, failures, faults) if keep else ()
+        first = world.robots[0]
+        failures = [Failure("conforms_to", first.network, first.slot, world.tick, wanted, found)]
+    cases = _cases(rule, run, failures, faults) if keep else ()
     return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
 
 
 def _cases(
     rule: Rule,
-    world: World,
-    trace: Trace,
+    run: Run,
     failures: Sequence[Failure],
     faults: Sequence[tuple[int, int, FirmwareFault]],
 ) -> tuple[tuple[str, str], ...]:
     """Each of which `mirotwin replay` brings to the same verdict."""
     own, of_fault = case_names(rule)
     found = []
-    if failures and world.finished:
-        found.append((own, case_text(world, trace, {"conforms_to": rule.id}, str(failures[0]))))
+    if failures and run.world.finished:
+        found.append((own, run.stream({"conforms_to": rule.id}, str(failures[0]))))
     if faults:
         first = min(faults, key=lambda one: one[2].tick)
         verdict = _of_fault("no_fault", NoFault.WANTED, *first)
-        found.append((of_fault, case_text(world, trace, {"no_fault": True}, str(verdict))))
+        found.append((of_fault, run.stream({"no_fault": True}, str(verdict))))
     return tuple(found)
 
 
 def _of_fault(check: str, wanted: str, network: int, slot: int, fault: FirmwareFault) -> Failure:
     return Failure(check, network, slot, fault.tick, wanted, str(fault), True)
-
-
-def _robots(world: World) -> list[RobotId]:
-    return [(robot.network, robot.slot) for robot in world.robots]
 
 
 FEWEST = 10

@@ -16,12 +16,15 @@ from msgspec import to_builtins
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
+from miro_robot.image import Image
 from miro_sim.scenario.file import of_table
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin.conform.rule import Rule, Topology
 from mirotwin.conform.trial_script import TrialExpectation, TrialScript
-from mirotwin.verify.checks.interface import Subject
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
+from mirotwin.verify.checks.interface import Check, Subject
 
 MOST_FAULTS = 1000
 LOOK_TICKS = 24_000
@@ -98,10 +101,26 @@ def _network(topology: Topology, places: Iterator[tuple[float, float]]) -> dict[
     return {"robots": topology.robots, "host": "silent", "radio": radio, "robot": robots}
 
 
-def run_trial(world: World) -> None:
-    """To its end, or after a thousand firmware faults."""
+def run_trial(trial: Trial, check: Check, image: Image, seed: int) -> Run:
+    """Its run under one check of each robot, to its end, or to a thousand firmware faults."""
+    places = [
+        (index, robot.slot)
+        for index, network in enumerate(trial.scenario.networks)
+        for robot in network.robot
+    ]
+    spec = RunSpec(
+        scenario=trial.scenario,
+        image=image,
+        seed=seed,
+        script=trial.script,
+        expected={place: [check] for place in places},
+    )
+    run = Run.traced(spec)
+    world = run.world
     while not world.finished and fault_count(world) < MOST_FAULTS:
         world.run_to(world.tick + (LOOK_TICKS if world.tick < CONTROL_PERIOD_TICKS else CONTROL_PERIOD_TICKS))
+    run.finish()
+    return run
 
 
 def fault_count(world: World) -> int:

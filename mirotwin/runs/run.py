@@ -170,9 +170,9 @@ class Run:
         """The case of the first failure. Raises ValueError if nothing failed."""
         return case_of_checks(self.world, self._known_trace(), self.checks)
 
-    def stream(self) -> str:
-        """The same run as a stream that nothing is expected of."""
-        return case_text(self.world, self._known_trace(), {}, "")
+    def stream(self, expect: Mapping[str, Any] = {}, verdict: str = "") -> str:
+        """The same run as a stream: the case of the check in `expect`, of which nothing is expected without one."""
+        return case_text(self.world, self._known_trace(), expect, verdict)
 
     def case_of_step(self) -> str | None:
         """The case of the step that has just failed; None where no check can judge it."""
@@ -193,13 +193,13 @@ class Run:
 
         None where the check passes, or cannot be one: a wait for no time at all.
         """
-        trace, world = self._known_trace(), self.world
+        world = self.world
         scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
         spec = RunSpec(
             scenario=scenario,
             image=world.image,
             seed=world.seed,
-            script=trace.script(),
+            script=self._known_trace().script(),
             until_tick=world.tick,
         )
         try:
@@ -207,7 +207,7 @@ class Run:
         except BadInput:
             return None
         failure = next((one for one in again.failures if one.check in expect), None)
-        return None if failure is None else case_text(world, trace, expect, str(failure))
+        return None if failure is None else self.stream(expect, str(failure))
 
     def _known_trace(self) -> Trace:
         assert self.trace is not None, "nobody traced the run, or it began with what another one had saved"
