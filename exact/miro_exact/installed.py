@@ -90,7 +90,7 @@ def described(kind: str, name: str) -> str:
 
 
 described_once = cache(described)
-"""The same as it was when this process looked first, which is about when it loaded the plug-in."""
+"""As `described` when this process looked first, which is about when it loaded the plug-in."""
 
 
 def differences(

@@ -357,7 +357,7 @@ def _blocks(pieces: list[Piece]) -> list[tuple[Any, bool]]:
 
 
 def _together(blocks: list[Any]) -> list[Any]:
-    """The same blocks for packing alone: one block, if compiled code is there to pack it."""
+    """Blocks for packing alone: these, or one in which compiled code packs them all."""
     if engine.active() != "compiled":
         return blocks
     from miro_exact.memory import Attributes

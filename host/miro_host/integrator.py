@@ -90,7 +90,7 @@ class Integrator:
 
 
 class AdamsBashforth(Integrator):
-    """The same with the rule of second order. The first step, and one after velocities, is an Euler step."""
+    """An integrator of second order. The first step, and one after velocities, is an Euler step."""
 
     STATE: dict[str, object] = {"last_v_dot": "d", "last_w_dot": "d", "begun": FLAG}
 

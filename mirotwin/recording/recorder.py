@@ -148,7 +148,7 @@ class Recorder:
             self._writer.flush()
 
     def flush_if_due(self) -> None:
-        """The same at the first call, and then each 0.2 s."""
+        """Flushes at the first call, and then each 0.2 s."""
         now_s = time.monotonic()
         if now_s - self._flushed_s >= FLUSH_S:
             self.flush()

@@ -44,7 +44,7 @@ def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[L
 
 
 def characters(periods: Sequence[Period], network: int) -> list[LogEntry]:
-    """The same of its robots, character by character: where they are parted by pauses is no matter."""
+    """Characters from its robots, one by one: the pauses between them do not matter."""
     found = []
     for one in on_air(periods, network, False):
         for value, stop_good, tick in one.symbols():

@@ -219,7 +219,7 @@ def make_folder(path: Path, option: str) -> None:
 
 
 def check_file(path: Path, option: str, *inputs: str | Path | None) -> None:
-    """Whether a single file could be written there, which is none of those that are read. Raises OutputError."""
+    """Raises OutputError unless the file can be written and is not an input."""
     remedy = f"choose another file with {option}"
     if path.is_dir():
         raise OutputError(path, "is a folder", remedy)

@@ -121,7 +121,7 @@ def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -
 
 
 def _scaled(errors: CalibrationErrors, factor: float) -> CalibrationErrors:
-    """The same errors, larger by a factor; switches stay."""
+    """Errors that are larger by a factor; switches stay."""
     return msgspec.structs.replace(errors, **{name: factor * getattr(errors, name) for name in ADDED})
 
 

@@ -50,7 +50,7 @@ def read_samples(path: str | Path) -> Samples:
 
 
 def parse_samples(text: str, origin: str) -> Samples:
-    """The same from CSV text. Raises EyeError with the line for wrong columns and for what is no level."""
+    """Colour samples from CSV text. Raises EyeError with the line for wrong columns and for what is no level."""
     found: Samples = {}
     for line, cells in csv_rows(text, origin, RGB, YCC):
         name = cells.pop("colour").strip()

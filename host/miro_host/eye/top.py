@@ -71,7 +71,7 @@ class Top:
         return max(0.0, min(least, self.margin(team_area), self.margin(identity_area)))
 
     def margin(self, area: int) -> float:
-        """The same for the area of one patch."""
+        """How far the area of one patch is from the nearest bound: 1 at what is expected, 0 on the bound."""
         share = area / self.area_px
         if share < 1.0:
             return (share - _LEAST) / (1.0 - _LEAST)

@@ -192,7 +192,7 @@ def authority(surface: float, gain: float, layer: float | None) -> float:
 
 
 def theory_text(theory: Theory) -> str:
-    """The same in a line for people: what holds is left out, but for condition (17)."""
+    """The figures in a line for people: what holds is left out, but for condition (17)."""
     parts = []
     third, f = theory.assumption_3, theory.disturbance
     for number, broken in enumerate((theory.assumption_1, theory.assumption_2), 1):

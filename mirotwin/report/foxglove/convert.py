@@ -23,7 +23,7 @@ from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
 from mirotwin.recording.writer import McapWriter
 from mirotwin.report.foxglove import derived, messages
-from mirotwin.report.foxglove.derived import Derived, Said
+from mirotwin.report.foxglove.derived import Derived, DerivedMessage
 from mirotwin.report.foxglove.frames import camera_frame, robot_frame
 
 PREFIX = "foxglove."
@@ -103,10 +103,10 @@ class Conversion:
             )
         topic = topic_of(record.topic)
         schema = self._schemas.get(record.schema_id, 0)
-        kept = 0
+        number = 0  # of none: frames are written in Foxglove's form alone
         if topic is None or topic.channel != IMAGE:
-            kept = self.writer.add_channel(record.topic, record.message_encoding, schema)
-        self._channels[record.id] = kept, topic
+            number = self.writer.add_channel(record.topic, record.message_encoding, schema)
+        self._channels[record.id] = number, topic
 
     def _take_message(self, record: Message) -> None:
         number, topic = self._channels.get(record.channel_id, (0, None))
@@ -120,24 +120,24 @@ class Conversion:
             fault = self._faults.decode(record.data)
             at, robot = messages.time_of(fault.tick), robot_frame(topic.network, topic.slot)
             line = messages.Log(at, messages.ERROR, f"firmware fault: {fault.text}", robot)
-            self._add(Said(derived.LOG, fault.tick, line))
+            self._add(DerivedMessage(derived.LOG, fault.tick, line))
         elif topic.channel == PERIOD and (period := next(self._coming, None)):
-            for said in self.derive.period(period):
-                self._add(said)
+            for message in self.derive.period(period):
+                self._add(message)
 
     def _take_image(self, topic: Topic, record: Message) -> None:
         try:
-            found = self._images.decode(record.data)
+            image = self._images.decode(record.data)
         except (msgspec.DecodeError, ValueError) as error:
             where = f"{topic_name(IMAGE, topic.network)} at {record.log_time} ns"
             raise RecordingError(self.path, where, brief(error), AGAIN) from None
         self.images += 1
         frame = camera_frame(topic.network)
-        message = messages.CompressedImage(messages.time_of(found.tick), frame, found.data, "png")
-        self._add(Said(f"{derived.PREFIX}net{topic.network}/image", found.tick, message))
+        message = messages.CompressedImage(messages.time_of(image.tick), frame, image.data, "png")
+        self._add(DerivedMessage(f"{derived.PREFIX}net{topic.network}/image", image.tick, message))
 
-    def _add(self, said: Said) -> None:
-        topic, tick, message = said
+    def _add(self, to_write: DerivedMessage) -> None:
+        topic, tick, message = to_write
         channel = self._topics.get(topic) or self._register(topic, message)
         self.writer.chunk.add(channel, nanoseconds(tick), message)
 

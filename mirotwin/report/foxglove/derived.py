@@ -1,6 +1,6 @@
 """From a run to Foxglove's messages: what control periods, frames and faults become.
 
-What stands still is said again each second, for viewers that jump.
+What stands still is written again each second, for viewers that jump.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class ErrorMessage(msgspec.Struct, frozen=True):
     off_pitch: bool
 
 
-class Said(NamedTuple):
-    """A message, where it goes, and of when it is."""
+class DerivedMessage(NamedTuple):
+    """A message for a topic. `tick`: of what it shows."""
 
     topic: str
     tick: int
@@ -44,7 +44,7 @@ class Said(NamedTuple):
 class Derived:
     """What of a run goes to Foxglove, one control period after the other.
 
-    `scenario` None: nobody knows it; then there are no camera, no ball, no patches and no references.
+    `scenario` None: it is not known; then there are no camera, no ball, no patches and no references.
     """
 
     def __init__(self, scenario: Scenario | None) -> None:
@@ -62,41 +62,43 @@ class Derived:
         self._notes: dict[RobotId, notes.RobotNotes] = {}
         self._count = 0
 
-    def period(self, period: Period) -> Iterator[Said]:
+    def period(self, period: Period) -> Iterator[DerivedMessage]:
         """Everything about a control period."""
         tick, at = period.tick, time_of(period.tick)
         still = self._count % AGAIN == 0
         self._count += 1
-        yield Said(TRANSFORMS, tick, self._transforms(period, at))
+        yield DerivedMessage(TRANSFORMS, tick, self._transforms(period, at))
         if still:
             yield from self._standing(period, at)
         trails: list[SceneEntity] = []
         for robot in period.robots:
             trail = self._trails.setdefault((robot.network, robot.slot), robots.Trail())
             trails += trail.add(robot, period.index, at)
-        yield Said(TRAILS, tick, SceneUpdate(tuple(trails)))
+        yield DerivedMessage(TRAILS, tick, SceneUpdate(tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
-            found = error_of(robot.truth, robot.reference, tick)
-            error = found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch
-            yield Said(f"{PREFIX}{frames.robot_frame(*place)}/error", tick, ErrorMessage(tick, *error))
+            sample = error_of(robot.truth, robot.reference, tick)
+            error = sample.x_cm, sample.y_cm, sample.position_cm, sample.theta_rad, sample.off_pitch
+            yield DerivedMessage(
+                f"{PREFIX}{frames.robot_frame(*place)}/error", tick, ErrorMessage(tick, *error)
+            )
             for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
-                yield Said(LOG, tick, line)
+                yield DerivedMessage(LOG, tick, line)
         for action in period.actions:
-            yield Said(LOG, action.tick, notes.of_action(action))
+            yield DerivedMessage(LOG, action.tick, notes.of_action(action))
 
     def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
-        found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
+        transforms = [frame for robot in period.robots for frame in frames.of_robot(robot, at)]
         if self._lens is not None:
-            found += [frames.transform(network, self._lens.lens, at) for network in _networks(period)]
-        return FrameTransforms(tuple(found))
+            transforms += [frames.transform(network, self._lens.lens, at) for network in _networks(period)]
+        return FrameTransforms(tuple(transforms))
 
-    def _standing(self, period: Period, at: Timestamp) -> Iterator[Said]:
-        yield Said(SCENE, period.tick, SceneUpdate(tuple(self._scene(period, at))))
+    def _standing(self, period: Period, at: Timestamp) -> Iterator[DerivedMessage]:
+        yield DerivedMessage(SCENE, period.tick, SceneUpdate(tuple(self._scene(period, at))))
         if self._lens is not None:
             for network in _networks(period):
                 message = frames.calibration(network, self._lens.lens, at)
-                yield Said(f"{PREFIX}net{network}/calibration", period.tick, message)
+                yield DerivedMessage(f"{PREFIX}net{network}/calibration", period.tick, message)
 
     def _scene(self, period: Period, at: Timestamp) -> Iterator[SceneEntity]:
         yield pitch.pitch(at)

@@ -21,24 +21,24 @@ class RobotNotes:
 
     def __init__(self) -> None:
         self._before: RobotPeriod | None = None
-        self._told = 0  # periods before this one in which the PC commanded, without a break
-        self._seen: bool | None = None
+        self._commanded = 0  # periods before this one in which the PC commanded, without a break
+        self._measured: bool | None = None
 
     def add(self, robot: RobotPeriod, tick: int) -> Iterator[Log]:
         """Lines about the control period that began at `tick`."""
         at, name = time_of(tick), robot_frame(robot.network, robot.slot)
-        seen = robot.measurement is not None
-        if self._seen is not None and seen != self._seen:
-            words = "measured again" if seen else "not measured: the robot or the frame was lost"
-            yield Log(at, INFO if seen else WARNING, words, name)
-        if seen or self._seen is not None:  # nothing is measured before the first frame has arrived
-            self._seen = seen
+        measured = robot.measurement is not None
+        if self._measured is not None and measured != self._measured:
+            words = "measured again" if measured else "not measured: the robot or the frame was lost"
+            yield Log(at, INFO if measured else WARNING, words, name)
+        if measured or self._measured is not None:  # nothing is measured before the first frame has arrived
+            self._measured = measured
         yield from (Log(at, WARNING, words, name) for words in self._frames(robot))
-        self._told = self._told + 1 if robot.control is not None else 0
+        self._commanded = self._commanded + 1 if robot.control is not None else 0
         self._before = robot
 
     def _frames(self, robot: RobotPeriod) -> Iterator[str]:
-        """What the firmware's counters say of the frames since the exposure before."""
+        """Frames since the exposure before, by the firmware's counters."""
         before = self._before
         if before is None:
             return
@@ -48,7 +48,7 @@ class RobotNotes:
         if stale:
             yield f"{stale} valid frames were not fresh"
         missing = robot.accepted is not None and not _more(before.accepted, robot.accepted)
-        if missing and self._told >= 2 and not rejected and not stale:
+        if missing and self._commanded >= 2 and not rejected and not stale:
             yield "no frame arrived since the last exposure"
 
 
