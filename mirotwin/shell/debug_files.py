@@ -53,11 +53,11 @@ def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
     return Sources(folders)
 
 
-def checked_sources(given: Sequence[str]) -> Sequence[str]:
-    """The folders of --sources. Raises BadInput for what is not one."""
+def checked_sources(given: Sequence[str], option: str = "--sources") -> Sequence[str]:
+    """The folders of the option. Raises BadInput for what is not one."""
     for folder in given:
         if not Path(folder).is_dir():
-            raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
+            raise BadInput(folder, option, "there is no such folder", "name the one with the C files")
     return given
 
 

@@ -19,6 +19,7 @@ from miro_robot.inspect.watcher import Inspector, attach
 from miro_robot.mcs51.cpu import Cpu, on_load
 from mirotwin.firmware import coverage_files as firmware_coverage
 from mirotwin.firmware.coverage_files import Report, table, write
+from mirotwin.shell.debug_files import checked_sources
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import check_file
 
@@ -40,7 +41,7 @@ class FirmwareCoverage:
         try:
             self.image = load_firmware(config.getoption("--firmware-image"))
             check_file(self.out, "--firmware-coverage", self.image.path)
-            _check_folders(config.getoption("--firmware-sources"))
+            checked_sources(config.getoption("--firmware-sources"), "--firmware-sources")
         except ValueError as error:
             raise pytest.UsageError(str(error)) from None
         on_load.set(self.watch)
@@ -90,23 +91,11 @@ class FirmwareCoverage:
     @cached_property
     def _report(self) -> Report:
         """Of the whole session: for when its last test has run."""
-        own = source_folder()
-        folders = [
-            *map(Path, self.config.getoption("--firmware-sources")),
-            self.image.path.parent,
-            *([own] if own else []),
-        ]
+        given = map(Path, self.config.getoption("--firmware-sources"))
+        folders = filter(None, (*given, self.image.path.parent, source_folder()))
         counts = merged([counts_of(self.counters), *self.from_workers])
         return firmware_coverage.collect(self.image, counts, Sources(folders), self.out)
 
     def _too_few(self) -> bool:
         share = line_share(self._report.tracefile)
         return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
-
-
-def _check_folders(folders: list[str]) -> None:
-    for folder in folders:
-        if not Path(folder).is_dir():
-            raise ValueError(
-                f"{folder}: --firmware-sources: there is no such folder; name the one with the C files"
-            )

@@ -49,14 +49,16 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     VERB: ClassVar[str] = ""
     CHANGES: ClassVar[bool] = True
     """What follows would be something else without it."""
+    NEEDS: ClassVar[Feature | None] = None
+    """Of the machine."""
 
     number: int = 0
     note: str = ""
 
     @property
     def needs(self) -> Feature | None:
-        """Of the machine."""
-        return None
+        """Of the machine, by all that the step says."""
+        return self.NEEDS
 
     @property
     def network(self) -> int:
@@ -103,6 +105,11 @@ class Send(OfNetwork, frozen=True, kw_only=True, tag_field="send", omit_defaults
 
     VERB = "send"
 
+    @property
+    def needs(self) -> Feature | None:
+        bad_stop = getattr(self, "bad_stop", ()) or "!" in getattr(self, "hex", "")
+        return "bad stop" if bad_stop else None
+
     def said(self) -> str:
         return f"send {self.__struct_config__.tag}"
 
@@ -117,10 +124,6 @@ class SendFrame(Send, frozen=True, kw_only=True):
     seq: Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)] | None = None
     wrong_bits: tuple[int, ...] = ()
     bad_stop: tuple[int, ...] = ()
-
-    @property
-    def needs(self) -> Feature | None:
-        return "bad stop" if self.bad_stop else None
 
     def problem(self, network: ScenarioNetwork) -> str:
         if self.seq is None and network.host != "silent":
@@ -231,10 +234,6 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
     """Characters as they are: pairs of hex digits, a `!` after one whose stop bit is bad (`55 55! ff`)."""
 
     hex: str
-
-    @property
-    def needs(self) -> Feature | None:
-        return "bad stop" if "!" in self.hex else None
 
     def problem(self, network: ScenarioNetwork) -> str:
         words = self.hex.split()
@@ -371,7 +370,7 @@ class CheckStep(OfRobot, frozen=True, kw_only=True):
 
     VERB = "check"
     CHANGES = False
-    needs = "inside"
+    NEEDS = "inside"
 
     check: dict[str, Any]
     network_: Network | None = msgspec.field(default=None, name="network")
@@ -393,7 +392,7 @@ class RadioStep(OfNetwork, frozen=True, kw_only=True):
     """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver hears noise)."""
 
     VERB = "radio"
-    needs = "switch"
+    NEEDS = "switch"
 
     radio: Literal["up", "down", "noise"]
 
@@ -406,7 +405,7 @@ class ResetStep(OfRobot, frozen=True, kw_only=True):
     """`reset`: the level of a robot's reset pin; 1 holds its processor in reset."""
 
     VERB = "reset"
-    needs = "switch"
+    NEEDS = "switch"
 
     reset: Literal[0, 1]
 
@@ -419,7 +418,7 @@ class PowerStep(OfRobot, frozen=True, kw_only=True):
     """`power`: a robot is switched off, or on."""
 
     VERB = "power"
-    needs = "switch"
+    NEEDS = "switch"
 
     power: Literal["on", "off"]
 
@@ -433,7 +432,7 @@ class SaveStep(Step, frozen=True, kw_only=True):
 
     VERB = "save"
     CHANGES = False
-    needs = "save"
+    NEEDS = "save"
 
     save: str
 
