@@ -20,12 +20,13 @@ def test_a_name_that_is_not_public_is_refused_with_those_that_are():
         _ = mirotwin.Wrold
 
 
-def test_importing_the_package_imports_nothing_else_of_ours():
+def test_importing_the_package_imports_nothing_else_of_ours_but_the_tables_of_checks():
     script = (
         "import sys, mirotwin; print(sorted(n for n in sys.modules if n.split('.')[0].startswith('miro')))"
     )
     done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "['mirotwin']\n"
+    tables = ["mirotwin.conform", "mirotwin.verify", "mirotwin.verify.checks"]
+    assert done.stdout == f"{['mirotwin', *tables]}\n"
 
 
 def test_the_example_in_its_documentation_runs():
