@@ -20,14 +20,14 @@ from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, refuse_given
-from mirotwin.replay.sources import SourceDifference, source_differences
-from mirotwin.replay.text import difference_lines, difference_tables
+from mirotwin.replay.sources import source_differences
+from mirotwin.replay.text import difference_lines, difference_tables, source_tables
 from mirotwin.runs.job import DEFAULT_SCENARIO, load_job, recorded_spec, recording_notes
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Option, Options, command_line, command_of, operand
-from mirotwin.shell.console import plain_table, show
+from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import print_json
@@ -112,7 +112,7 @@ def diff(options: DiffOptions) -> int:
     found = replace(found, notes=(*one.notes, *other.notes, *notes, *found.notes))
     origins = [*source_differences(one, other)]
     if options.shows:
-        _print_tables(origins, found, options.everything)
+        show(*source_tables(origins, NAMES), *difference_tables(found, options.everything))
     code = _report(options, one, other, found, alike=not origins)
     if compare.as_json:
         document: dict[str, Any] = {"a": file_in(options.a), "b": file_in(options.b)}
@@ -230,17 +230,6 @@ def _rule(rule: CompareRule, one: ComparedRun, other: ComparedRun) -> tuple[Comp
     return replace(rule, host=bits, digests=digests), notes
 
 
-def _print_tables(origins: Sequence[SourceDifference], found: RunDifference, everything: bool) -> None:
-    if origins:
-        table = plain_table("made from", *NAMES)
-        for each in origins:
-            table.add_row(each.key, each.a, each.b)
-        show(table)
-        show("")
-    for part in difference_tables(found, everything) if found.differences else ():
-        show(part)
-
-
 def _report(
     options: DiffOptions, one: ComparedRun, other: ComparedRun, found: RunDifference, alike: bool
 ) -> int:
@@ -248,12 +237,10 @@ def _report(
     noun = "recordings" if one.recorded else "images"
     shorter, longer = sorted((one.periods, other.periods), key=len)
     cut = len(shorter) != len(longer) and options.compare.to_time is None
-    for line in difference_lines(found, f"the {noun} differ") if found.differences else ():
-        complain(line)
+    complain(*difference_lines(found, f"the {noun} differ"))
     if cut:
         complain(f"A has {amount(len(one.periods), 'control period')}, B has {len(other.periods)}")
-    for note in found.notes:
-        complain(note)
+    complain(*found.notes)
     if found.differences or cut:
         return exit_code("differs")
     if not options.compare.as_json:

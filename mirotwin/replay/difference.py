@@ -66,7 +66,7 @@ class RunDifference(msgspec.Struct, frozen=True):
     differences: Sequence[Difference] = ()
     state: StateDifference | None = None
     instruction: FirmwareDifference | None = None
-    notes: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
 
     @property
     def period(self) -> int:

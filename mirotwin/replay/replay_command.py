@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import click
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
-from miro_sim.periods import Period
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
@@ -27,7 +26,7 @@ from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom
-from mirotwin.shell.outputs import RECORDINGS, file_in
+from mirotwin.shell.outputs import RECORDING, RECORDINGS, OutputFolder, file_in
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
@@ -114,16 +113,9 @@ def replay(options: ReplayOptions) -> int:
         return _replay_bare_case(file, options)
     job, images = _loaded(file, options)
     if options.desk.port:
-        from mirotwin.replay.replay_port import record_at_port  # loads pyserial
-
-        options.compare.of_answers(file)  # refuses before anything is sent
-        job = load_job(f"{record_at_port(job, options.desk, options.out, options.force, options.quiet)}")
-        complain(*job.notes)
+        job = _sent_to_port(job, options)
     if job.origin:
-        from mirotwin.replay.replay_port import compare_with_twin
-
-        rule = options.compare.of_answers(job.spec.origin)
-        return compare_with_twin(job, rule, options.everything, options.quiet, options.compare.as_json)
+        return _compare_with_twin(job, options)
     if options.compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
@@ -180,50 +172,45 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
 
 def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOptions) -> int:
     """Replays it; a stream has nothing to be compared with."""
-    compare = options.compare
+    compare, to_tick = options.compare, options.compare.rule.to_tick
     if job.recorded:
         compare.check_reaches(job.spec.origin, job.recorded)
-    to_tick = compare.rule.to_tick
     recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
     again = _rerun(job, to_tick, not options.shows)
-    rule = replace(compare.rule, digests=job.state == again.world.state.tables())
     found = compare_runs(
         ComparedRun(recorded, [job.as_recorded] if job.image and job.as_recorded else []),
         ComparedRun(again.periods, [job.spec]),
-        rule,
+        replace(compare.rule, digests=job.state == again.world.state.tables()),
         (
             partial(annotated_of, images=images, sources=()),
             partial(annotated_of, images=(), sources=options.sources),
         ),
     )
+    result = again.result()
+    ended = len(again.periods) < len(recorded)
     if options.shows:
-        tables = difference_tables(found, options.everything) if found.differences else ()
-        for table in (*frame_tables(job, again.periods, options.everything, to_tick), *tables):
-            show(table)
+        show(*frame_tables(job, again.periods, options.everything, to_tick))
+        show(*difference_tables(found, options.everything))
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
-    result = again.result()
     complain(*result.texts)
     if options.shows and says_anything(job.spec.scenario):
         show(expectations_text(result.expectations))
-    differs = _report_difference(found, recorded, again.periods, compare)
+    complain(*difference_lines(found, "the replay differs"), *found.notes)
     if found.differences and options.shows:
         show(debug_line(job.spec.origin, options.firmware, found.differences[0].tick))
-    code = result.code if options.expects else differs or result.code
+    elif ended and not found.differences:
+        complain(f"the replay ended after {len(again.periods)} of {len(recorded)} recorded control periods")
+    elif recorded and not found.differences and not compare.as_json:
+        show(f"the robots' response equals the recorded one in {compare.extent(again.periods)}")
+    differs = (found.differences or ended) and not options.expects
+    code = exit_code(result.verdict, *(["differs"] if differs else []))
     if compare.as_json:
-        print_json(_document(job, again, found, options) | {"exit_code": code})
+        firmware = {"recorded": job.image and job.image.sha256, "replayed": job.spec.image.sha256}
+        periods = {"recorded": len(job.recorded), "replayed": len(again.periods)}
+        head = {"file": job.spec.origin, "seed": job.spec.seed, "firmware": firmware, "periods": periods}
+        print_json({**head, **compare.rule_as_json(), **found.as_json(options.everything), "exit_code": code})
     return code
-
-
-def _document(job: Job, again: Run, found: RunDifference, options: ReplayOptions) -> dict[str, Any]:
-    return {
-        "file": job.spec.origin,
-        "seed": job.spec.seed,
-        "firmware": {"recorded": job.image.sha256 if job.image else None, "replayed": job.spec.image.sha256},
-        "periods": {"recorded": len(job.recorded), "replayed": len(again.periods)},
-        **options.compare.rule_as_json(),
-        **found.as_json(options.everything),
-    }
 
 
 def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
@@ -243,18 +230,53 @@ def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
     return again
 
 
-def _report_difference(
-    found: RunDifference, recorded: Sequence[Period], replayed: Sequence[Period], compare: CompareOptions
-) -> int:
-    if not recorded:
-        return DONE
-    if found.differences:
-        for line in (*difference_lines(found, "the replay differs"), *found.notes):
-            complain(line)
-        return exit_code("differs")
-    if len(replayed) < len(recorded):
-        complain(f"the replay ended after {len(replayed)} of {len(recorded)} recorded control periods")
-        return exit_code("differs")
-    if not compare.as_json:
-        show(f"the robots' response equals the recorded one in {compare.extent(replayed)}")
-    return DONE
+def _sent_to_port(job: Job, options: ReplayOptions) -> Job:
+    """Sends all that the job's hosts send to the robots at the port; the job of its recording. Raises BadInput."""
+    from mirotwin.runs.at_port import send, sendable  # loads pyserial
+
+    file = job.spec.origin
+    options.compare.of_answers(file)  # refuses before anything is sent
+    sent = sendable(job, options.desk, complain)
+    name = Path(file).name
+    stem = Path(file).absolute().parent.name if name.startswith("run.") else name.partition(".")[0]
+    default = Path("runs") / f"{stem or 'stream'}-port"
+    folder = OutputFolder(options.out or default, options.force, (RECORDING,), ours=options.out is None)
+    with ProgressBar("sending", sent[-1].end_tick - sent[0].tick, options.quiet) as bar:
+        send(sent, job, options.desk, folder, complain, bar.to)
+    job = load_job(f"{folder.path / RECORDING}")
+    complain(*job.notes)
+    return job
+
+
+def _compare_with_twin(job: Job, options: ReplayOptions) -> int:
+    """Runs the twin with what was sent at the port, and compares its answers."""
+    from mirotwin.runs.at_port import beside_twin
+
+    compare, rule = options.compare, options.compare.of_answers(job.spec.origin)
+    total_ticks = len(job.recorded) * CONTROL_PERIOD_TICKS
+    with ProgressBar("running the twin", total_ticks, options.quiet or compare.as_json) as bar:
+        answers = beside_twin(job, rule, bar.to)
+    notes = [f"robot {slot} of the twin is not at the port: not compared" for slot in answers.silent]
+    if answers.not_judged:
+        notes.append(f"{answers.not_judged} values are not judged: they depend on times too near to a limit")
+    found = RunDifference(("robot", "twin"), answers.differences, notes=notes)
+    count = sum(map(len, answers.robots.values()))
+    code = exit_code("differs" if found.differences else "passed" if count else "not observable")
+    if options.shows:
+        show(*difference_tables(found, options.everything))
+    complain(*found.notes, *difference_lines(found, "the robot differs from its twin"))
+    if not count:
+        complain("no robot was asked, or none answered: nothing could be compared")
+    elif not found.differences and not compare.as_json:
+        known = f"times are known to {answers.unsure_ms:.1f} ms"
+        show(f"the robot answers as its twin does, {amount(count, 'time')}; {known}")
+    if compare.as_json:
+        head = {
+            "file": job.spec.origin,
+            "seed": job.spec.seed,
+            "source": job.origin,
+            "silent": answers.silent,
+        }
+        head["not_judged"] = answers.not_judged
+        print_json({**head, **found.as_json(options.everything), "exit_code": code})
+    return code

@@ -20,6 +20,7 @@ from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference
 from mirotwin.replay.lockstep.instructions import InstructionDifference
 from mirotwin.replay.lockstep.variables import VariableDifference
+from mirotwin.replay.sources import SourceDifference
 from mirotwin.runs.job import Job
 from mirotwin.shell.console import plain_table
 
@@ -30,6 +31,8 @@ Names = tuple[str, str]
 
 def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
     """Where `subject` differs first, and what was found by repeating both runs; the notes are not in it."""
+    if not found.differences:
+        return
     yield f"{subject} in control period {found.period}, {found.differences[0].said(found.names)}"
     if found.state is not None:
         yield f"their states differ from {found.state} on"
@@ -39,6 +42,8 @@ def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
 
 def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table | str]:
     """The first difference of each channel, or all of them."""
+    if not found.differences:
+        return
     listed = first_per_channel(found.differences)
     if everything:
         listed = [(each, 1) for each in found.differences]
@@ -54,6 +59,16 @@ def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table 
     yield table
     if len(listed) < len(found.differences):
         yield f"{len(found.differences)} differences in {amount(len(listed), 'channel')}; --all lists them"
+
+
+def source_tables(origins: Sequence[SourceDifference], names: Names) -> Iterator[Table | str]:
+    """What two runs were not made alike from, and an empty line."""
+    if origins:
+        table = plain_table("made from", *names)
+        for origin in origins:
+            table.add_row(origin.key, origin.a, origin.b)
+        yield table
+        yield ""
 
 
 def _firmware_lines(found: FirmwareDifference, names: Names) -> Iterator[str]:

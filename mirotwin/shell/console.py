@@ -38,19 +38,20 @@ def facts_table() -> Table:
     return table
 
 
-def show(result: RenderableType) -> None:
-    """Prints a result on stdout. No line of text is folded; tables in a file or a pipe are not padded.
+def show(*results: RenderableType) -> None:
+    """Prints results on stdout. No line of text is folded; tables in a file or a pipe are not padded.
 
     In a narrow terminal a word that is too long for its column is folded, not cut: it may be a digest or a name.
     """
-    whole = isinstance(result, str)  # a path is one word, however long
-    if isinstance(result, Table):
-        for column in result.columns:
-            column.overflow = "fold"
-    if sys.stdout.isatty():
-        _Plain(highlight=False, markup=False).print(result, soft_wrap=whole)
-        return
-    console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
-    with console.capture() as capture:
-        console.print(result, soft_wrap=whole)
-    click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
+    for result in results:
+        whole = isinstance(result, str)  # a path is one word, however long
+        if isinstance(result, Table):
+            for column in result.columns:
+                column.overflow = "fold"
+        if sys.stdout.isatty():
+            _Plain(highlight=False, markup=False).print(result, soft_wrap=whole)
+            continue
+        console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
+        with console.capture() as capture:
+            console.print(result, soft_wrap=whole)
+        click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)

@@ -2,6 +2,7 @@
 
 import json
 
+import click
 import pytest
 from msgspec.structs import replace
 
@@ -11,6 +12,7 @@ from miro_protocol.stream import write
 from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
+from mirotwin.commands import main
 from mirotwin.recording import reader as recording_reader
 from mirotwin.recording import recorder as recording_recorder
 from mirotwin.recording.recorder import Recorder, RunSource, source_of
@@ -396,3 +398,17 @@ def test_what_was_changed_in_a_recording_is_in_no_state(mirotwin, finished, tmp_
     path = rewritten(finished / "run.mcap", tmp_path / "shifted.mcap", shifted)
     err = mirotwin.ends(4, "replay", path, "-q")
     assert "run again, their states do not differ up to the end of control period 0: what made the" in err
+
+
+def options_by_command(command, context, words=()):
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            yield from options_by_command(command.get_command(context, name), context, (*words, name))
+    else:
+        yield words, {max(one.opts, key=len) for one in command.params if isinstance(one, click.Option)}
+
+
+def test_replay_and_diff_have_few_options_that_no_other_command_has():
+    found = dict(options_by_command(main, click.Context(main)))
+    own = found.pop(("replay",)) | found.pop(("diff",))
+    assert 0 < len(own - set().union(*found.values())) <= 8
