@@ -28,7 +28,7 @@ from mirotwin.conform.rules import presupposed, presupposed_first
 from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 from mirotwin.runs.run import Run
 from mirotwin.shell.process_pool import spare_process
-from mirotwin.shell.verdicts import Verdict
+from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.cases.case import SUFFIX
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
@@ -56,9 +56,12 @@ class Outcome(msgspec.Struct, frozen=True):
 
     @property
     def verdict(self) -> Verdict:
-        if self.failures:
-            return "failed"
-        return "not judged" if self.cause or self.unsure else "not observable" if self.unseen else "passed"
+        reasons: dict[Verdict, object] = {
+            "failed": self.failures,
+            "not judged": self.cause or self.unsure,
+            "not observable": self.unseen,
+        }
+        return judge(verdict for verdict, reason in reasons.items() if reason)
 
     @property
     def why(self) -> str:
