@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+import click
 from msgspec.structs import replace
 
 from miro_exact.bad_input import amount
@@ -87,6 +88,7 @@ def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:
     def show(tally: Tally, outcome: RunOutcome) -> None:
         nonlocal last
         last = tally
+        click.echo(outcome.traceback, err=True, nl=False)
         bar.begun = tally.done - tally.new
         bar.to(tally.done)
 

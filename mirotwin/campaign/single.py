@@ -24,7 +24,7 @@ from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.runs.summary import summarise
-from mirotwin.shell.program import show_traceback
+from mirotwin.shell.program import traceback_text
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
@@ -53,8 +53,7 @@ def run_single(job: Work) -> RunOutcome:
     try:
         return _run(job)
     except BadInput as error:
-        show_traceback(error)
-        return RunOutcome(job.run, error=f"{error}")
+        return RunOutcome(job.run, error=f"{error}", traceback=traceback_text(error))
     except ValueError as error:  # numbers with which nothing can be computed, a part that fails
         return RunOutcome(job.run, error=f"cannot be run: {error}")
     except OSError as error:  # no room for its recording

@@ -47,7 +47,7 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a check that is named had no
     occasion), fault (of the firmware) or error (no run).
 
-    `error`: why there are no figures. `failure`: the first check or step that failed, or what was not judged. `checks`:
+    `error`: why there are no figures; `traceback`: of a plug-in's error, where it is wanted. `failure`: the first check or step that failed, or what was not judged. `checks`:
     name -> verdict.
     `wall_s`: the simulation loop.
     """
@@ -55,6 +55,7 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     run: int
     verdict: str = "error"
     error: str = ""
+    traceback: str = ""
     failure: str = ""
     digest: str = ""
     figures: dict[str, Figure] = {}

@@ -33,10 +33,15 @@ from mirotwin.shell.verdicts import (
 )
 
 
+def traceback_text(error: BaseException) -> str:
+    """It, if it is wanted, else "". For plug-ins: an error that nothing caused has no more to say."""
+    wanted = error.__cause__ is not None and os.environ.get("MIROTWIN_TRACEBACK")
+    return "".join(traceback.format_exception(error)) if wanted else ""
+
+
 def show_traceback(error: BaseException) -> None:
-    """Writes it to stderr, if it is wanted. For plug-ins: an error that nothing caused has no more to say."""
-    if error.__cause__ is not None and os.environ.get("MIROTWIN_TRACEBACK"):
-        sys.stderr.write("".join(traceback.format_exception(error)))
+    """Writes it to stderr, if it is wanted."""
+    sys.stderr.write(traceback_text(error))
 
 
 class Terminated(BaseException):

@@ -407,16 +407,18 @@ def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mi
 def test_with_mirotwin_traceback_the_whole_of_it_comes_first(mirotwin, monkeypatch, here):
     monkeypatch.setenv("MIROTWIN_TRACEBACK", "1")
     (here / "a.scenario.toml").write_text(f"{TEST}expect.raises = true\n")
+    (here / "c.toml").write_text('scenario = "a.scenario.toml"\nseeds = "0"\n')
     for command in (
         ("run", "fig6", *SETTINGS, "-q", "--no-figure", "--expect", "raises"),
         ("run", "fig6", *SETTINGS, "-q", "--set", "network.robot.controller={law='law_refuses'}"),
         ("run", "fig6", *SETTINGS, "-q", "--expect", "syntax"),
         ("test", "a.scenario.toml"),
+        ("campaign", "c.toml", "-q", "--jobs", "1"),
     ):
         err = mirotwin.ends(2, *command)
         trace, _, line = err.rstrip().rpartition("\n")
         assert "Traceback (most recent call last):" in trace, command
-        assert line.startswith("mirotwin: error: ") or command[0] == "test"
+        assert line.startswith("mirotwin: error: ") or command[0] in ("test", "campaign")
         assert re.search(r'File ".*/site/plugged_\w+.py", line \d+', err), command
     code, _, err = mirotwin("run", "fig6", "--set", "duration=1")  # nobody's plug-in
     assert (code, err.count("\n")) == (2, 1)
