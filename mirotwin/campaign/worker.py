@@ -47,9 +47,8 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a check that is named had no
     occasion), fault (of the firmware) or error (no run).
 
-    `error`: why there are no figures; `traceback`: of a plug-in's error, where it is wanted. `failure`: the first check or step that failed, or what was not judged. `checks`:
-    name -> verdict.
-    `wall_s`: the simulation loop.
+    `error`: why there are no figures; `traceback`: that of a plug-in's error, where it is wanted. `failure`: the first
+    check or step that failed, or what was not judged. `checks`: name -> verdict. `wall_s`: the simulation loop.
     """
 
     run: int
