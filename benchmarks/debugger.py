@@ -30,20 +30,20 @@ from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.debug.wire import Wire
-from mirotwin.runs.inspected_run import RobotRun
+from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.shell.firmware_image import load_firmware
 
 ROUNDS = 40
 SIX = Path(__file__).parents[1] / "examples" / "two_teams.toml"
 
 
-def run_of(scenario: str, seconds: float) -> RobotRun:
+def run_of(scenario: str, seconds: float) -> InspectedRun:
     """A run at its start; the circle goes on as long as is needed."""
     text = load(scenario, [f"duration_s={seconds + 0.5}"] if scenario == "curve" else [])
-    return RobotRun(World(text.scenario, 0, load_firmware()))
+    return InspectedRun(World(text.scenario, 0, load_firmware()))
 
 
-def debugger_of(run: RobotRun, everyone: bool = True) -> Debugger:
+def debugger_of(run: InspectedRun, everyone: bool = True) -> Debugger:
     """At the start of `run`, with the sources of the robot's own firmware."""
     folder = source_folder()
     assert folder is not None

@@ -162,14 +162,11 @@ class Console(Cmd):
             raise BadInput("", rest, f"{error}") from None
         if name not in CONDITIONS:
             raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
-        robot, kind = self.timeline.core.robot, CONDITIONS[name]
-        if robot is None:
-            what = "is a condition of a robot's world"
-            raise BadInput("", name, what, "stop the bare processor by breakpoints")
+        device, kind = self.timeline.core.device, CONDITIONS[name]
         fields = kind.__struct_fields__
-        given: dict[str, Any] = {"network": robot.network}
+        given: dict[str, Any] = {"network": device.network}
         if "slot" in fields:
-            given["slot"] = robot.slot
+            given["slot"] = device.slot
         for key, _, value in (word.partition("=") for word in keys):
             given[key] = int(value, 16) if _HEX.fullmatch(value) else value
         try:

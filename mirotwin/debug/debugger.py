@@ -24,7 +24,6 @@ from miro_sim.world.conditions import Condition
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Position, Timeline, Trap
-from mirotwin.runs.inspected_run import RobotRun
 
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
 _BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}
@@ -311,9 +310,8 @@ class Debugger:
     def _at_end(self) -> str:
         if not self.timeline.run.over:
             return ""
-        faults = [core.board.faults[-1] for core in self.timeline.cores if core.board and core.board.faults]
-        if not isinstance(self.timeline.run, RobotRun):
-            faults = list(self.timeline.run.machine.faults[-1:])
+        boards = [core.device.board for core in self.timeline.cores]
+        faults = [board.faults[-1] for board in boards if board.faults]
         return f"firmware fault: {faults[-1]}" if faults else "the run ends here"
 
     # By instruction

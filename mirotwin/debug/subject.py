@@ -13,13 +13,15 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
+from miro_robot.board_spec import BoardSpec
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.subject import SubjectOptions, open_run
 from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
-from mirotwin.runs.inspected_run import BareRun, CaseRun, RobotRun
+from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.runs.job import Job
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
@@ -28,7 +30,6 @@ from mirotwin.shell.debug_files import LinesFrom, SourceFolders, debugged_image,
 from mirotwin.shell.options import AT, RESUME
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
-from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.interface import Failure
@@ -92,7 +93,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     elif files and not any(map(symbols.sources.path, files)):
         said.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
-        if isinstance(run, RobotRun) and run.job is not None and run.job.case.verdict:
+        if run.job is not None and run.job.case.verdict:
             verdict = _judged(timeline, run.world, run.job)
         if verdict is not None:
             why = "case"
@@ -104,20 +105,19 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     return debugger, said, why
 
 
-def _opened(options: DebugSubject) -> tuple[RobotRun | BareRun | CaseRun, Result | None]:
+def _opened(options: DebugSubject) -> tuple[InspectedRun, Result | None]:
     """The run, and the verdict on a case of a bare processor."""
     path = options.subject
     if is_bare_case(path):
         image = load_case_firmware(path, options.firmware)
         again, verdict = rerun_bare_case(path, image, options.check)
         end_tick = again.end_tick if again.failure is None else max(again.end_tick, again.failure.tick)
-        playback = BarePlayback(image, again.line, again.script, end_tick, path)
-        return CaseRun(playback), verdict
+        board = BoardSpec(crystal_hz=again.line.crystal_hz, bound_stack=False)
+        scenario = BoardScenario(board=board, bit_ticks=again.line.bit_ticks)
+        return InspectedRun(World(scenario, 0, image, again.script), end_tick=end_tick), verdict
     if options.check is not None:
         raise BadInput(path, "--check", "is for a case of a bare processor", "leave it out")
-    run = open_run(options)
-    assert isinstance(run, RobotRun | BareRun)
-    return run, None
+    return open_run(options), None
 
 
 def _judged(timeline: Timeline, world: World, job: Job) -> Result:
@@ -138,9 +138,7 @@ def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
     timeline.go_to(failure.tick)
 
 
-def _resume(run: RobotRun | BareRun | CaseRun, path: str) -> None:
-    if not isinstance(run, RobotRun):
-        raise BadInput(path, "--resume", "is a world, and SUBJECT is none", "leave it out")
+def _resume(run: InspectedRun, path: str) -> None:
     saved = read_input(path, WORLD_BYTES)
     try:
         run.world.load(saved)

@@ -17,16 +17,17 @@ from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
-from miro_exact.state import Flat
 from miro_robot.board import Board
+from miro_robot.empty_board import EmptyBoard
 from miro_robot.event_log import EventLog
 from miro_robot.inspect.marks import MarkInspector
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.world.conditions import Condition
+from miro_sim.world.device import Device
 from miro_sim.world.events import Event, HostLog
 from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired
-from mirotwin.runs.inspected_run import BareRun, CaseRun, RobotRun
+from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.shell.progress import ProgressBar
 
 BUDGET_BYTES = 16 << 20
@@ -37,11 +38,15 @@ _WAKES = frozenset((0, *range(0x03, 0x34, 8)))  # where a processor that slept g
 
 
 class Core(NamedTuple):
-    """A processor of the run: of a robot, or the bare one, which has no board."""
+    """A processor of the run, on `device`. `robot`, `board`: of a robot; a board alone has neither."""
 
     name: str
     cpu: Cpu
-    robot: Robot | None = None
+    device: Device
+
+    @property
+    def robot(self) -> Robot | None:
+        return self.device if isinstance(self.device, Robot) else None
 
     @property
     def board(self) -> Board | None:
@@ -79,23 +84,18 @@ class Timeline:
     `code_in_ram`: what is executed may change, and lie anywhere.
     """
 
-    def __init__(self, run: RobotRun | BareRun | CaseRun) -> None:
+    def __init__(self, run: InspectedRun) -> None:
         self.run = run
         self.interrupted: Callable[[], bool] = lambda: False
-        self.cores = [Core("processor", run.cpu)]
-        self._logs: list[EventLog | HostLog] = []
-        self._restore: Callable[[bytes], None]
-        if isinstance(run, RobotRun):
-            networks = run.world.networks
-            robots = [robot for network in networks for robot in network.robots]
-            self.cores = [Core(f"net{one.network}/robot{one.slot}", one.board.cpu, one) for one in robots]
-            self._logs = [*(one.board.log for one in robots), *(network.log for network in networks)]
-            self.code_in_ram = False
-            self.state, self._restore = run.world.state.save, run.world.go_on_from
-        else:
-            flat = Flat(run.machine)
-            self.code_in_ram = run.machine.bus.code_of is not None
-            self.state, self._restore = flat.save, flat.load
+        world, devices = run.world, run.world.devices
+        self.cores = [Core(_name(device), device.board.cpu, device) for device in devices]
+        self._logs: list[EventLog | HostLog] = [
+            *(device.board.log for device in devices),
+            *(line.log for line in world.lines),
+        ]
+        alone = run.device.board
+        self.code_in_ram = isinstance(alone, EmptyBoard) and alone.shared
+        self.state, self._restore = world.state.save, world.go_on_from
         self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
         self._begins = [core.cpu.cycles for core in self.cores]
         self._kept: list[_Checkpoint] = []
@@ -131,7 +131,7 @@ class Timeline:
 
     @property
     def _now(self) -> int:
-        return self.run.world.tick if isinstance(self.run, RobotRun) else self.tick
+        return self.run.world.tick
 
     def _save(self) -> None:
         """Keeps the state of now, unless it is kept."""
@@ -151,10 +151,8 @@ class Timeline:
         self._restore(one.state)
         for log, end in zip(self._logs, one.log_ends, strict=True):
             log.cut(end)
-        for board in filter(None, (core.board for core in self.cores)):
-            del board.faults[board.fault_count :]
-        if not isinstance(self.run, RobotRun):
-            self.run.resume()
+        for core in self.cores:
+            del core.device.board.faults[core.device.board.fault_count :]
 
     def _before(self, tick: int) -> int:
         """The last checkpoint before `tick`, or the first one."""
@@ -318,7 +316,6 @@ class Timeline:
 
     def until(self, condition: Condition) -> Event | None:
         """Goes on to the first tick at which `condition` is true; None at the end or where it was interrupted."""
-        assert isinstance(self.run, RobotRun)
         while not self.run.over and not self.interrupted():
             with suppress(WaitExpired):
                 event = self.run.world.run_until(
@@ -332,10 +329,9 @@ class Timeline:
 
     def radio_events(self) -> list[Event]:
         """Frames on the air of the network of the robot in focus, up to now."""
-        robot = self.core.robot
-        if robot is None or not isinstance(self.run, RobotRun):
+        if self.core.robot is None:
             return []
-        log = self.run.world.networks[robot.network].log
+        log = self.run.world.lines[self.core.device.network].log
         return [event for _, event in log.since(0, ("sent", "answer")) if event.tick <= self.tick]
 
     @contextmanager
@@ -352,9 +348,10 @@ class Timeline:
             found.append(Hit(self.cores[at].cpu.cycles, at, it))
             return enough(found[-1])
 
-        others = None if isinstance(self.run, RobotRun) else self.run.marks
         asking = [
-            MarkInspector(self.cores[at].cpu, trap.addresses, partial(ask, at, trap), others)
+            MarkInspector(
+                self.cores[at].cpu, trap.addresses, partial(ask, at, trap), _own_marks(self.cores[at].device)
+            )
             for at, trap in traps.items()
         ]
         try:
@@ -362,3 +359,13 @@ class Timeline:
         finally:
             for one in asking:
                 one.detach()
+
+
+def _name(device: Device) -> str:
+    return f"net{device.network}/robot{device.slot}" if isinstance(device, Robot) else "processor"
+
+
+def _own_marks(device: Device) -> Callable[[], Collection[int]] | None:
+    """Where the board sets marks itself, for each run."""
+    board = device.board
+    return board.marks if isinstance(board, EmptyBoard) else None

@@ -5,15 +5,20 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from enum import StrEnum
 from typing import Annotated
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES, read_input
-from miro_robot.bare.input import InputPiece
-from miro_robot.bare.machine import BareMachine, Ended
-from miro_robot.bare.pins import PinEvent, read_pins
+from miro_robot.board_spec import BoardSpec
+from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.terminal import InputPiece, PinEvent, TerminalSpec, read_pins
+from miro_sim.world.terminal import Terminal
+from miro_sim.world.wire import Wire
+from miro_sim.world.world import World
 from mirotwin.firmware.code_place import address_of, check_code_at, place_of
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
@@ -23,6 +28,7 @@ from mirotwin.shell.times import Time, TimeType
 from mirotwin.shell.verdicts import exit_code
 
 STDIN = "-"
+FAULTS_LISTED = 100
 _SCON, _NINE_BITS = 0x98, 0x80
 
 
@@ -164,32 +170,77 @@ def target_of(path: str, image: Image, options: BareOptions) -> int | None:
     return address
 
 
-def make_machine(
-    image: Image, options: BareOptions, output: Callable[[bytes], object] | None = None, live: bool = False
-) -> BareMachine:
-    """The machine that was asked for. Raises BadInput, and errors of the files read."""
-    pieces = _pieces(options)
-    pins = _pins(options)
-    start = _start(image, options)
+class Ended(StrEnum):
+    """Why a run ended."""
+
+    UNTIL = "until"  # the address asked for is next
+    CYCLES = "cycles"  # the limit is reached
+    FAULT = "fault"
+    PAUSED = "paused"  # it can go on
+    HALTED = "halted"  # nothing can ever make it go on: a jump to itself or asleep, with no interrupt to come
+
+
+def make_world(
+    image: Image,
+    options: BareOptions,
+    until: int | None = None,
+    output: Callable[[bytes], object] | None = None,
+    live: bool = False,
+) -> World:
+    """A world of one board, as it was asked for. `output` gets what it sends. Raises BadInput, and errors of the files
+    read.
+    """
+    pieces, pins = _pieces(options), _pins(options)
+    hz = options.crystal_hz
+    board = BoardSpec(crystal_hz=hz, code_in_xram=options.code_in_xram, start=_start(image, options))
+    gap_ticks = 0 if options.stdin_gap is None else options.stdin_gap.ticks(hz)
+    terminal = TerminalSpec(
+        pieces=pieces, baud=options.baud, gap_ticks=gap_ticks, wait=options.stdin_wait, live=live, pins=pins
+    )
+    scenario = BoardScenario(
+        board=board,
+        stop_on_fault=not options.go_on,
+        stop_at=() if until is None else (until,),
+        stop_at_end=True,
+        terminal=terminal,
+    )
     try:
-        return BareMachine(
-            image,
-            code_in_xram=options.code_in_xram,
-            stdin=pieces,
-            baud=options.baud,
-            output=output,
-            stop_on_fault=not options.go_on,
-            crystal_hz=options.crystal_hz,
-            gap_ticks=0 if options.stdin_gap is None else options.stdin_gap.ticks(options.crystal_hz),
-            live=live,
-            pins=pins,
-            start=start,
-            wait=options.stdin_wait,
-        )
+        world = World(scenario, 0, image)
     except ValueError as error:
         raise BadInput(
             "", "", f"--{error}" if str(error).startswith("baud") else f"--pins: {error}"
         ) from None
+    wire_of(world).output = output
+    return world
+
+
+def wire_of(world: World) -> Wire:
+    """The wire of a world of one board."""
+    wire = world.lines[0]
+    assert isinstance(wire, Wire)
+    return wire
+
+
+def board_of(world: World) -> EmptyBoard:
+    """The board of a world of one board."""
+    return wire_of(world).board
+
+
+def terminal_of(world: World) -> Terminal:
+    """What is at the end of its wire."""
+    terminal = wire_of(world).terminal
+    assert terminal is not None
+    return terminal
+
+
+def ended(world: World, max_cycles: int | None) -> Ended:
+    """Why a world of one board stands where it does."""
+    board = board_of(world)
+    if not world.stopped:
+        return Ended.PAUSED if max_cycles is None or board.cpu.cycles < max_cycles else Ended.CYCLES
+    if board.fault_count and board.stop_on_fault:
+        return Ended.FAULT
+    return Ended.HALTED if board.ended else Ended.UNTIL
 
 
 def _start(image: Image, options: BareOptions) -> int:
@@ -205,45 +256,48 @@ def _start(image: Image, options: BareOptions) -> int:
     return start
 
 
-def report(machine: BareMachine, ended: Ended, options: BareOptions) -> int:
+def report(world: World, options: BareOptions) -> int:
     """Says on stderr why a run ended that did not end as planned; returns the exit code."""
+    board, serial, why = board_of(world), terminal_of(world).input, ended(world, options.max_cycles)
     verdict = "passed"
-    for fault in machine.faults:
+    for fault in board.faults[:FAULTS_LISTED]:
         complain(f"firmware fault: {fault}")
-    if machine.faults_lost:
-        complain(f"firmware faults: {machine.faults_lost} more are not listed")
-    if ended is Ended.CYCLES:
-        complain(f"stopped at the limit, at {stopped_at(machine)}")
+    if board.fault_count > FAULTS_LISTED:
+        complain(f"firmware faults: {board.fault_count - FAULTS_LISTED} more are not listed")
+    if why is Ended.CYCLES:
+        complain(f"stopped at the limit, at {stopped_at(world)}")
         verdict = "limit"
-    elif ended is Ended.HALTED:
-        complain(f"the program ended at {stopped_at(machine)}; no interrupt can wake it")
+    elif why is Ended.HALTED:
+        complain(f"the program ended at {stopped_at(world)}; no interrupt can wake it")
         verdict = "passed" if options.until is None else "failed"
-    if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
-        complain(f"addresses have no names: {machine.image.symbols.problem}")
-    waiting = machine.input.waiting_for
-    left = amount(machine.input.left, "byte of --stdin was", "bytes of --stdin were")
+    if (board.faults or why in (Ended.CYCLES, Ended.HALTED)) and world.image.symbols.problem:
+        complain(f"addresses have no names: {world.image.symbols.problem}")
+    waiting = serial.waiting_for
+    left = amount(serial.left, "byte of --stdin was", "bytes of --stdin were")
     if waiting:
-        times = machine.input.seen[waiting]
+        times = serial.seen[waiting]
         seen = f"was not seen again after {amount(times, 'time')}" if times else "was not seen"
         complain(f"--stdin-when: {waiting!r} {seen}; {left} not sent")
-    elif machine.input.left and not machine.input.live and ended is not Ended.UNTIL:
-        begun = machine.input.char_end
-        reason = "the run ended first" if begun else "the receiver was never on, and no --baud is given"
+    elif serial.left and not serial.live and why is not Ended.UNTIL:
+        reason = (
+            "the run ended first" if serial.char_end else "the receiver was never on, and no --baud is given"
+        )
         complain(f"{left} not sent: {reason}")
-    if options.stdin and machine.cpu.sfr(_SCON) & _NINE_BITS:
+    if options.stdin and board.cpu.sfr(_SCON) & _NINE_BITS:
         complain("--stdin: the serial port takes characters of 9 bits; the ninth was 1 in all that were sent")
-    changed = machine.changed_code()
+    changed = board.changed_code()
     if changed:
         complain(
             f"--code-in-xram: the program has overwritten {amount(len(changed), 'byte')} of its image, "
             f"the first at {changed[0]:#06x}"
         )
-    return exit_code(verdict, *("fault" for _ in machine.faults))
+    return exit_code(verdict, *("fault" for _ in board.faults))
 
 
-def stopped_at(machine: BareMachine) -> str:
+def stopped_at(world: World) -> str:
     """Where and when, for people."""
-    return f"{place_of(machine.cpu.pc, machine.image)} after {amount(machine.cpu.cycles, 'machine cycle')}"
+    cpu = board_of(world).cpu
+    return f"{place_of(cpu.pc, world.image)} after {amount(cpu.cycles, 'machine cycle')}"
 
 
 def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:

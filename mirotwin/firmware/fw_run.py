@@ -20,15 +20,18 @@ from typing import Annotated
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.machine import BareMachine, Ended
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
     STDIN,
     BareOptions,
+    board_of,
     load_bare_image,
-    make_machine,
+    make_world,
     report,
     stopped_at,
     target_of,
+    terminal_of,
 )
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
@@ -58,27 +61,39 @@ def check_terminal(options: BareOptions) -> None:
         ) from None
 
 
-def run_terminal(machine: BareMachine, target: int | None, options: BareOptions) -> Ended:
-    """Runs `machine`, which must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
-    hertz = options.crystal_hz / 12
-    slice_cycles = max(1, int(hertz * SLICE_S))
+def limit_tick(options: BareOptions) -> int:
+    """The tick of --max-cycles."""
+    return NEVER_TICK if options.max_cycles is None else options.max_cycles * CYCLE_TICKS
+
+
+def run_world(world: World, options: BareOptions) -> None:
+    """Runs to its end or to the limit."""
+    end_tick, cpu = limit_tick(options), board_of(world).cpu
+    with ProgressBar("running", options.max_cycles) as bar:
+        while not world.finished and world.tick < end_tick:
+            world.run_to(min(end_tick, world.period_end))
+            bar.to(cpu.cycles)
+
+
+def run_terminal(world: World, options: BareOptions) -> None:
+    """Runs `world`, whose terminal must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
+    slice_ticks = max(1, int(options.crystal_hz / CYCLE_TICKS * SLICE_S)) * CYCLE_TICKS
+    end_tick = limit_tick(options)
     keyboard = sys.stdin.fileno()
     with _raw(keyboard):
         due_s = time.monotonic()
         while True:
-            ended = machine.run(target, options.max_cycles, pause=machine.cpu.cycles + slice_cycles)
+            world.run_to(min(end_tick, world.tick + slice_ticks))
             sys.stdout.buffer.flush()
-            if ended is not Ended.PAUSED:
-                break
+            if world.finished or world.tick >= end_tick:
+                return
             due_s = max(due_s + SLICE_S, time.monotonic() - LATEST_S)
             keys = _keys(keyboard, due_s)
             if keys is None or LEAVE in keys:
                 break
             if keys:
-                machine.input.add(keys)
-    if ended is Ended.PAUSED:
-        complain(f"left at {stopped_at(machine)}")
-    return ended
+                terminal_of(world).input.add(keys)
+    complain(f"left at {stopped_at(world)}")
 
 
 def _keys(keyboard: int, due_s: float) -> bytes | None:
@@ -111,6 +126,20 @@ def _raw(keyboard: int) -> Iterator[None]:
         yield
     finally:
         termios.tcsetattr(keyboard, termios.TCSANOW, before)
+
+
+def dumped(world: World) -> dict[str, object]:
+    """Registers and memories; SFRs by two hex digits, ports at their latches."""
+    board = board_of(world)
+    cpu = board.cpu
+    return {
+        "pc": cpu.pc,
+        "cycles": cpu.cycles,
+        "instructions": cpu.instructions,
+        "iram_hex": bytes(cpu.peek_iram(address) for address in range(0x100)).hex(),
+        "sfr": {f"{address:02x}": cpu.sfr(address) for address in range(0x80, 0x100)},
+        "xram_hex": board.xram().hex(),
+    }
 
 
 class FwRunOptions(Options, frozen=True, kw_only=True):
@@ -154,14 +183,10 @@ def run(options: FwRunOptions) -> int:
         loaded = loaded.merged(load_bare_image(one, bare, named=False))
     target = target_of(image, loaded, bare)
     out = sys.stdout.buffer
-    machine = make_machine(loaded, bare, out.write, live=options.terminal)
-    if options.terminal:
-        ended = run_terminal(machine, target, bare)
-    else:
-        with ProgressBar("running", bare.max_cycles) as bar:
-            ended = machine.run(until=target, max_cycles=bare.max_cycles, progress=bar.to)
+    world = make_world(loaded, bare, target, out.write, live=options.terminal)
+    (run_terminal if options.terminal else run_world)(world, bare)
     out.flush()
     if dump is not None:
         with whole_file(dump, "--dump") as staging:
-            staging.write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
-    return report(machine, ended, bare)
+            staging.write_bytes(msgspec.json.format(msgspec.json.encode(dumped(world)), indent=2) + b"\n")
+    return report(world, bare)

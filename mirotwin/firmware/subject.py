@@ -12,8 +12,8 @@ from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
-from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_machine, report, target_of
-from mirotwin.runs.inspected_run import BareRun, RobotRun, Run, watch
+from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_world, report, target_of
+from mirotwin.runs.inspected_run import InspectedRun, watch
 from mirotwin.runs.job import load_job
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.spec import RunSpec
@@ -77,7 +77,7 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
         return window(self.from_time, self.to_time, self.bare.crystal_hz)[1]
 
 
-def open_window(options: WindowOptions) -> Run:
+def open_window(options: WindowOptions) -> InspectedRun:
     """The run that was asked for, at its first tick. Raises BadInput where the window is not in it.
 
     An empty window is refused before anything is read.
@@ -94,7 +94,7 @@ def open_window(options: WindowOptions) -> Run:
     return run
 
 
-def open_run(options: SubjectOptions) -> Run:
+def open_run(options: SubjectOptions) -> InspectedRun:
     """The run that was asked for, at its first tick. Raises BadInput."""
     if options.subject.lower().endswith(IMAGE_SUFFIXES):
         return _bare_run(options)
@@ -102,7 +102,7 @@ def open_run(options: SubjectOptions) -> Run:
 
 
 def look(
-    run: Run, options: WindowOptions, *watchers: Watcher, early_ticks: int = 0, late_ticks: int = 0
+    run: InspectedRun, options: WindowOptions, *watchers: Watcher, early_ticks: int = 0, late_ticks: int = 0
 ) -> int:
     """Runs it under the eyes of `watchers` and says how it ended; returns the exit code.
 
@@ -124,10 +124,9 @@ def look(
         raise BadInput(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
-    if isinstance(run, RobotRun):
+    if run.board is not None:
         return report_lines(fault_lines(run.world.robots))
-    assert isinstance(run, BareRun)
-    return report(run.machine, run.ended, options.bare)
+    return report(run.world, options.bare)
 
 
 def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
@@ -135,15 +134,15 @@ def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
         raise BadInput(options.subject, "", f"is {kind}, {option} does not apply to it", "leave it out")
 
 
-def _bare_run(options: SubjectOptions) -> BareRun:
+def _bare_run(options: SubjectOptions) -> InspectedRun:
     _refuse(options, "an image on the bare processor", "seed", "firmware", "settings", "network", "slot")
     image = load_bare_image(options.subject, options.bare)
-    until = target_of(options.subject, image, options.bare)
+    world = make_world(image, options.bare, target_of(options.subject, image, options.bare))
+    cycles = options.bare.max_cycles
+    return InspectedRun(world, end_tick=None if cycles is None else cycles * clock.CYCLE_TICKS)
 
-    return BareRun(make_machine(image, options.bare), until, options.bare.max_cycles)
 
-
-def _robot_run(options: SubjectOptions) -> RobotRun:
+def _robot_run(options: SubjectOptions) -> InspectedRun:
     for option in options.bare.given():
         raise BadInput(options.subject, "", f"is no image, {option} does not apply to it", "leave it out")
     subject = options.subject
@@ -164,7 +163,7 @@ def _robot_run(options: SubjectOptions) -> RobotRun:
         with plain_parameters(subject):
             world = job.spec.world()
     network, index = _which_robot(world, options)
-    return RobotRun(world, network, index, end_tick, job)
+    return InspectedRun(world, network, index, end_tick, job)
 
 
 def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:

@@ -21,7 +21,7 @@ from miro_protocol.actions import ScriptItem
 from miro_protocol.protocol import Damage, Frame, Protocol
 from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import Transmission
-from miro_robot.bare.machine import CRYSTAL_HZ
+from miro_robot.board_spec import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle

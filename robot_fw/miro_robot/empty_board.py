@@ -176,6 +176,10 @@ class EmptyBoard(ProcessorBoard):
         self.ends = tuple([address for address in self.loops if jumps_to_itself(code_at, address)])
         self.next_check = self.cpu.cycles + _CHECK_CYCLES
 
+    def marks(self) -> tuple[int, ...]:
+        """Where it sets marks itself, for each run: for the debugger."""
+        return (*self.ends, *self.stop_at)
+
     def _code_at(self, address: int) -> int:
         return self.cpu.code_at(address)
 

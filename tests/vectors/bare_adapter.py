@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 from miro_exact.state import Flat
 from miro_robot.image import load_hex
-from mirotwin.firmware.bare_options import load_bare_image, make_machine, target_of
-from mirotwin.firmware.fw_run import FwRunOptions, run
+from mirotwin.firmware.bare_options import board_of, ended, load_bare_image, make_world, target_of, wire_of
+from mirotwin.firmware.fw_run import FwRunOptions, run, run_world
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
 from mirotwin.runs.bare_case import rerun_bare_case
@@ -50,16 +50,11 @@ def run_image(entry, folder):
     given = run.make_context("run", words, resilient_parsing=False).params
     options = _read(FwRunOptions, given)
     image = load_bare_image(options.image, options.bare, named=False)
-    machine = make_machine(image, options.bare)
-    sent, hear = [], machine.input.heard
-
-    def heard(value, tick):
-        sent.append((value, tick))
-        hear(value, tick)
-
-    machine.input.heard = heard
-    why = machine.run(target_of(options.image, image, options.bare), options.bare.max_cycles)
-    return _end(machine, sent, machine.faults, f"{why}")
+    world = make_world(image, options.bare, target_of(options.image, image, options.bare))
+    run_world(world, options.bare)
+    sent = [(event.value, event.tick) for _, event in wire_of(world).log.since(0, ("heard",))]
+    board, why = board_of(world), ended(world, options.bare.max_cycles)
+    return _end(board.cpu, board.xram(), sent, world.faults[:100], f"{why}")
 
 
 def run_case(entry, folder):
@@ -82,11 +77,12 @@ def run_case(entry, folder):
         image = load_hex(program_of(entry.other, folder, "other.ihx"))
     again, verdict = rerun_bare_case(path, image, check)
     processor = BarePlayback(image, again.line, again.script, again.end_tick).play().processor
-    return _end(processor, processor.bus.said, processor.faults, verdict.verdict, verdict.texts[0])
+    xram, sent = processor.bus.content(), processor.bus.said
+    return _end(processor.cpu, xram, sent, processor.faults, verdict.verdict, verdict.texts[0])
 
 
-def _end(machine, sent, faults, why, verdict=""):
-    flat = Flat(machine.cpu)
+def _end(cpu, xram, sent, faults, why, verdict=""):
+    flat = Flat(cpu)
     faults = [(int(fault.kind), fault.tick, fault.pc) for fault in faults]
     fields = flat.decode(flat.save())
-    return End(fields, machine.cpu.cycles, machine.bus.content(), list(sent), faults, why, verdict)
+    return End(fields, cpu.cycles, xram, list(sent), faults, why, verdict)

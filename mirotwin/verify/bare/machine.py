@@ -6,7 +6,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import NEVER_TICK
-from miro_robot.bare.machine import CRYSTAL_HZ, CRYSTAL_RANGE_HZ
+from miro_robot.board_spec import CRYSTAL_HZ, CRYSTAL_RANGE_HZ
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image

@@ -1,7 +1,4 @@
-"""A bus with 64 KB of RAM on it and nothing else.
-
-Feeding the serial port is `miro_robot.bare.machine`'s.
-"""
+"""A bus with 64 KB of RAM on it and nothing else."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ cdef int TRUE
 
 cdef class Device:
     cdef readonly ProcessorBoard board
-    cdef readonly object network, slot, log
+    cdef readonly object network, slot, log, image
     cdef readonly list counter_addresses
     cdef public tuple marks
     cdef public list asked

@@ -21,7 +21,7 @@ class Device:
     """
 
     STATE: dict[str, Any] = {"board": ProcessorBoard}
-    NOT_STATE: tuple[str, ...] = ("network", "slot", "log", "marks", "asked", "counter_addresses")
+    NOT_STATE: tuple[str, ...] = ("network", "slot", "log", "marks", "asked", "image", "counter_addresses")
 
     def __init__(self, board: ProcessorBoard, network: int, slot: int, image: Image) -> None:
         self.board = board
@@ -30,7 +30,8 @@ class Device:
         self.log = BoardLog(board.log, network, slot)
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Any], object], str]] = []
-        self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
+        self.image = image
+        self.counter_addresses: list[int | None] | None = None
 
     def run(self, tick: int) -> int:
         """Runs the board to `tick`, watching out for what a wait asked for; not 0 when it stopped early."""
@@ -62,6 +63,8 @@ class Device:
 
     def counter(self, index: int) -> int | None:
         """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
+        if self.counter_addresses is None:  # not before: it takes time to read symbols
+            self.counter_addresses = [_iram_address(self.image, f"_{counter}") for counter in COUNTERS]
         address = self.counter_addresses[index]
         if address is None:
             return None

@@ -117,7 +117,9 @@ class Watch:
         if not 0 <= condition.network < len(lines):
             raise ValueError(f"there is no network {condition.network}; the last one is {len(lines) - 1}")
         slot = condition.at_slot(lines[condition.network].first_slot)
-        if slot != PC:
+        if isinstance(condition, WheelSpeeds):
+            self.world.robot(condition.network, slot)
+        elif slot != PC:
             self.world.device(condition.network, slot)
         return condition.network, slot
 

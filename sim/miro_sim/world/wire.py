@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
@@ -43,12 +43,12 @@ class BoardAlone(Device):
 class Wire(Medium):
     """Line `index` with one board on it. `script`: what the host sends; without it and a terminal, who injects.
 
-    The PC hears a character when its stop bit begins.
+    The PC hears a character when its stop bit begins. `output` gets each of them then, again where the world goes back.
     """
 
     STATE = {"terminal": Terminal, "bit_ticks": ("q", 0, 1 << 40), "busy_tick": TICK, "transmissions": TICK}
     NOT_HASHED = ("bit_ticks",)
-    NOT_STATE = ("character_ticks",)
+    NOT_STATE = ("character_ticks", "output")
 
     def __init__(
         self, scenario: BoardScenario, index: int, image: Image, script: Sequence[ScriptItem] | None
@@ -63,6 +63,7 @@ class Wire(Medium):
         self.busy_tick = 0
         self.transmissions = 0
         self.character_ticks = 0  # of the last one that the board sent
+        self.output: Callable[[bytes], object] | None = None
         outbox = Outbox(0, index, CHARACTER_BITS * scenario.bit_ticks)
         log = HostLog(index, lambda tick: tick, 0)
         Medium.__init__(self, index, host, [BoardAlone(board, index, image)], outbox, log)
@@ -136,6 +137,8 @@ class Wire(Medium):
         self.character_ticks = (bits + 1) * bit_ticks
         self.heard.append((value, True, max(0, tick - bits * bit_ticks)))
         self.log.note_heard([(value, True, tick)])
+        if self.output is not None:
+            self.output(bytes([value]))
 
     def hear(self, tick: int) -> None:
         """Everything was heard while the board ran."""

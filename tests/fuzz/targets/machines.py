@@ -1,13 +1,12 @@
 """What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.input import InputPiece
-from miro_robot.bare.machine import BareMachine
-from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.board import Board
 from miro_robot.image import load_hex
 from miro_robot.plant import IdealWheels
 from miro_robot.wiring import WiringError, load_wiring
+from miro_sim.scenario.terminal import InputPiece, PinEvent, read_pins
+from tests.alone import Alone
 from tests.fuzz.target import Draws, Target, always, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
 from tests.states import snapshot
@@ -49,7 +48,7 @@ def _serial():
         sent = ([], [])
         try:
             whole, parts = (
-                BareMachine(
+                Alone(
                     *(image, False, tuple(pieces), baud, lambda some, at=at: sent[at].extend(some)),
                     crystal_hz=crystal_hz,
                     gap_ticks=gap_ticks,

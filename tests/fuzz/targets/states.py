@@ -10,15 +10,14 @@ import struct
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import Flat
-from miro_robot.bare.input import InputPiece
-from miro_robot.bare.machine import BareMachine
-from miro_robot.bare.pins import PinEvent
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
+from miro_sim.scenario.terminal import InputPiece, PinEvent
 from miro_sim.world.saved import opened, sealed
+from tests.alone import Alone
 from tests.fuzz.target import Draws, Target, folder, refused
 from tests.mirotwin.mutated_files import ECHO, hex_records
 from tests.sim.mutated_worlds import fresh, saved_worlds
@@ -166,7 +165,7 @@ def _bare():
     def make():
         pieces = (InputPiece(b"abc"), InputPiece(b"de", b"c", 5))
         return _Flat(
-            BareMachine(image, False, pieces, 9600, pins=(PinEvent(5000, 1, 2, 0), PinEvent(90_000, 1, 2, 1)))
+            Alone(image, False, pieces, 9600, pins=(PinEvent(5000, 1, 2, 0), PinEvent(90_000, 1, 2, 1)))
         )
 
     states = []

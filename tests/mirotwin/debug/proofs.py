@@ -15,7 +15,6 @@ from pathlib import Path
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import Flat
-from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from miro_robot.image.c_types import value_of
 from miro_robot.inspect.frames import Unwinder
@@ -25,8 +24,9 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
 from mirotwin.debug.expression import content
 from mirotwin.debug.timeline import Trap
-from mirotwin.runs.inspected_run import BareRun
+from mirotwin.runs.inspected_run import InspectedRun
 from tests import children
+from tests.alone import Alone
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
 
 JBC = 0x10
@@ -135,14 +135,14 @@ def assembled(source):
     """A run of a program in assembler on the bare processor."""
     from tests.mirotwin.verify.bare.firmwares import image
 
-    return BareRun(BareMachine(image(source), stop_on_fault=False), None, None)
+    return InspectedRun(Alone(image(source), stop_on_fault=False).world)
 
 
 def compiled(folder, source, *options):
     """A run of a C program, built by SDCC."""
     target = Path(folder) / f"{source.stem}{''.join(options)}.ihx"
     children.run(["sdcc", "-mmcs51", "--debug", *options, str(source), "-o", str(target)], check=True)
-    return BareRun(BareMachine(load_hex(target, limit=65536), stop_on_fault=False), None, None)
+    return InspectedRun(Alone(load_hex(target, limit=65536), stop_on_fault=False).world)
 
 
 def arguments(run, end_tick):

@@ -9,7 +9,7 @@ from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
-from mirotwin.runs.inspected_run import RobotRun
+from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.shell.firmware_image import load_firmware
 from tests.sim.digests import GOLDEN
 
@@ -40,7 +40,7 @@ RET
 
 def robot_run(scenario="fig6", seed=7, firmware=None, index=0, settings=()):
     """A run of a scenario at its first tick."""
-    return RobotRun(World(load(scenario, settings).scenario, seed, load_firmware(firmware)), 0, index)
+    return InspectedRun(World(load(scenario, settings).scenario, seed, load_firmware(firmware)), 0, index)
 
 
 def golden_digest(name):

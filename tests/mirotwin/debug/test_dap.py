@@ -8,11 +8,11 @@ import threading
 
 import pytest
 
-from miro_robot.bare.machine import BareMachine
 from mirotwin.debug import debug_command
 from mirotwin.debug.adapter import Adapter
-from mirotwin.runs.inspected_run import BareRun
+from mirotwin.runs.inspected_run import InspectedRun
 from tests import children
+from tests.alone import Alone
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.debug.runs import debugger_of, robot_run
 from tests.mirotwin.program import COMMAND
@@ -172,7 +172,7 @@ class ClientDuringARun:
 def test_a_step_goes_on_past_a_change_of_breakpoints_and_stops_at_new_ones(place, stops_at):
     places = {"breakpoints": [{"instructionReference": hex(place)}]}
     wire = ClientDuringARun({"seq": 2, "command": "setInstructionBreakpoints", "arguments": places})
-    debugger = debugger_of(BareRun(BareMachine(image(SLOW)), None, None))
+    debugger = debugger_of(InspectedRun(Alone(image(SLOW)).world))
     adapter = Adapter(wire)
     adapter.use(debugger)
     adapter.answer({"seq": 1, "command": "next", "arguments": {"threadId": 1}})

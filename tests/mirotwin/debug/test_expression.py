@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from miro_robot.image.c_types import CType
 from mirotwin.debug.expression import NoValue, Value, content, expression
-from mirotwin.runs.inspected_run import BareRun
+from mirotwin.runs.inspected_run import InspectedRun
 from tests import children
+from tests.alone import Alone
 from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
 from tests.mutants.sdcc import needs_sdcc
 
@@ -146,7 +146,7 @@ void main(void) { while (1) { sum = twice(sum, 3); sum = less(sum, 1); } }
 def test_a_variable_in_shared_memory_is_live_while_its_function_is_under_way(tmp_path):
     (tmp_path / "two.c").write_text(OVERLAID)
     children.run(["sdcc", "-mmcs51", "--debug", "two.c"], cwd=tmp_path, check=True)
-    debugger = debugger_of(BareRun(BareMachine(load_hex(tmp_path / "two.ihx")), None, None))
+    debugger = debugger_of(InspectedRun(Alone(load_hex(tmp_path / "two.ihx")).world))
     debugger.add("less")
     debugger.move("continue")
     assert shown(debugger, "less_PARM_2") == 1

@@ -6,11 +6,11 @@ from itertools import product
 import pytest
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from mirotwin.debug.expression import content, expression
-from mirotwin.runs.inspected_run import BareRun
+from mirotwin.runs.inspected_run import InspectedRun
 from tests import children
+from tests.alone import Alone
 from tests.mirotwin.debug.proofs import arguments
 from tests.mirotwin.debug.runs import debugger_of, robot_run
 from tests.mutants.sdcc import needs_sdcc
@@ -28,7 +28,7 @@ def compiled(folder, source, *options):
     (folder / "program.c").write_text(source)
     command = ["sdcc", "-mmcs51", "--debug", *options, "program.c"]
     children.run(command, cwd=folder, check=True, capture_output=True)
-    return debugger_of(BareRun(BareMachine(load_hex(folder / "program.ihx", limit=65536)), None, None))
+    return debugger_of(InspectedRun(Alone(load_hex(folder / "program.ihx", limit=65536)).world))
 
 
 def every_convention():

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import Flat
-from miro_robot.bare.machine import BareMachine
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.marks import MarkInspector
 from miro_robot.inspect.writes import cpu_bit
@@ -20,6 +19,7 @@ from mirotwin.debug.console import Console
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline, Trap
 from mirotwin.shell.progress import ProgressBar
+from tests.alone import Alone
 from tests.mirotwin.debug import proofs
 from tests.mirotwin.debug.proofs import LIBRARY, MIX
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
@@ -429,7 +429,7 @@ PLACES = st.sets(st.integers(0, 0x60), max_size=8)
 
 
 def machine():
-    return BareMachine(image(ASM), stop_on_fault=False)
+    return Alone(image(ASM), stop_on_fault=False)
 
 
 def executed():

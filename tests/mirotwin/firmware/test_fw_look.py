@@ -13,7 +13,7 @@ from miro_robot.image import load_hex
 from miro_robot.inspect.counters import Activity, Counters
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.runs.inspected_run import RobotRun, watch
+from mirotwin.runs.inspected_run import InspectedRun, watch
 from tests import children
 from tests.mirotwin.conftest import hex_file
 from tests.robot.inspect.programs import build_modules
@@ -184,7 +184,7 @@ def test_looking_changes_no_bit_of_the_world(short):
     plain, watched = world(), world()
     while not plain.finished:
         plain.step()
-    assert watch(RobotRun(watched, 0, 1), [Counters(), Activity()], 1_000_001, 2_345_678)
+    assert watch(InspectedRun(watched, 0, 1), [Counters(), Activity()], 1_000_001, 2_345_678)
     while not watched.finished:
         watched.step()
     assert watched.digest == plain.digest

@@ -400,17 +400,18 @@ def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_fa
 # Firmware coverage of other people's test sessions
 
 TESTS = """
-from miro_robot.bare.machine import BareMachine
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.world.world import World
 
 def test_reset():
-    BareMachine(load_hex(image_path())).run(max_cycles=2000)
+    World(BoardScenario(), 0, load_hex(image_path())).run_to(12 * 2000)
 
 def test_longer():
-    BareMachine(load_hex(image_path())).run(max_cycles=20000)
+    World(BoardScenario(), 0, load_hex(image_path())).run_to(12 * 20000)
 
 def test_other_firmware_does_not_count():
     cpu = Cpu(Bus())

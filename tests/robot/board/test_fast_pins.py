@@ -2,8 +2,8 @@
 
 import itertools
 
-from miro_robot.bare.machine import BareMachine
 from miro_robot.mcs51.cpu import REACHED, WIRE_FULL
+from tests.alone import Alone
 from tests.robot.board.rig import board_with, image_of
 from tests.states import snapshot
 
@@ -26,7 +26,7 @@ def test_a_board_without_a_listener_goes_on():
 
 
 def test_so_does_the_bare_machine():
-    machine = BareMachine(image_of(TOGGLE))
+    machine = Alone(image_of(TOGGLE))
     machine.run(max_cycles=200_000)
     assert machine.cpu.cycles >= 200_000
     assert len(machine.cpu.txd.edges()) <= 4096

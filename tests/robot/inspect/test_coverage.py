@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.counters import Counters
@@ -31,6 +30,7 @@ from miro_robot.inspect.lcov import FileRecord, add, decode, encode
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.opcodes import is_conditional
 from tests import children
+from tests.alone import Alone
 from tests.robot.inspect.programs import SWITCH, build, line_of
 
 COUNTS = st.integers(0, 10**12)
@@ -187,7 +187,7 @@ def test_a_long_word_is_no_kind_of_record_and_is_not_repeated():
 
 
 def counts_after(image, cycles):
-    machine = BareMachine(image)
+    machine = Alone(image)
     counters = Counters()
     attach(machine.cpu, counters)
     machine.run(max_cycles=cycles)

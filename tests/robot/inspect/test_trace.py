@@ -1,9 +1,9 @@
 """A trace has a line for each step, with what it changed."""
 
-from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, InstructionTrace, registers
 from miro_robot.inspect.watcher import attach, detach
+from tests.alone import Alone
 from tests.robot.mcs51.asm import image_of
 from tests.robot.mcs51.rig import cpu_with
 
@@ -80,7 +80,7 @@ def test_sleep_is_one_line_however_the_run_is_cut():
 
 def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
     image, lines = image_of("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h"), []
-    machine = BareMachine(image, code_in_xram=True)
+    machine = Alone(image, code_in_xram=True)
     attach(machine.cpu, InstructionTrace(SymbolNames(image), lines.append))
     machine.run(max_cycles=30)
     shown = [line.split("MOV A,")[1].split()[0] for line in lines if "MOV A," in line]

@@ -7,10 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from miro_robot.bare.input import InputPiece
-from miro_robot.bare.machine import BareMachine, Ended
-from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.faults import FaultKind
+from miro_sim.scenario.terminal import InputPiece, PinEvent, read_pins
+from tests.alone import Alone, Ended
 from tests.robot.mcs51.asm import assemble, image_of
 from tests.states import restore, snapshot
 
@@ -22,7 +21,7 @@ AUTOBAUD += "measure:\nINC A\n" + "NOP\n" * 6 + "JNB RXD,measure\nMOV 30h,A\nSJM
 
 def test_stdin_is_echoed_byte_by_byte():
     out = bytearray()
-    machine = BareMachine(image_of(ECHO), stdin=b"hello, world\n", output=out.extend)
+    machine = Alone(image_of(ECHO), stdin=b"hello, world\n", output=out.extend)
     assert machine.run(max_cycles=100_000) == Ended.CYCLES
     assert bytes(out) == b"hello, world\n"
 
@@ -30,28 +29,26 @@ def test_stdin_is_echoed_byte_by_byte():
 def test_with_wait_the_next_byte_waits_until_ri_was_cleared():
     slow = SERIAL + "loop:\nJNB RI,$\nMOV @R0,SBUF\nINC R0\nMOV R7,#00h\nw:\nMOV R6,#20\nDJNZ R6,$\n"
     slow += "DJNZ R7,w\nCLR RI\nSJMP loop"
-    machine = BareMachine(image_of("MOV R0,#30h\n" + slow), stdin=b"abcdef", wait=True)
+    machine = Alone(image_of("MOV R0,#30h\n" + slow), stdin=b"abcdef", wait=True)
     machine.run(max_cycles=200_000)
     assert bytes(machine.cpu.peek_iram(0x30 + n) for n in range(6)) == b"abcdef"
 
 
 def test_a_program_may_measure_the_bit_rate_of_its_first_character():
-    machine = BareMachine(image_of(AUTOBAUD), stdin=b" ", baud=9600)
+    machine = Alone(image_of(AUTOBAUD), stdin=b" ", baud=9600)
     assert machine.run() == Ended.HALTED
     low_cycles = machine.cpu.peek_iram(0x30) * 9
     assert low_cycles == pytest.approx(6 * 2_000_000 / 9600, abs=12)  # start bit and five zeros of a space
 
 
 def test_without_a_baud_rate_nothing_is_sent_to_a_receiver_that_is_off():
-    machine = BareMachine(image_of(AUTOBAUD), stdin=b" ")
+    machine = Alone(image_of(AUTOBAUD), stdin=b" ")
     assert machine.run(max_cycles=50_000) == Ended.CYCLES
     assert machine.cpu.peek_iram(0x30) == 0
 
 
 def test_external_ram_is_64_kb_apart_from_code():
-    machine = BareMachine(
-        image_of("MOV DPTR,#0000h\nMOV A,#5Ah\nMOVX @DPTR,A\nMOV A,#00h\nMOVC A,@A+DPTR\nSJMP $")
-    )
+    machine = Alone(image_of("MOV DPTR,#0000h\nMOV A,#5Ah\nMOVX @DPTR,A\nMOV A,#00h\nMOVC A,@A+DPTR\nSJMP $"))
     assert machine.run() == Ended.HALTED
     assert machine.cpu.a == 0x90
     assert machine.dump()["xram_hex"].startswith("5a00")
@@ -61,16 +58,16 @@ def test_code_in_xram_runs_what_it_writes():
     store = "MOV A,#{}\nMOVX @DPTR,A\nINC DPTR\n"
     text = "MOV DPTR,#0100h\n" + "".join(store.format(byte) for byte in ("74h", "33h", "22h"))
     text += "LCALL 0100h\nSJMP $"
-    machine = BareMachine(image_of(text), code_in_xram=True)
+    machine = Alone(image_of(text), code_in_xram=True)
     assert machine.run() == Ended.HALTED
     assert machine.cpu.a == 0x33
     assert machine.faults == []
-    other = BareMachine(image_of(text))
+    other = Alone(image_of(text))
     assert other.run(max_cycles=1000) == Ended.FAULT
 
 
 def test_a_run_stops_at_an_address_and_goes_on():
-    machine = BareMachine(image_of("NOP\nNOP\nMOV A,#01h\nSJMP $"))
+    machine = Alone(image_of("NOP\nNOP\nMOV A,#01h\nSJMP $"))
     assert machine.run(until=2, max_cycles=1000) == Ended.UNTIL
     assert machine.cpu.a == 0
     assert machine.run() == Ended.HALTED
@@ -86,7 +83,7 @@ def test_a_run_stops_at_an_address_and_goes_on():
     ],
 )
 def test_whatever_jump_leads_to_itself_ends_a_program_where_no_interrupt_may_come(text, end):
-    machine = BareMachine(image_of(text))
+    machine = Alone(image_of(text))
     assert machine.run() == Ended.HALTED
     assert (machine.cpu.pc, machine.cpu.cycles, machine.cpu.instructions) == end
 
@@ -95,7 +92,7 @@ def test_whatever_jump_leads_to_itself_ends_a_program_where_no_interrupt_may_com
 def test_a_limit_that_is_not_reached_changes_nothing(main):
     text = "LJMP start\nORG 0023h\nCLR RI\nMOV A,SBUF\nDJNZ R7,back\nLJMP done\nback:\nRETI\nstart:\n"
     text += SERIAL + f"MOV R7,#5\nMOV IE,#90h\nmain:\n{main}\ndone:\nNOP\nSJMP $"
-    free, limited = (BareMachine(image_of(text), stdin=b"hello") for _ in range(2))
+    free, limited = (Alone(image_of(text), stdin=b"hello") for _ in range(2))
     until = assemble(text).rindex(b"\x00\x80\xfe")
     assert free.run(until=until) == Ended.UNTIL
     assert limited.run(until=until, max_cycles=1_000_000) == Ended.UNTIL
@@ -104,13 +101,13 @@ def test_a_limit_that_is_not_reached_changes_nothing(main):
 
 def test_a_jump_to_itself_that_interrupts_leave_is_no_end():
     program = "LJMP main\nORG 000Bh\nINC 30h\nRETI\nmain:\nMOV TMOD,#02h\nSETB TR0\nMOV IE,#82h\nSJMP $"
-    machine = BareMachine(image_of(program))
+    machine = Alone(image_of(program))
     assert machine.run(pause=1_000_000) == Ended.PAUSED
     assert machine.cpu.peek_iram(0x30) > 0
 
 
 def test_bytes_that_only_look_like_a_jump_to_itself_end_nothing():
-    machine = BareMachine(image_of("MOV 80h,#0FEh\nMOV DPTR,#80FEh\nSJMP $"))
+    machine = Alone(image_of("MOV 80h,#0FEh\nMOV DPTR,#80FEh\nSJMP $"))
     assert machine.run() == Ended.HALTED
     assert (machine.cpu.pc, machine.cpu.dptr) == (6, 0x80FE)
 
@@ -118,7 +115,7 @@ def test_bytes_that_only_look_like_a_jump_to_itself_end_nothing():
 @pytest.mark.parametrize("step", [1, 7, 333, 1_001])
 @pytest.mark.parametrize("text", [ECHO, SERIAL + "MOV SBUF,#41h\nSJMP $", "NOP\nMOV PCON,#01h\nSJMP $"])
 def test_a_run_that_is_paused_is_the_same_run(text, step):
-    whole, cut = (BareMachine(image_of(text), stdin=b"hi!") for _ in range(2))
+    whole, cut = (Alone(image_of(text), stdin=b"hi!") for _ in range(2))
     limit = 12_000 if text == ECHO else None
     ended = whole.run(max_cycles=limit)
     pause = step
@@ -129,12 +126,12 @@ def test_a_run_that_is_paused_is_the_same_run(text, step):
 
 
 def test_a_fault_names_kind_place_and_tick():
-    machine = BareMachine(image_of("NOP\nDB 0A5h\nSJMP $"))
+    machine = Alone(image_of("NOP\nDB 0A5h\nSJMP $"))
     assert machine.run(max_cycles=1000) == Ended.FAULT
     fault = machine.faults[0]
     assert (fault.kind, fault.pc, fault.tick) == (FaultKind.UNDEFINED_OPCODE, 1, 24)
     assert str(fault) == "firmware executed the undefined opcode A5 at 0x0001, tick 24"
-    forgiving = BareMachine(image_of("NOP\nDB 0A5h\nSJMP $"), stop_on_fault=False)
+    forgiving = Alone(image_of("NOP\nDB 0A5h\nSJMP $"), stop_on_fault=False)
     assert forgiving.run() == Ended.HALTED
 
 
@@ -144,18 +141,17 @@ def test_a_fault_names_kind_place_and_tick():
 def test_a_program_may_send_as_much_as_it_likes(mode, lasts):
     out = bytearray()
     text = f"MOV TMOD,#20h\nMOV TH1,#0FFh\nMOV TCON,#40h\nMOV SCON,{mode}\nloop:\nMOV SBUF,#55h\nJNB TI,$\n"
-    machine = BareMachine(image_of(text + "CLR TI\nSJMP loop"), output=out.extend)
+    machine = Alone(image_of(text + "CLR TI\nSJMP loop"), output=out.extend)
     assert machine.run(max_cycles=1_000 * lasts) == Ended.CYCLES
     assert bytes(out) == b"U" * len(out)
     assert len(out) > 1_000
 
 
-def test_progress_is_told_and_the_dump_has_the_registers():
-    told = []
-    machine = BareMachine(image_of("SETB EA\nMOV B,#12h\nloop:\nNOP\nSJMP loop"))
-    assert machine.run(until=6, max_cycles=500_000, progress=told.append) == Ended.UNTIL
-    assert machine.run(max_cycles=500_000, progress=told.append) == Ended.CYCLES
-    assert told[-1] == machine.cpu.cycles
+def test_the_dump_has_the_registers():
+    machine = Alone(image_of("SETB EA\nMOV B,#12h\nloop:\nNOP\nSJMP loop"))
+    assert machine.run(until=6, max_cycles=500_000) == Ended.UNTIL
+    assert machine.cpu.pc == 6
+    assert machine.run(max_cycles=500_000) == Ended.CYCLES
     dump = machine.dump()
     assert (dump["pc"], dump["sfr"]["f0"], len(dump["iram_hex"]), len(dump["xram_hex"])) == (
         5,
@@ -170,19 +166,19 @@ def test_progress_is_told_and_the_dump_has_the_registers():
 )
 def test_a_baud_rate_that_no_receiver_reaches_is_refused(baud, crystal_hz, said):
     with pytest.raises(ValueError, match=f"baud {baud} is outside 50..{said} at {crystal_hz} Hz"):
-        BareMachine(image_of("NOP"), baud=baud, crystal_hz=crystal_hz)
+        Alone(image_of("NOP"), baud=baud, crystal_hz=crystal_hz)
 
 
 def test_a_crystal_that_no_8051_has_is_refused():
     with pytest.raises(ValueError, match="crystal 5 Hz is outside"):
-        BareMachine(image_of("NOP"), crystal_hz=5)
+        Alone(image_of("NOP"), crystal_hz=5)
 
 
 def test_a_limit_does_not_keep_a_program_from_ending():
-    machine = BareMachine(image_of("NOP\nSJMP $"))
+    machine = Alone(image_of("NOP\nSJMP $"))
     assert machine.run(max_cycles=1000) == Ended.HALTED
     assert machine.cpu.cycles == 3
-    assert BareMachine(image_of("NOP\nSJMP $")).run(max_cycles=1) == Ended.CYCLES
+    assert Alone(image_of("NOP\nSJMP $")).run(max_cycles=1) == Ended.CYCLES
 
 
 @pytest.mark.parametrize("limit", [None, 1_000_000])
@@ -200,21 +196,21 @@ def test_a_limit_does_not_keep_a_program_from_ending():
     ids=["idle", "power-down", "serial off", "serial on", "pins", "timers off", "timer that stands"],
 )
 def test_a_program_that_sleeps_for_good_ends_in_that_cycle(text, cycles, limit):
-    machine = BareMachine(image_of(text + "\nSJMP $"))
+    machine = Alone(image_of(text + "\nSJMP $"))
     assert machine.run(max_cycles=limit) == Ended.HALTED
     assert machine.cpu.cycles == cycles
 
 
 def test_a_sleep_that_a_timer_ends_is_no_end():
     text = "LJMP main\nORG 000Bh\nINC 30h\nRETI\nmain:\nMOV TMOD,#02h\nSETB TR0\nMOV IE,#82h\n"
-    machine = BareMachine(image_of(text + "again:\nMOV PCON,#01h\nSJMP again"))
+    machine = Alone(image_of(text + "again:\nMOV PCON,#01h\nSJMP again"))
     assert machine.run(max_cycles=5_000) == Ended.CYCLES
     assert machine.cpu.peek_iram(0x30) > 10
 
 
 def test_input_that_is_still_to_come_wakes_a_sleeper():
     text = "LJMP main\nORG 0023h\nMOV A,SBUF\nCLR RI\nMOV 30h,A\nRETI\nmain:\n" + SERIAL
-    machine = BareMachine(image_of(text + "MOV IE,#90h\nagain:\nMOV PCON,#01h\nSJMP again"), stdin=b"xyz")
+    machine = Alone(image_of(text + "MOV IE,#90h\nagain:\nMOV PCON,#01h\nSJMP again"), stdin=b"xyz")
     assert machine.run() == Ended.HALTED
     assert machine.cpu.peek_iram(0x30) == ord("z")
     woken = machine.cpu.cycles
@@ -226,40 +222,40 @@ def test_input_that_is_still_to_come_wakes_a_sleeper():
 @pytest.mark.parametrize("mode", ["", "MOV SCON,#00h\n"], ids=["uart", "shift register"])
 def test_a_run_ends_with_the_last_character_that_is_being_sent(sleep, mode):
     out = bytearray()
-    machine = BareMachine(image_of(SERIAL + mode + "MOV SBUF,#41h\n" + sleep), output=out.extend)
+    machine = Alone(image_of(SERIAL + mode + "MOV SBUF,#41h\n" + sleep), output=out.extend)
     assert machine.run() == Ended.HALTED
     assert bytes(out) == b"A"
     assert machine.cpu.sfr(0x98) & 0x02  # TI
-    shorter = BareMachine(image_of(SERIAL + mode + "MOV SBUF,#41h\n" + sleep))
+    shorter = Alone(image_of(SERIAL + mode + "MOV SBUF,#41h\n" + sleep))
     assert shorter.run(pause=machine.cpu.cycles - 2) == Ended.PAUSED
     assert not shorter.cpu.sfr(0x98) & 0x02
 
 
 def test_power_down_stops_the_transmitter_too():
     out = bytearray()
-    machine = BareMachine(image_of(SERIAL + "MOV SBUF,#41h\nMOV PCON,#02h"), output=out.extend)
+    machine = Alone(image_of(SERIAL + "MOV SBUF,#41h\nMOV PCON,#02h"), output=out.extend)
     assert machine.run() == Ended.HALTED
     assert (bytes(out), machine.cpu.cycles) == (b"", 12)
 
 
 def test_interrupts_that_are_switched_off_at_the_end_do_not_hide_it():
     wait = "MOV R7,#200\nwait:\nDJNZ R7,wait\n"
-    machine = BareMachine(image_of("SETB ET0\nSETB EA\n" + wait + "CLR EA\nSJMP $"))
+    machine = Alone(image_of("SETB ET0\nSETB EA\n" + wait + "CLR EA\nSJMP $"))
     assert machine.run() == Ended.HALTED
     assert machine.cpu.cycles == 1 + 1 + 1 + 400 + 1 + 2
 
 
-def test_faults_beyond_a_hundred_are_counted():
-    machine = BareMachine(image_of("loop:\nDB 0A5h\nSJMP loop"), stop_on_fault=False)
-    assert machine.run(max_cycles=3 * 130) == Ended.CYCLES
-    assert (len(machine.faults), machine.faults_lost) == (100, 30)
+def test_faults_beyond_a_thousand_are_counted():
+    machine = Alone(image_of("loop:\nDB 0A5h\nSJMP loop"), stop_on_fault=False)
+    assert machine.run(max_cycles=3 * 1030) == Ended.CYCLES
+    assert (len(machine.faults), machine.board.fault_count) == (1000, 1030)
 
 
 def test_code_that_data_has_overwritten_is_known():
     store = "MOV DPTR,#0002h\nMOV A,#77h\nMOVX @DPTR,A\nMOV DPTR,#4000h\nMOVX @DPTR,A\nSJMP $"
-    shared, apart = BareMachine(image_of(store), code_in_xram=True), BareMachine(image_of(store))
+    shared, apart = Alone(image_of(store), code_in_xram=True), Alone(image_of(store))
     assert shared.run() == apart.run() == Ended.HALTED
-    assert (shared.changed_code(), apart.changed_code()) == ([2], [])
+    assert (shared.board.changed_code(), apart.board.changed_code()) == ([2], [])
 
 
 # ------------------------------------------------------------------------------- serial input
@@ -271,15 +267,15 @@ SLOW_POLLS = "MOV R7,#200\nw:\nDJNZ R7,w\nJB RXD,slow\nMOV PCON,#02h"  # five po
 
 def test_a_piece_begins_at_its_time_whether_the_program_seems_to_listen_or_not():
     text = "slow:\n" + SLOW_POLLS
-    machine = BareMachine(image_of(text), stdin=(InputPiece(b"\x00", delay_ticks=240_000),), baud=9600)
+    machine = Alone(image_of(text), stdin=(InputPiece(b"\x00", delay_ticks=240_000),), baud=9600)
     assert machine.run(max_cycles=100_000) == Ended.HALTED
     assert 20_000 <= machine.cpu.cycles <= 20_500
-    plain = BareMachine(image_of(text), stdin=b"\x00", baud=9600)
+    plain = Alone(image_of(text), stdin=b"\x00", baud=9600)
     assert plain.run(max_cycles=100_000) == Ended.CYCLES
 
 
 def test_a_piece_with_a_time_waits_for_a_receiver_that_is_on_and_free():
-    machine = BareMachine(image_of(ECHO), stdin=(InputPiece(b"ab", delay_ticks=1_200_000),))
+    machine = Alone(image_of(ECHO), stdin=(InputPiece(b"ab", delay_ticks=1_200_000),))
     machine.run(max_cycles=90_000)
     assert machine.input.left == 2
     machine.run(max_cycles=120_000)
@@ -288,7 +284,7 @@ def test_a_piece_with_a_time_waits_for_a_receiver_that_is_on_and_free():
 
 def test_a_text_releases_what_waits_for_it_and_only_once():
     pieces = (InputPiece(b"x", b">"), InputPiece(b"y", b">"), InputPiece(b"\r", b">"))
-    machine = BareMachine(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces)
+    machine = Alone(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.HALTED
     assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(3)) == b"xy\r"
 
@@ -325,7 +321,7 @@ def starts_of(machine):
 
 @pytest.mark.parametrize(("wait", "taken"), [(False, b"AC\0\0"), (True, b"ABCD")])
 def test_a_parser_that_is_slower_than_the_line_loses_every_second_character(wait, taken):
-    machine = BareMachine(image_of(LOSES_EVERY_SECOND), stdin=b"ABCD", wait=wait)
+    machine = Alone(image_of(LOSES_EVERY_SECOND), stdin=b"ABCD", wait=wait)
     machine.run(max_cycles=50_000)
     assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(4)) == taken
 
@@ -334,7 +330,7 @@ def test_a_parser_that_is_slower_than_the_line_loses_every_second_character(wait
 @pytest.mark.parametrize("gap_ticks", [0, 7, 480_000])
 def test_characters_follow_at_the_rate_of_the_line_whatever_the_program_does(text, gap_ticks):
     pieces = (InputPiece(b"ABCDE" * 20), InputPiece(b""), InputPiece(b"FG"))
-    machine = BareMachine(image_of(text), stdin=pieces, gap_ticks=gap_ticks)
+    machine = Alone(image_of(text), stdin=pieces, gap_ticks=gap_ticks)
     starts = starts_of(machine)
     machine.run(max_cycles=5_000_000)
     assert len(starts) == 102
@@ -346,7 +342,7 @@ def test_the_first_character_begins_when_the_receiver_is_switched_on(baud, delay
     before = f"MOV R6,#40\nw:\nMOV R7,#{delay}\nDJNZ R7,$\nDJNZ R6,w\n"
     on = 6 + 1 + 40 * (1 + 2 * delay + 2) + 2  # cycles until SCON is written
     timed = SERIAL.replace("MOV SCON,#50h\n", "") + before + "MOV SCON,#50h\n"
-    machine = BareMachine(image_of(timed + "JNB RI,$\nSJMP $"), stdin=b"A", baud=baud)
+    machine = Alone(image_of(timed + "JNB RI,$\nSJMP $"), stdin=b"A", baud=baud)
     starts = starts_of(machine)
     machine.run(max_cycles=100_000)
     assert starts == [12 * on + 240]
@@ -354,7 +350,7 @@ def test_the_first_character_begins_when_the_receiver_is_switched_on(baud, delay
 
 def test_without_a_baud_rate_it_begins_when_the_clock_of_the_receiver_runs():
     text = "MOV SCON,#50h\nMOV TMOD,#20h\nMOV TH1,#0F3h\nMOV R7,#0\nMOV R6,#9\nw:\nDJNZ R7,w\nDJNZ R6,w\n"
-    machine = BareMachine(image_of(text + "SETB TR1\nloop:\nJNB RI,$\nSJMP loop"), stdin=b"AB")
+    machine = Alone(image_of(text + "SETB TR1\nloop:\nJNB RI,$\nSJMP loop"), stdin=b"AB")
     starts = starts_of(machine)
     machine.run(max_cycles=100_000)
     overflow = 12 * (8 + 9 * 514 + 256)
@@ -368,14 +364,14 @@ def test_every_mode_of_the_receiver_takes_all_characters(control, wait):
     """Those of 9 bits have no time for the next start bit during their eleventh bit."""
     text = "MOV R0,#40h\nMOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nSETB TR1\n"
     text += f"MOV SCON,#{control}\nloop:\nJNB RI,$\nCLR RI\nMOV @R0,SBUF\nINC R0\nSJMP loop"
-    machine = BareMachine(image_of(text), stdin=b"ABCDEFGH", wait=wait)
+    machine = Alone(image_of(text), stdin=b"ABCDEFGH", wait=wait)
     machine.run(max_cycles=100_000)
     assert bytes(machine.cpu.peek_iram(0x40 + number) for number in range(8)) == b"ABCDEFGH"
 
 
 def test_a_receiver_that_is_switched_off_does_not_stop_the_line():
     text = SERIAL + "JNB RI,$\nMOV SCON,#00h\nSJMP $"
-    machine = BareMachine(image_of(text), stdin=b"ABCD")
+    machine = Alone(image_of(text), stdin=b"ABCD")
     starts = starts_of(machine)
     machine.run(max_cycles=50_000)
     assert {later - earlier for earlier, later in pairwise(starts)} == {10 * BIT_TICKS}
@@ -383,7 +379,7 @@ def test_a_receiver_that_is_switched_off_does_not_stop_the_line():
 
 def test_each_piece_has_a_delay_of_its_own():
     pieces = (InputPiece(b"ab", delay_ticks=240_000), InputPiece(b"c", delay_ticks=33_333), InputPiece(b"d"))
-    machine = BareMachine(image_of(ECHO), stdin=pieces)
+    machine = Alone(image_of(ECHO), stdin=pieces)
     starts = starts_of(machine)
     machine.run(max_cycles=50_000)
     ends = [start + 10 * BIT_TICKS for start in starts]
@@ -393,7 +389,7 @@ def test_each_piece_has_a_delay_of_its_own():
 def test_a_text_counts_only_behind_the_piece_before():
     """Its first letter would fit the prompt that came before."""
     pieces = (InputPiece(b"x", b">"), InputPiece(b"\r", b">>"))
-    machine = BareMachine(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces)
+    machine = Alone(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.CYCLES
     assert (machine.input.waiting_for, machine.input.left) == (b">>", 1)
 
@@ -402,15 +398,15 @@ def test_a_text_that_was_sent_before_the_last_character_of_a_piece_began_does_no
     """The second character is put on the line as the program sends its prompt, and begins 300 cycles after that."""
     text = SERIAL + "JNB RI,$\nMOV SBUF,#3Eh\nSJMP loop\nloop:\nJNB F0,loop"
     pieces = (InputPiece(b"a"), InputPiece(b"b", delay_ticks=10 * BIT_TICKS + 4_000), InputPiece(b"c", b">"))
-    machine = BareMachine(image_of(text), stdin=pieces)
+    machine = Alone(image_of(text), stdin=pieces)
     assert machine.run(max_cycles=200_000) == Ended.CYCLES
     assert (machine.input.waiting_for, machine.input.left) == (b">", 1)
 
 
 def test_characters_keep_their_gap():
     sent = []
-    machine = BareMachine(image_of(ECHO), stdin=b"abc", gap_ticks=480_000)
-    machine.output = lambda data: sent.append(machine.cpu.cycles)
+    machine = Alone(image_of(ECHO), stdin=b"abc", gap_ticks=480_000)
+    machine.wire.output = lambda data: sent.append(machine.cpu.cycles)
     machine.run(max_cycles=300_000)
     assert len(sent) == 3
     assert all(later - earlier >= 40_000 for earlier, later in pairwise(sent))
@@ -418,7 +414,7 @@ def test_characters_keep_their_gap():
 
 @pytest.mark.parametrize("crystal_hz", [11_059_200, 12_000_000, 24_000_000])
 def test_the_bit_rate_is_that_of_the_crystal(crystal_hz):
-    machine = BareMachine(image_of(AUTOBAUD), stdin=b" ", baud=2400, crystal_hz=crystal_hz)
+    machine = Alone(image_of(AUTOBAUD), stdin=b" ", baud=2400, crystal_hz=crystal_hz)
     assert machine.run() == Ended.HALTED
     cycles = machine.cpu.peek_iram(0x30) * 9
     assert cycles % 2304 == pytest.approx(6 * crystal_hz / 12 / 2400 % 2304, abs=12)
@@ -426,7 +422,7 @@ def test_the_bit_rate_is_that_of_the_crystal(crystal_hz):
 
 def test_keys_that_are_added_later_are_sent_and_wait_for_nothing_else():
     out = bytearray()
-    machine = BareMachine(image_of(ECHO), output=out.extend, live=True)
+    machine = Alone(image_of(ECHO), output=out.extend, live=True)
     assert machine.run(pause=50_000) == Ended.PAUSED
     machine.input.add(b"hi")
     machine.input.add(b"!")
@@ -443,7 +439,7 @@ def test_a_dialogue_that_is_cut_and_saved_is_the_same(step):
         InputPiece(b"z\r", delay_ticks=7),
     )
     whole, cut, other = (
-        BareMachine(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces, gap_ticks=999) for _ in range(3)
+        Alone(image_of("MOV R0,#40h\n" + PROMPT), stdin=pieces, gap_ticks=999) for _ in range(3)
     )
     assert whole.run() == Ended.HALTED
     pause = step
@@ -478,7 +474,7 @@ def square_wave(port, bit, count, period, begin=240):
 )
 def test_a_program_counts_the_edges_of_a_file(bit, setup, counter):
     pins = square_wave(*bit, count=1_000, period=48)
-    machine = BareMachine(image_of(setup + "\nwait:\nNOP\nSJMP wait"), pins=pins)
+    machine = Alone(image_of(setup + "\nwait:\nNOP\nSJMP wait"), pins=pins)
     machine.run(max_cycles=5_000)
     high, low = (machine.cpu.sfr(address) for address in counter)
     assert high << 8 | low == 1_000
@@ -489,7 +485,7 @@ def test_a_falling_pin_interrupts_and_wakes():
         "LJMP main\nORG 0003h\nINC 30h\nRETI\nmain:\nSETB IT0\nMOV IE,#81h\nagain:\nMOV PCON,#01h\nSJMP again"
     )
     pins = square_wave(3, 2, count=50, period=100_000)
-    machine = BareMachine(image_of(text), pins=pins)
+    machine = Alone(image_of(text), pins=pins)
     assert machine.run() == Ended.HALTED
     assert machine.cpu.peek_iram(0x30) == 50
     assert machine.cpu.cycles >= pins[-2].tick // 12
@@ -498,15 +494,13 @@ def test_a_falling_pin_interrupts_and_wakes():
 def test_pins_that_can_wake_nothing_keep_no_program_from_ending():
     pins = (PinEvent(24_000_000, 3, 2, 0),)
     for text, cycles in (("MOV PCON,#01h", 2), ("MOV IE,#81h\nMOV PCON,#02h", 4), ("SJMP $", 2)):
-        machine = BareMachine(image_of(text), pins=pins)
+        machine = Alone(image_of(text), pins=pins)
         assert machine.run() == Ended.HALTED
         assert machine.cpu.cycles == cycles
 
 
 def test_a_pin_is_low_from_the_cycle_that_samples_its_tick():
-    machine = BareMachine(
-        image_of("NOP\nNOP\nMOV A,P1\nMOV 30h,P1\nSJMP $"), pins=(PinEvent(12 * 3, 1, 7, 0),)
-    )
+    machine = Alone(image_of("NOP\nNOP\nMOV A,P1\nMOV 30h,P1\nSJMP $"), pins=(PinEvent(12 * 3, 1, 7, 0),))
     machine.run()
     assert (machine.cpu.a, machine.cpu.peek_iram(0x30)) == (0xFF, 0x7F)
 
@@ -516,7 +510,7 @@ def test_levels_on_rxd_are_characters_for_the_receiver():
     start = 480_000
     levels = [0, *(0x5A >> number & 1 for number in range(8)), 1]
     pins = tuple(PinEvent(start + number * bit, 3, 0, level) for number, level in enumerate(levels))
-    machine = BareMachine(image_of(SERIAL + "JNB RI,$\nMOV A,SBUF\nSJMP $"), pins=pins)
+    machine = Alone(image_of(SERIAL + "JNB RI,$\nMOV A,SBUF\nSJMP $"), pins=pins)
     assert machine.run(max_cycles=100_000) == Ended.HALTED
     assert machine.cpu.a == 0x5A
 
@@ -524,16 +518,16 @@ def test_levels_on_rxd_are_characters_for_the_receiver():
 @pytest.mark.parametrize("options", [{"stdin": b"a"}, {"stdin": (InputPiece(b"a", b"> "),)}, {"live": True}])
 def test_rxd_is_driven_by_pins_or_by_input(options):
     with pytest.raises(ValueError, match=r"P3\.0 is RXD"):
-        BareMachine(image_of("NOP"), pins=(PinEvent(0, 3, 0, 0),), **options)
+        Alone(image_of("NOP"), pins=(PinEvent(0, 3, 0, 0),), **options)
 
 
 @pytest.mark.parametrize("step", [37, 333])
 def test_pins_and_pauses_give_the_same_bits(step):
     text = "MOV TMOD,#05h\nSETB TR0\nwait:\nMOV P2,TL0\nSJMP wait"
     pins = square_wave(3, 4, 900, 60) + (PinEvent(60_000, 3, 0, 0), PinEvent(60_001, 3, 0, 1))
-    whole, cut = (BareMachine(image_of(text), pins=pins) for _ in range(2))
+    whole, cut = (Alone(image_of(text), pins=pins) for _ in range(2))
     whole.run(max_cycles=8_000)
-    other = BareMachine(image_of(text), pins=pins)
+    other = Alone(image_of(text), pins=pins)
     for pause in range(step, 8_000, step):
         cut.run(max_cycles=8_000, pause=pause)
         if pause % (5 * step) == 0:
@@ -545,7 +539,7 @@ def test_pins_and_pauses_give_the_same_bits(step):
 
 def test_edges_on_every_tick_are_taken_in_bounded_steps():
     pins = tuple(PinEvent(tick, 3, 0, tick & 1) for tick in range(240, 60_000))
-    machine = BareMachine(image_of("wait:\nSJMP wait2\nwait2:\nSJMP wait"), pins=pins)
+    machine = Alone(image_of("wait:\nSJMP wait2\nwait2:\nSJMP wait"), pins=pins)
     assert machine.run(max_cycles=6_000) == Ended.CYCLES
 
 

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from miro_robot.bare.machine import BareMachine
 from miro_robot.faults import FaultKind
 from miro_robot.image import Symbol, Symbols, load_hex
+from tests.alone import Alone
 from tests.naive import stack as naive
 from tests.robot.inspect.programs import build
 from tests.robot.mcs51.rig import cpu_with
@@ -143,7 +143,7 @@ void main(void) { P1 = eat(12); while (1) PCON |= 1; }
 
 def test_firmware_whose_local_variables_leave_ram_is_caught(tmp_path):
     """No PUSH goes past FFh: SDCC's reentrant functions add to SP."""
-    machine = BareMachine(load_hex(build(tmp_path, DYING, "--stack-auto", "--debug")))
+    machine = Alone(load_hex(build(tmp_path, DYING, "--stack-auto", "--debug")))
     machine.run(max_cycles=200_000)
     assert [fault.kind for fault in machine.faults][:1] == [OVER]
     assert machine.faults[0].symbol == "_eat"

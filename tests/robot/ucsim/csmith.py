@@ -13,9 +13,9 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.image import load_hex
 from tests import children
+from tests.alone import Alone, Ended
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import ALIKE_AFTER_MOVX
 
@@ -46,7 +46,7 @@ def differences(image):
     end = image.symbols.find("_finished")
     assert end is not None
     sent = []
-    machine = BareMachine(image, output=sent.append, stop_on_fault=False)
+    machine = Alone(image, output=sent.append, stop_on_fault=False)
     if machine.run(until=end.address, max_cycles=MOST_CYCLES) is not Ended.UNTIL:
         return None
     step, dump = f"step {machine.cpu.instructions}", f"dump /b xram 0 {XRAM_BYTES - 1}"
@@ -56,7 +56,7 @@ def differences(image):
         reader = s51.Reader(s51.run(image.code[: image.used[-1][1]], commands, heard))
         characters = heard.read_bytes()
     found = list(s51.cpu_differences(reader.observed(step), machine.cpu, ALIKE_AFTER_MOVX))
-    if machine.bus.content()[:XRAM_BYTES] != reader.raw(dump, XRAM_BYTES):
+    if machine.board.xram()[:XRAM_BYTES] != reader.raw(dump, XRAM_BYTES):
         found.append("external RAM")
     if b"".join(sent) != characters:
         found.append(f"UART ours {b''.join(sent).hex(' ')} ucsim {characters.hex(' ')}")

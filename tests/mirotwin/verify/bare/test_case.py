@@ -7,13 +7,13 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_protocol.actions import Reset
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.bare.machine import BareMachine
-from miro_robot.bare.pins import PinEvent
+from miro_sim.scenario.terminal import PinEvent
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
 from mirotwin.runs.bare_case import case_text, rerun_bare_case
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.bare.run import BarePlayback
+from tests.alone import Alone
 from tests.exact import distribution
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 from tests.states import restore, snapshot
@@ -157,7 +157,7 @@ def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pi
             events += [PinEvent(tick + place * 1152, 3, 0, level) for place, level in enumerate(levels)]
             events += [PinEvent(tick + 9 * 1152 + 864, 3, 0, 1)] if at in one.bad_stop else []
             tick += 11_520
-    machine = BareMachine(image(SLEEPS), pins=tuple(events))
+    machine = Alone(image(SLEEPS), pins=tuple(events))
     machine.run(max_cycles=100_000)
     assert (machine.faults[0].tick, machine.faults[0].pc) == (target.failure.tick, target.failure.pc)
 
