@@ -15,7 +15,7 @@ from miro_exact.installed import described_once
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
 NOT_OF_RUNS = (
     "camera", "campaign/reproduce", "debug", "desk", "firmware", "fuzz", "ports",
-    "recording/capture", "replay", "report/foxglove", "report/page", "run", "testing",
+    "recording/capture", "replay", "report", "run", "testing",
 )  # fmt: skip
 """Folders of `mirotwin` that no run of a campaign uses."""
 
