@@ -17,7 +17,6 @@ from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
-from mirotwin.runs.test_file import keep_saved
 from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.held_signals import held_signals
@@ -121,7 +120,7 @@ def run(options: RunOptions) -> int:
         print_table(summary, run_files.tracks, folder.path)
     result = under_way.result()
     complain(*result.texts)
-    keep_saved(under_way.player, folder.path)
+    under_way.keep_saved(folder.path)
     return result.code
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
@@ -26,6 +27,7 @@ from mirotwin.runs.result import Result, expectation_lines, fault_lines
 from mirotwin.runs.spec import RunSpec, silent_scenario
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.happens import expect_of
@@ -164,7 +166,14 @@ class Run:
             firmware_sha256=world.image.sha256 or "",
         )
 
-    # As a file
+    # As files
+
+    def keep_saved(self, folder: Path) -> None:
+        """Writes what `save` steps kept. Raises OutputError."""
+        for name, content in (self.player.saved if self.player else {}).items():
+            folder.mkdir(parents=True, exist_ok=True)
+            with whole_file(folder / name, "--artifacts") as part:
+                part.write_bytes(content)
 
     def case(self) -> str:
         """The case of the first failure. Raises ValueError if nothing failed."""

@@ -19,13 +19,11 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
-from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.program import show_traceback
 from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import everything, steps_of
 
 SCENARIO = "scenario.toml"
@@ -106,7 +104,7 @@ def _left(run: Run, case: str | None, result: Result, folder: Path, text: Scenar
     """What `save` steps kept, and the case if it failed, stand in the folder now."""
     failed = bool(result.lines)
     try:
-        keep_saved(run.player, folder)
+        run.keep_saved(folder)
         if failed:
             said = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
             case = case or (run.case() if run.failures else None)
@@ -131,14 +129,6 @@ def folder_of(artifacts: Path, path: str) -> Path:
 def stem_of(path: str) -> str:
     """The name of a file without what its kind is called."""
     return Path(path).name.removesuffix(".stream").removesuffix(".toml").removesuffix(".scenario")
-
-
-def keep_saved(player: Player | None, folder: Path) -> None:
-    """Writes what `save` steps kept. Raises OutputError."""
-    for name, content in (player.saved if player else {}).items():
-        folder.mkdir(parents=True, exist_ok=True)
-        with whole_file(folder / name, "--artifacts") as part:
-            part.write_bytes(content)
 
 
 SUFFIX = ".scenario.toml"
