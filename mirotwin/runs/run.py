@@ -20,12 +20,9 @@ from miro_protocol.actions import ScriptItem
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
-from mirotwin.recording.recorder import Recorder, RunSource
-from mirotwin.recording.track import Tracks
 from mirotwin.runs import runner
 from mirotwin.runs.result import Result, expectation_lines, fault_lines
 from mirotwin.runs.spec import RunSpec, silent_scenario
-from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.verdicts import Verdict, judge
@@ -38,6 +35,9 @@ from mirotwin.verify.steps.player import Player, player_of
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World
+    from mirotwin.recording.recorder import Recorder, RunSource
+    from mirotwin.recording.track import Tracks
+    from mirotwin.shell.held_signals import Hold
 
 
 class Run:
@@ -90,6 +90,8 @@ class Run:
 
         `hold` holds signals, except while the world is moved.
         """
+
+        from mirotwin.recording.recorder import Recorder  # loads the library of the format
 
         def keep(period: Period) -> None:
             tracks.add(period)

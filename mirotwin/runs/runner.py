@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
 from miro_sim.periods import Period
-from mirotwin.recording.channels import SampleMessage
-from mirotwin.recording.recorder import Recorder
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World  # a hot module: not before the engine was chosen
+    from mirotwin.recording.channels import SampleMessage
+    from mirotwin.recording.recorder import Recorder
 
 
 def run(
@@ -59,6 +59,8 @@ def _run_samples(world: World, recorder: Recorder) -> None:
 
 
 def _sample(tick: int, board: Any) -> SampleMessage:
+    from mirotwin.recording.channels import SampleMessage  # loads the library of the format
+
     values: list[int] = []
     for chip in (board.left, board.right):
         duty = -chip.pwm_magnitude if chip.sign else chip.pwm_magnitude
