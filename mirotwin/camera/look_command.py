@@ -69,7 +69,7 @@ def look(options: LookOptions) -> int:
     from mirotwin.camera.view import view_of  # loads the pictures' library
 
     with plain_parameters(text.origin):
-        world = RunSpec(scenario=text.scenario, image=image, seed=seed).world()
+        world = RunSpec.of(text, image, seed).world()
         view = view_of(world, network, text.origin)
         if frame >= world.periods:
             ends_s = seconds(world.periods * CONTROL_PERIOD_TICKS)

@@ -154,7 +154,7 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
         refuse_steps(text.scenario, subject)
         image = load_firmware(options.firmware)
         with plain_parameters(subject):
-            world = RunSpec(scenario=text.scenario, image=image, seed=options.seed or 0).world()
+            world = RunSpec.of(text, image, options.seed or 0).world()
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
         job = load_job(subject, options.firmware, options.settings)

@@ -111,7 +111,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             options = parse_url(self._port)
             text = live_scenario(options.scenario, options.settings)
             image = load_firmware(options.firmware, named=False)
-            world = RunSpec(scenario=text.scenario, image=image, seed=options.seed).world()
+            world = RunSpec.of(text, image, options.seed).world()
             self._radio = RadioPort(world, options.network)
             if options.out:
                 self._files.enter_context(_recorded(world, text, OutputFolder(Path(options.out))))

@@ -89,10 +89,8 @@ def serve(options: ServeOptions) -> int:
         options.out or default, options.ports.force, (*FILES, CASE), ours=options.out is None
     )
     image = load_firmware(options.firmware)
-    expected = expectations_of(text.scenario, text.origin)
-    spec = RunSpec(scenario=text.scenario, image=image, seed=seed, expected=expected, origin=text.origin)
     with plain_parameters(text.origin):
-        run = Run.traced(spec)
+        run = Run.traced(RunSpec.of(text, image, seed))
     world = run.world
     run_files = RunFiles(folder, source_of(text, world), run, text.settings)
 

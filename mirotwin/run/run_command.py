@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
@@ -24,7 +25,6 @@ from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import as_settings
 from mirotwin.verify.steps.reading import everything, steps_of
 
@@ -72,15 +72,7 @@ def run(options: RunOptions) -> int:
     earlier = "" if options.out is not None else digest_in(folder.path)
     image = load_firmware(options.firmware, stack_from=options.stack_from)
 
-    spec = RunSpec(
-        scenario=text.scenario,
-        image=image,
-        seed=seed,
-        expected=expectations_of(text.scenario, text.origin),
-        steps=steps,
-        cut=stops.to_tick is not None,
-        origin=text.origin,
-    )
+    spec = replace(RunSpec.of(text, image, seed, steps), cut=stops.to_tick is not None)
     with plain_parameters(text.origin):
         world = spec.world()
         stops.begin(world)
@@ -115,9 +107,10 @@ def run(options: RunOptions) -> int:
         note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
         tell_notes([f"{note}; --out keeps both"])
     if not options.quiet:
-        from mirotwin.run.run_table import print_table  # loads rich
+        from mirotwin.run.run_table import table_of  # loads rich
+        from mirotwin.shell.console import show
 
-        print_table(summary, run_files.tracks, folder.path)
+        show(table_of(summary, run_files.tracks, folder.path))
     result = under_way.result()
     complain(*result.texts)
     under_way.keep_saved(folder.path)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rich.table import Table
+
 from miro_exact.bad_input import amount
 from mirotwin.recording.theory.figures import theory_text
 from mirotwin.recording.track import Tracks
 from mirotwin.runs.learnt import calibration_text, wheels_text
 from mirotwin.runs.result import expectations_text
 from mirotwin.runs.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
-from mirotwin.shell.console import facts_table, show
+from mirotwin.shell.console import facts_table
 
 
-def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
+def table_of(summary: Summary, tracks: Tracks, folder: Path) -> Table:
     tracking, link, firmware = summary.tracking, summary.link, summary.firmware
     table = facts_table()
     table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
@@ -62,7 +64,7 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
     table.add_row("expected", expectations_text(summary.expectations))
     table.add_row("digest", summary.digest)
     table.add_row("files", str(folder))
-    show(table)
+    return table
 
 
 def _known(count: int | None) -> str:

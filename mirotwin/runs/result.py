@@ -25,7 +25,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
     `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
     the run ended. `left`: the folder with its case; `left_out`: what settings left out of the scenario, a line each.
-    `again`: the command that gives the verdict again.
+    `again`: the command that gives the verdict again; `error`: why there was no run.
     """
 
     path: str = ""
@@ -43,6 +43,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     left: str = ""
     left_out: Sequence[str] = ()
     again: str = ""
+    error: Exception | None = None
 
     @property
     def code(self) -> int:

@@ -51,7 +51,7 @@ class Run:
         self.spec = spec
         self.world = spec.world() if world is None else world
         self.trace = trace
-        self.checks = Checks(self.world, spec.expected, spec.cut)
+        self.checks = Checks(self.world, spec.checks(), spec.cut)
         self.player: Player | None = player_of(self.world, spec.steps, spec.origin)
         self.periods: list[Period] = []
         self.tick = -1

@@ -12,8 +12,9 @@ from miro_exact.bad_input import BadInput
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_sim.scenario.file import load
+from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Expected
 from mirotwin.verify.steps.keys import Step
 
@@ -42,6 +43,17 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     until_tick: int | None = None
     cut: bool = False
     origin: str = ""
+
+    @classmethod
+    def of(cls, text: ScenarioText, image: Image, seed: int = 0, steps: Sequence[Step] = ()) -> RunSpec:
+        """Of a scenario that was read."""
+        return cls(scenario=text.scenario, image=image, seed=seed, steps=steps, origin=text.origin)
+
+    def checks(self) -> Expected:
+        """What is expected of each robot. Raises ScenarioError."""
+        if self.expected is not None:
+            return self.expected
+        return expectations_of(self.scenario, self.origin or self.scenario.name)
 
     def world(self, image: Image | None = None) -> World:
         """A new one, at its first tick, with another image if one is given. Raises BadInput where the saved world is

@@ -19,11 +19,9 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
-from mirotwin.shell.program import show_traceback
 from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.steps.reading import everything, steps_of
 
 SCENARIO = "scenario.toml"
@@ -54,15 +52,13 @@ def run_test(
     except NotObservable as error:
         return Result(path=path, verdict="not observable", said=[("not observable", f"{error}")], seed=seed)
     except (DomainError, PluginError, OSError) as error:
-        show_traceback(error)
-        return cannot_be_run(path, BadInput(path, "", f"cannot be run: {error}"), seed)
+        return cannot_be_run(path, BadInput(path, "", f"cannot be run: {error}"), seed, error)
     except BadInput as error:
-        show_traceback(error)
         return cannot_be_run(path, error, seed)
 
 
-def cannot_be_run(path: str, error: BadInput, seed: int = 0) -> Result:
-    return Result(path=path, verdict="error", said=[("error", f"{error}")], seed=seed)
+def cannot_be_run(path: str, bad: BadInput, seed: int = 0, error: Exception | None = None) -> Result:
+    return Result(path=path, verdict="error", said=[("error", f"{bad}")], seed=seed, error=error or bad)
 
 
 def _run(
@@ -85,10 +81,7 @@ def _run(
         raise BadInput(
             path, f"step {saving[0].number}", "there is no folder to save into", "give --artifacts DIR"
         )
-    expected = expectations_of(text.scenario, path)
-    spec = RunSpec(
-        scenario=text.scenario, image=image, seed=seed, expected=expected, steps=steps, origin=path
-    )
+    spec = RunSpec.of(text, image, seed, steps)
     run = Run(spec) if folder is None else Run.traced(spec)
     case = None
     if run.player is not None:

@@ -26,7 +26,7 @@ from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.outputs import check_file, whole_file
-from mirotwin.shell.program import show_line, tell_notes
+from mirotwin.shell.program import show_line, show_traceback, tell_notes
 from mirotwin.shell.verdicts import VERDICTS, exit_code
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
@@ -129,6 +129,8 @@ def run_scenario(options: TestOptions, file: str) -> Result:
     image, again = load_firmware(options.firmware), partial(options.line_for, file)
     settings = (*options.settings, *as_settings(options.expected))
     result = run_test(file, image, options.seed, settings, options.artifacts, again, options.desk)
+    if result.error is not None:
+        show_traceback(result.error)
     return replace(result, again=result.again or again())
 
 
