@@ -148,7 +148,8 @@ def _air(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> I
     """Characters are known once their stop bits were sampled."""
     within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
     end_tick = one[-1].tick + CONTROL_PERIOD_TICKS
-    for network in sorted({robot.network for robot in one[0].robots}):
+    robots = {robot.network for robot in one[0].robots}
+    for network in sorted(robots or {0}):  # 0: the wire of a board alone
         if rule.kind == "bytes":
             known_tick = end_tick - within_ticks - HOST_CHARACTER_TICKS
             here, there = sequences.characters(one, network), sequences.characters(other, network)

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.clock import seconds
+from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.channels import PERIOD, topic_name
 
 WORDS = ("recorded", "replayed")
@@ -23,6 +23,7 @@ class Difference(msgspec.Struct, frozen=True):
 
     `channel` as in a recording, with the field: `lm629 left status`, `wire`. `slot` -1: of a whole network; `network`
     -1: of the whole world. `recorded`, `replayed`: numbers, or text for characters and commands; None: nothing there.
+    `clock`: ticks a second.
     """
 
     tick: int
@@ -32,6 +33,7 @@ class Difference(msgspec.Struct, frozen=True):
     channel: str
     recorded: int | float | str | None
     replayed: int | float | str | None
+    clock: int = TICKS_PER_SECOND
 
     @property
     def topic(self) -> str:
@@ -49,7 +51,7 @@ class Difference(msgspec.Struct, frozen=True):
         """One line; `words` name the two runs."""
         recorded, replayed = self.values()
         values = f"{words[0]} {recorded}, {words[1]} {replayed}"
-        return f"tick {self.tick} ({seconds(self.tick):.6f} s), {self.topic}: {values}"
+        return f"{moment(self.tick, self.clock)}, {self.topic}: {values}"
 
     def __str__(self) -> str:
         return self.said()
@@ -58,7 +60,7 @@ class Difference(msgspec.Struct, frozen=True):
         """What `--json` says of it."""
         return {
             "tick": self.tick,
-            "t_s": seconds(self.tick),
+            "t_s": self.tick / self.clock,
             "period": self.period,
             "network": None if self.network < 0 else self.network,
             "slot": None if self.slot < 0 else self.slot,
@@ -74,6 +76,11 @@ def first_per_channel(found: Iterable[Difference]) -> list[tuple[Difference, int
     for one in found:
         by_channel.setdefault((one.network, one.slot, one.channel), []).append(one)
     return [(alike[0], len(alike)) for alike in by_channel.values()]
+
+
+def moment(tick: int, clock: int) -> str:
+    """A tick in words, with its time by the clock of its world."""
+    return f"tick {tick} ({tick / clock:.6f} s)"
 
 
 def shown(value: object) -> str:

@@ -12,6 +12,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
+from miro_sim.scenario.board import BoardScenario
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import DIGEST, WORDS, Difference, first_per_channel
 from mirotwin.replay.lockstep.annotated_image import AnnotatedImage
@@ -60,6 +61,7 @@ class ComparedRun(msgspec.Struct, frozen=True):
 class RunDifference(msgspec.Struct, frozen=True):
     """Where two runs, called `names`, differ. `differences`: of what they did, in the order of time. `state` and
     `instruction` were found by repeating both; `notes`: what could not be done, and why.
+    `alone`: they are of a board without a robot.
     """
 
     names: tuple[str, str] = WORDS
@@ -67,6 +69,7 @@ class RunDifference(msgspec.Struct, frozen=True):
     state: StateDifference | None = None
     instruction: FirmwareDifference | None = None
     notes: Sequence[str] = ()
+    alone: bool = False
 
     @property
     def period(self) -> int:
@@ -122,6 +125,10 @@ def compare_runs(
     found = RunDifference(names, differences(one.periods, other.periods, rule))
     if not found.differences:
         return found
+    if one.ways:
+        scenario = one.ways[0].scenario
+        in_time = [replace(each, clock=scenario.clock) for each in found.differences]
+        found = replace(found, differences=in_time, alone=isinstance(scenario, BoardScenario))
     if not one.ways or not other.ways:
         return replace(found, notes=("they cannot be run again: what was recorded is no firmware image",))
     try:

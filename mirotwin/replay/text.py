@@ -15,7 +15,7 @@ from miro_sim.periods import Period
 from mirotwin.recording.capture.recorded import transmissions_of
 from mirotwin.recording.capture.render import SHOWN_BYTES, described
 from mirotwin.recording.capture.rows import DecodedRow, rows
-from mirotwin.recording.difference import first_per_channel, shown
+from mirotwin.recording.difference import first_per_channel, moment, shown
 from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference
 from mirotwin.replay.lockstep.instructions import InstructionDifference
@@ -37,7 +37,7 @@ def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
     if found.state is not None:
         yield f"their states differ from {found.state} on"
     if found.instruction is not None:
-        yield from _firmware_lines(found.instruction, found.names)
+        yield from _firmware_lines(found.instruction, found)
 
 
 def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table | str]:
@@ -54,7 +54,7 @@ def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table 
     if not everything:
         table.add_column("in all", justify="right")
     for each, count in listed:
-        place = (str(each.period), str(each.tick), f"{seconds(each.tick):.6f}", each.topic)
+        place = (str(each.period), str(each.tick), f"{each.tick / each.clock:.6f}", each.topic)
         table.add_row(*place, *each.values(), *([] if everything else [str(count)]))
     yield table
     if len(listed) < len(found.differences):
@@ -71,23 +71,24 @@ def source_tables(origins: Sequence[SourceDifference], names: Names) -> Iterator
         yield ""
 
 
-def _firmware_lines(found: FirmwareDifference, names: Names) -> Iterator[str]:
+def _firmware_lines(found: FirmwareDifference, runs: RunDifference) -> Iterator[str]:
     for each in (found.changed, found.mapped):
         if each is not None:
-            yield from _instruction_lines("the first changed instruction that is executed", each, names)
+            yield from _instruction_lines("the first changed instruction that is executed", each, runs)
     if found.effect is not None and found.effect != found.changed:
-        yield from _instruction_lines("the states differ for good from here on", found.effect, names)
+        yield from _instruction_lines("the states differ for good from here on", found.effect, runs)
     if found.effect is not None and found.effect.parted is not None:
         yield f"they go on at different places after {found.effect.parted}"
     for variable in found.variables[:LISTED]:
-        yield from _variable_lines(variable, names)
+        yield from _variable_lines(variable, runs)
     if len(found.variables) > LISTED:
         yield f"{len(found.variables) - LISTED} more variables differ; --json lists them"
     yield from found.notes
 
 
-def _instruction_lines(head: str, found: InstructionDifference, names: Names) -> Iterator[str]:
-    yield f"{head}: net{found.network}/robot{found.slot}: {names[0]} {found.one}"
+def _instruction_lines(head: str, found: InstructionDifference, runs: RunDifference) -> Iterator[str]:
+    names = runs.names
+    yield f"{head}: {_place(found, runs)}{names[0]} {found.one}"
     if (found.one.pc, found.one.text) != (found.other.pc, found.other.text):
         yield f"  {names[1]} {found.other}"
     values = [
@@ -98,13 +99,17 @@ def _instruction_lines(head: str, found: InstructionDifference, names: Names) ->
         yield f"  after it {'; '.join(values[:LISTED])}{more}"
 
 
-def _variable_lines(found: VariableDifference, names: Names) -> Iterator[str]:
-    place = f"net{found.network}/robot{found.slot}: {found.name}"
-    since = f"tick {found.tick} ({seconds(found.tick):.6f} s)"
-    yield f"from {since} on {place} differs: {names[0]} {found.one}, {names[1]} {found.other}"
+def _variable_lines(found: VariableDifference, runs: RunDifference) -> Iterator[str]:
+    names, since = runs.names, moment(found.tick, found.clock)
+    values = f"{names[0]} {found.one}, {names[1]} {found.other}"
+    yield f"from {since} on {_place(found, runs)}{found.name} differs: {values}"
     for name, writer in zip(names, found.writers, strict=True):
         if writer is not None:
             yield f"  {name}: written at {writer}"
+
+
+def _place(found: InstructionDifference | VariableDifference, runs: RunDifference) -> str:
+    return "" if runs.alone else f"net{found.network}/robot{found.slot}: "
 
 
 SHOWN = 20

@@ -8,11 +8,12 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import seconds
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
+from mirotwin.recording.difference import moment
 from mirotwin.replay.lockstep.fields import Record
 from mirotwin.shell.debug_files import debugged_image
 
@@ -29,12 +30,13 @@ class CodeLocation(Record, frozen=True):
     line: str | None
     source: str | None
     text: str
+    clock: int = TICKS_PER_SECOND
 
     def __str__(self) -> str:
         line = f", {self.line}" if self.line else ""
         source = f" `{self.source}`" if self.source else ""
-        at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
-        return f"{at}: {self.pc:#06x} in {self.symbol}{line}{source}: {self.text}"
+        where = f"{self.pc:#06x} in {self.symbol}{line}{source}"
+        return f"{moment(self.tick, self.clock)}: {where}: {self.text}"
 
 
 NOWHERE = Path("no-such-folder") / "image.ihx"
@@ -42,13 +44,15 @@ NOWHERE = Path("no-such-folder") / "image.ihx"
 
 
 class AnnotatedImage:
-    """One image with its debug files, as far as they are there. `sources`: where C files may be.
+    """One image with its debug files, as far as they are there. `sources`: where C files may be. `clock`: ticks a
+    second where it runs.
 
     `problem`: why the debug files are not used, where they belong to another image.
     """
 
     def __init__(self, image: Image, sources: Sources) -> None:
         self.problem: BadInput | None = None
+        self.clock = TICKS_PER_SECOND
         self.sources = sources
         try:
             self.debug = DebugInfo.of(image)
@@ -64,7 +68,7 @@ class AnnotatedImage:
         text = " ".join(disassemble(self.image.code, pc, self.names).split())
         source = None if line is None else self.sources.text(line) or None
         where = None if line is None else str(line)
-        return CodeLocation(tick, pc, self.names.place(pc), where, source, text)
+        return CodeLocation(tick, pc, self.names.place(pc), where, source, text, self.clock)
 
 
 def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from miro_exact.clock import seconds
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_robot.image import Image
 from miro_robot.image.symbol_files import STACK
 from miro_robot.image.variables import variables_of
@@ -77,7 +77,7 @@ Value = int | float | str | None
 
 
 class Record(msgspec.Struct, frozen=True):
-    """Part of a result. As JSON: fields by name, a tick also in seconds, `one` and `other` as a pair."""
+    """Part of a result. As JSON: fields by name, `one` and `other` as a pair, a tick also in seconds of its `clock`."""
 
     def as_json(self) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -86,10 +86,10 @@ class Record(msgspec.Struct, frozen=True):
             if name == "one":
                 pair = "places" if isinstance(value, Record) else "values"
                 found[pair] = [_as_json(value), _as_json(fields["other"])]
-            elif name != "other":
+            elif name not in ("other", "clock"):
                 found[name] = _as_json(value)
             if name == "tick":
-                found["t_s"] = seconds(value)
+                found["t_s"] = value / fields.get("clock", TICKS_PER_SECOND)
         return found
 
 

@@ -141,7 +141,9 @@ def first_instruction(
     notes = list(_missing(annotated))
 
     def worlds() -> tuple[World, World]:
-        return make(one.image), make(other.image)
+        made = make(one.image), make(other.image)
+        one.clock = other.clock = made[0].clock
+        return made
 
     if same_layout(one.image, other.image):
         changed = Stepper(*worlds(), annotated).changed(until_tick)
@@ -175,7 +177,7 @@ def _first_mapped(
     if event is None:
         return None
     there = mapping.places[event.address]
-    twin = first_reached(other, [there], until_tick, [other.robot(event.network, event.slot)])
+    twin = first_reached(other, [there], until_tick, [other.device(event.network, event.slot)])
     places = (
         annotated[0].place(event.address, event.tick),
         annotated[1].place(there, event.tick if twin is None else twin.tick),

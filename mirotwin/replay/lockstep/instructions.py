@@ -25,8 +25,8 @@ from mirotwin.replay.lockstep.pair import LOOK_TICKS, WorldPair
 if TYPE_CHECKING:
     from miro_robot.image import Image
     from miro_robot.mcs51.cpu import Cpu
+    from miro_sim.world.device import Device
     from miro_sim.world.events import Event
-    from miro_sim.world.robot import Robot
     from miro_sim.world.world import World
 
 STEPPED_TICKS = 4 * CONTROL_PERIOD_TICKS
@@ -102,7 +102,7 @@ class Processors(WorldPair):
         # One layout: where one image has no symbols, its stack begins where that of the other does.
         stacks = (image.symbols.names.get(STACK) for image in (one.image, other.image))
         self.stack = next((symbol.address for symbol in stacks if symbol is not None), None)
-        both = zip(one.robots, other.robots, strict=True)
+        both = zip(one.devices, other.devices, strict=True)
         self.live = [
             (LiveState(a.board.cpu, self.stack), LiveState(b.board.cpu, self.stack)) for a, b in both
         ]
@@ -112,16 +112,16 @@ class Processors(WorldPair):
 
 
 class InstructionLog(Watcher):
-    """Keeps what a robot's processor does, until `detach`."""
+    """Keeps what a device's processor does, until `detach`."""
 
-    def __init__(self, robot: Robot, stack: int | None) -> None:
-        self.robot = robot
-        self.live = LiveState(robot.board.cpu, stack)
+    def __init__(self, device: Device, stack: int | None) -> None:
+        self.device = device
+        self.live = LiveState(device.board.cpu, stack)
         self.steps: list[ExecutedInstruction] = []
-        attach(robot.board.cpu, self)
+        attach(device.board.cpu, self)
 
     def detach(self) -> None:
-        detach(self.robot.board.cpu, self)
+        detach(self.device.board.cpu, self)
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         code = bytes(cpu.code_at(pc + offset) for offset in range(LENGTH[cpu.code_at(pc)]))
@@ -145,13 +145,13 @@ class Stepper:
         if event is None:
             return None
         other.run_to(one.tick)
-        robot = one.robot(event.network, event.slot)
-        tick = robot.board.cpu.cycles * CYCLE_TICKS
+        device = one.device(event.network, event.slot)
+        tick = device.board.cpu.cycles * CYCLE_TICKS
         for here, there in self._pieces(tick + 1, tick + 1):
-            if here.robot is robot and here.steps and there.steps:
+            if here.device is device and here.steps and there.steps:
                 return self._difference(here, there, 0, -1)
         place, other_place = (image.place(event.address, tick) for image in self.annotated)
-        return InstructionDifference(robot.network, robot.slot, place, other_place, ())
+        return InstructionDifference(device.network, device.slot, place, other_place, ())
 
     def effect(self, until_tick: int) -> InstructionDifference | None:
         """The instruction after which the processors are not in the same state again, from now to `until_tick`."""
@@ -168,9 +168,9 @@ class Stepper:
                 return min(found, key=lambda one: one.one.tick)
 
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
-        """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
+        """Runs both to `tick` and in pieces on to `end_tick`; all devices of the first piece that is not the same."""
         one, other, stack = self.pair.one, self.pair.other, self.pair.stack
-        both = zip(one.robots, other.robots, strict=True)
+        both = zip(one.devices, other.devices, strict=True)
         pairs = [(InstructionLog(a, stack), InstructionLog(b, stack)) for a, b in both]
         try:
             while True:
@@ -189,25 +189,25 @@ class Stepper:
     def _difference(
         self, here: InstructionLog, there: InstructionLog, index: int, parted: int
     ) -> InstructionDifference:
-        robot = here.robot
-        values = _values(robot, self.pair.one.image, here.steps[index].state, there.steps[index].state)
+        device = here.device
+        values = _values(device, self.pair.one.image, here.steps[index].state, there.steps[index].state)
         places = [
             image.place(step.pc, step.cycle * CYCLE_TICKS)
             for at in (index, *([parted] if parted >= 0 else []))
             for image, step in zip(self.annotated, (here.steps[at], there.steps[at]), strict=True)
         ]
         return InstructionDifference(
-            robot.network, robot.slot, places[0], places[1], tuple(values), *places[2:3]
+            device.network, device.slot, places[0], places[1], tuple(values), *places[2:3]
         )
 
 
 def first_reached(
-    world: World, addresses: Iterable[int], until_tick: int, robots: Sequence[Robot] | None = None
+    world: World, addresses: Iterable[int], until_tick: int, devices: Sequence[Device] | None = None
 ) -> Event | None:
-    """Runs to where one of these robots (None: of all) is to execute what lies at one of the addresses."""
+    """Runs to where one of these devices (None: of all) is to execute what lies at one of the addresses."""
     conditions = [
-        Reached(address=address, network=robot.network, slot=robot.slot)
-        for robot in (robots or world.robots)
+        Reached(address=address, network=device.network, slot=device.slot)
+        for device in (devices or world.devices)
         for address in addresses
     ]
     try:
@@ -230,9 +230,9 @@ def _lasting(
     return first, next(parted, -1)
 
 
-def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[ValueDifference]:
-    """Registers and variables that differ, by the names that people have for them; of the first robot's firmware."""
-    flat = Flat(robot.board.cpu)
+def _values(device: Device, image: Image, one: bytes, other: bytes) -> Iterator[ValueDifference]:
+    """Registers and variables that differ, by the names that people have for them; of the first firmware."""
+    flat = Flat(device.board.cpu)
     values, others = flat.decode(one), flat.decode(other)
     for path, value in values.items():
         if path in DERIVED:

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from mirotwin.recording.difference import moment
 from mirotwin.replay.lockstep.fields import FieldDifference, Record, differing
 
 if TYPE_CHECKING:
@@ -32,12 +33,13 @@ class StateDifference(Record, frozen=True):
     tick: int
     period: int
     fields: tuple[FieldDifference, ...]
+    clock: int = TICKS_PER_SECOND
 
     def __str__(self) -> str:
         more = len(self.fields) - NAMED
         named = "; ".join(str(field) for field in self.fields[:NAMED])
         rest = f"; and {more} more fields" if more > 0 else ""
-        return f"tick {self.tick} ({seconds(self.tick):.6f} s), control period {self.period}: {named}{rest}"
+        return f"{moment(self.tick, self.clock)}, control period {self.period}: {named}{rest}"
 
 
 class WorldPair:
@@ -118,6 +120,6 @@ def first_difference(
             found_tick = narrowed_tick
         pair.run_to(found_tick)
     fields = pair.fields()
-    return (
-        StateDifference(pair.tick, max(0, pair.tick - 1) // CONTROL_PERIOD_TICKS, fields) if fields else None
-    )
+    if not fields:
+        return None
+    return StateDifference(pair.tick, max(0, pair.tick - 1) // CONTROL_PERIOD_TICKS, fields, one.clock)

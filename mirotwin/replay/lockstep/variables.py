@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from miro_exact.clock import CYCLE_TICKS
+from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from mirotwin.replay.lockstep.annotated_image import AnnotatedImage, CodeLocation
 from mirotwin.replay.lockstep.fields import Record, extents
@@ -45,6 +45,7 @@ class VariableDifference(Record, frozen=True):
     one: int | str
     other: int | str
     writers: tuple[CodeLocation | None, CodeLocation | None] = (None, None)
+    clock: int = TICKS_PER_SECOND
 
 
 class Builds:
@@ -79,23 +80,25 @@ class Builds:
         return [self._traced(one, mark) if index < TRACED else one for index, (one, mark) in enumerate(found)]
 
     def _look(self, before: tuple[Mark, Mark]) -> bool:
-        """Compares the variables of each robot whose processors sleep; whether all do."""
+        """Compares the variables of each device whose processors sleep; whether all do."""
         slept = True
-        for robot, twin in zip(self.pair.one.robots, self.pair.other.robots, strict=True):
-            if not (robot.board.cpu.idle and twin.board.cpu.idle):
+        for device, twin in zip(self.pair.one.devices, self.pair.other.devices, strict=True):
+            if not (device.board.cpu.idle and twin.board.cpu.idle):
                 slept = False
                 continue
             self.looks += 1
             for name, (first, second, size) in self.places.items():
-                here = _bytes(robot.board.cpu, first, size)
+                here = _bytes(device.board.cpu, first, size)
                 there = _bytes(twin.board.cpu, second, size)
-                key = robot.network, robot.slot, name
+                key = device.network, device.slot, name
                 if here == there:
                     was = self.since.pop(key, None)
                     if was is not None and was[0].tick < self.last_tick:
                         self.gone.setdefault(key, was)
                 elif key not in self.since:
-                    found = VariableDifference(self.pair.tick, *key, _value(here), _value(there))
+                    found = VariableDifference(
+                        self.pair.tick, *key, _value(here), _value(there), clock=self.pair.one.clock
+                    )
                     self.since[key] = found, before
         return slept
 
@@ -105,12 +108,12 @@ class Builds:
         first, second, size = self.places[found.name]
         watchers = Writes(first, size), Writes(second, size)
         for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
-            attach(world.robot(found.network, found.slot).board.cpu, watcher)
+            attach(world.device(found.network, found.slot).board.cpu, watcher)
         try:
             self.pair.run_to(found.tick)
         finally:
             for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
-                detach(world.robot(found.network, found.slot).board.cpu, watcher)
+                detach(world.device(found.network, found.slot).board.cpu, watcher)
         writers = [
             None if watcher.last is None else image.place(*watcher.last)
             for image, watcher in zip(self.annotated, watchers, strict=True)
