@@ -38,15 +38,18 @@ class BadInput(ValueError):
         """What a process hands to another: a base class, because a derived one may be made of other parts."""
         return BadInput, (self.path, self.place, self.what, self.remedy)
 
-
-@contextmanager
-def of_file(path: str | PathLike[str]) -> Iterator[None]:
-    """Within it, input that cannot be used came from `path`: what is wrong with a text need not know where it stood."""
-    try:
-        yield
-    except BadInput as error:
-        whole = f"{path}: {error.path}" if f"{error.path}" else path
-        raise BadInput(whole, error.place, error.what, error.remedy) from error.__cause__
+    @classmethod
+    @contextmanager
+    def at(cls, path: str | PathLike[str], place: str = "") -> Iterator[None]:
+        """Within it, input that cannot be used came from `path`, where its place is below `place`: what is wrong with a
+        text need not know where that stood. The error becomes one of this class.
+        """
+        try:
+            yield
+        except BadInput as error:
+            whole = ": ".join(filter(None, dict.fromkeys((f"{path}", f"{error.path}"))))
+            below = f"{place}.{error.place}" if place and error.place else place or error.place
+            raise cls(whole, below, error.what, error.remedy) from error.__cause__
 
 
 def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:

@@ -101,10 +101,8 @@ def _tracker(options: TrackOptions, robots: tuple[int, ...]) -> Tracker:
     """Raises BadInput for files that make none."""
     believed = calibrations.read(options.calibration)
     classes = eye_file.read(options.colours, ColourClasses)
-    try:
+    with EyeError.at(options.colours):  # a colour that these robots need has no class
         return Tracker(options.team, robots, options.pattern, believed, classes, options.centroid)
-    except EyeError as error:  # a colour that these robots need has no class
-        raise EyeError(options.colours, error.place, error.what, error.remedy) from None
 
 
 def _utf8(name: str) -> str:

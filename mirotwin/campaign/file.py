@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import MAX_SEED
-from miro_exact.inputs import InputError, path_beside, read_input
+from miro_exact.inputs import path_beside, read_input
 from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, struct_of, tables
 from miro_sim.scenario.base import beside
 from miro_sim.scenario.file import decode
@@ -80,14 +80,12 @@ def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
 
 def _parsed(text: str, path: Path) -> Plan:
     """What the text says, with paths relative to where it stands."""
-    try:
+    with BadInput.at(path):
         raw = tables(text)
         check_numbers(raw)
         found = struct_of(raw, Document)
         design = _design(found, path)
         scenario, firmware = _scenario(found.scenario, path, SCENARIO), _image(found.firmware, path, FIRMWARE)
-    except TomlError as error:
-        raise BadInput(path, error.place, error.what, error.remedy) from None
     settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
     settings += [(f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()]
     return Plan(
@@ -101,18 +99,14 @@ def _parsed(text: str, path: Path) -> Plan:
 
 
 def _scenario(name: str, path: Path, place: str) -> str:
-    """Raises TomlError, as all below."""
-    try:
+    """Raises BadInput, as all below."""
+    with BadInput.at(path, place):
         return beside(str(path), name)
-    except InputError as error:
-        raise TomlError(error.what, error.remedy, place) from None
 
 
 def _image(name: str, path: Path, place: str) -> str:
-    try:
+    with BadInput.at(path, place):
         return str(Path(path_beside(path, name)).resolve()) if name else ""
-    except InputError as error:
-        raise TomlError(error.what, error.remedy, place) from None
 
 
 def _design(found: Document, path: Path) -> Design:

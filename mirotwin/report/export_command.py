@@ -145,10 +145,8 @@ def export(options: ExportOptions) -> int:
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.sent, network, given, bar)
         pieces = render.to_stream(exported, layouts.of) if layouts else render.to_pcapng(exported)
-        try:
+        with BadInput.at(given.label):
             _write(out, _some(pieces, exported, given.label))
-        except render.ConversionError as error:
-            raise BadInput(given.label, error.place, error.what, error.remedy) from None
     if not quiet and out != STDIN:
         show(f"{out}: {amount(exported.down, 'transmission')} from the host and {exported.up} from robots")
     if exported.bad_stops and to == "pcapng":

@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput, of_file, one_line, shortened
+from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_exact.installed import differences as plugin_differences
@@ -283,7 +283,7 @@ def load_job(
 def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
     """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
     source = recording.source
-    with of_file(f"{path}: {SCENARIO_ATTACHMENT}"):
+    with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
         scenario = parse_scenario(source.scenario_text, "")
     return RunSpec(
         scenario=scenario,
@@ -344,10 +344,10 @@ def _job_of_recording(
         if runs_on is None:
             raise
     as_recorded = recorded_spec(recording, path, image or runs_on)
-    with of_file(f"{path}: {SCENARIO_ATTACHMENT}"):
+    with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
         scenario = parse_scenario(source.scenario_text, "", settings, expectations_of)
         expected = expectations_of(scenario, "")
-    with of_file(path):
+    with BadInput.at(path):
         check_script(as_recorded.script or (), scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
@@ -375,7 +375,7 @@ def _job_of_stream(
     header, sent = given.header, given.script()
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
     script, own = script_of_stream(sent), header.seed or 0
-    with of_file(path):
+    with BadInput.at(path):
         written = scenario_of_stream(sent, header)
         scenario = changed(written, "", [*keys, *settings], expectations_of)
         expected = expectations_of(scenario, "")

@@ -18,7 +18,7 @@ from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import BOARD_BYTES, InputError, read_input
-from miro_protocol.toml_text import TomlError, struct_of, tables
+from miro_protocol.toml_text import struct_of, tables
 
 SIDES = ("left", "right")
 CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
@@ -131,10 +131,8 @@ def _miro() -> Wiring:
 
 
 def _wiring(text: str, origin: str) -> Wiring:
-    try:
+    with WiringError.at(origin):
         wiring = struct_of(tables(text), Wiring)
-    except TomlError as error:
-        raise WiringError(origin, error.place, error.what, error.remedy) from None
     if len(wiring.latch) > MAX_LATCHES:
         raise WiringError(origin, "latch", f"{len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
     if len(wiring.buffer) > MAX_BUFFERS:

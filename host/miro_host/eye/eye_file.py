@@ -11,7 +11,7 @@ from typing import TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import EYE_BYTES, InputError, read_input
+from miro_exact.inputs import EYE_BYTES, read_input
 from miro_protocol.toml_text import TomlError, check_numbers, struct_of, tables, without_none
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -28,14 +28,14 @@ def read(path: str | Path, kind: type[T]) -> T:
 
 def text_of(path: str | Path) -> str:
     """A file's text. Raises EyeError."""
-    try:
-        return read_input(path, EYE_BYTES).decode("utf-8-sig")
-    except InputError as error:
-        raise EyeError(path, "", error.what, error.remedy) from None
-    except OSError as error:
-        raise EyeError(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
-    except ValueError:
-        raise EyeError(path, "", "not UTF-8 text", "give a text file") from None
+    with EyeError.at(path):
+        try:
+            return read_input(path, EYE_BYTES).decode("utf-8-sig")
+        except OSError as error:
+            what = f"cannot be read: {error.strerror}"
+            raise EyeError(path, "", what, "check path and permissions") from None
+        except UnicodeDecodeError:
+            raise EyeError(path, "", "not UTF-8 text", "give a text file") from None
 
 
 def csv_rows(text: str, origin: str, *columns: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:

@@ -12,7 +12,7 @@ from typing import BinaryIO
 import msgspec
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from miro_exact.bad_input import BadInput, of_file, shortened
+from miro_exact.bad_input import BadInput, shortened
 from miro_exact.clock import nanoseconds
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
@@ -54,7 +54,7 @@ class Conversion:
         self.notes = [recording.broken_off] if recording.broken_off else []
         scenario: Scenario | None = None
         try:
-            with of_file(path):
+            with BadInput.at(path):
                 scenario = parse(recording.source.scenario_text, "")
         except BadInput as error:
             without = "so there are no camera, no ball, no patches and no references in the scene"
