@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_exact.inputs import IMAGE_BYTES, InputError, read_input
+from miro_exact.inputs import IMAGE_BYTES, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
 from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
 
@@ -90,14 +90,13 @@ class Image(msgspec.Struct, frozen=True):
 def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
     """Reads an Intel HEX file whose bytes all lie below `limit`. Raises ImageError."""
     path = Path(path)
-    try:
-        content = read_input(path, IMAGE_BYTES)
-    except FileNotFoundError:
-        raise ImageError(path, 0, "there is no such file", _GIVE) from None
-    except InputError as error:
-        raise ImageError(path, 0, error.what, error.remedy) from None
-    except OSError as error:
-        raise ImageError(path, 0, f"cannot be read ({error.strerror})", "name a readable file") from None
+    with ImageError.at(path):
+        try:
+            content = read_input(path, IMAGE_BYTES)
+        except FileNotFoundError:
+            raise ImageError(path, 0, "there is no such file", _GIVE) from None
+        except OSError as error:
+            raise ImageError(path, 0, f"cannot be read ({error.strerror})", "name a readable file") from None
     return parse_hex(content, path, limit)
 
 
@@ -108,36 +107,18 @@ def parse_hex(
 
     `names`: address and space of each name, instead of the files beside `path`.
     """
-    try:
-        known = _parsed(content, limit)
-    except ImageError as error:
-        raise ImageError(path, error.place, error.what, error.remedy) from None
+    with ImageError.at(path):
+        known, _ = _parsed(content, limit)
     if names is None:
         symbols = Symbols(partial(_names_beside, path, content, limit), known.used)
     else:
         symbols = Symbols({name: Symbol(*place) for name, place in names.items()}, known.used)
-    return Image(
-        path=path,
-        code=known.code,
-        used=known.used,
-        size=known.loaded.count(1),
-        sha256=known.sha256,
-        symbols=symbols,
-        content=content,
-    )
-
-
-class _Content(msgspec.Struct, frozen=True):
-    """What a file's content alone says. `loaded`: 1 for each address that it has a byte for."""
-
-    code: bytes
-    loaded: bytes
-    used: tuple[tuple[int, int], ...]
-    sha256: str
+    return msgspec.structs.replace(known, path=path, symbols=symbols)
 
 
 @lru_cache(32)  # by content: a test loads the robot's image hundreds of times
-def _parsed(content: bytes, limit: int) -> _Content:
+def _parsed(content: bytes, limit: int) -> tuple[Image, bytes]:
+    """What a file's content alone says; and 1 for each address that it has a byte for."""
     if not content.removeprefix(BOM_UTF8).strip(_BLANK):
         raise ImageError("", 0, "is empty", _REBUILD)
     code = bytearray(b"\xff" * SPACE_BYTES)
@@ -154,7 +135,9 @@ def _parsed(content: bytes, limit: int) -> _Content:
         loaded[address:end] = b"\x01" * len(data)
     if not any(loaded):
         raise ImageError("", 0, "holds no bytes", _REBUILD)
-    return _Content(bytes(code), bytes(loaded), _ranges(loaded), hashlib.sha256(content).hexdigest())
+    used, sha256 = _ranges(loaded), hashlib.sha256(content).hexdigest()
+    image = Image(Path(), bytes(code), used, loaded.count(1), sha256, Symbols({}), content)
+    return image, bytes(loaded)
 
 
 def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
@@ -162,11 +145,11 @@ def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
 
     Raises ImageError when one of them contradicts the image.
     """
-    known = _parsed(content, limit)
+    known, loaded = _parsed(content, limit)
     map_path, cdb_path = path.with_suffix(".map"), path.with_suffix(".cdb")
     found_map, found_cdb = parse_map(read_text(map_path)), parse_cdb(read_text(cdb_path))
-    _refuse(map_path, check_map(found_map, known.code, known.loaded))
-    _refuse(cdb_path, check_cdb(found_cdb, known.code, known.loaded))
+    _refuse(map_path, check_map(found_map, known.code, loaded))
+    _refuse(cdb_path, check_cdb(found_cdb, known.code, loaded))
     return found_map.names | found_cdb.names
 
 

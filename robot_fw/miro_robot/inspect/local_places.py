@@ -18,7 +18,7 @@ from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Function
 from miro_robot.image.registers import STACK, Blocks, LocalVariable
 from miro_robot.image.variables import Variables
-from miro_robot.inspect.data_flow import DPH, DPL, ENTRY, SP, A, B, Callees, Effect, Flow, Held, Origin
+from miro_robot.inspect.data_flow import DPH, DPL, ENTRY, SP, A, B, Callees, Effect, Flow, Held
 from miro_robot.mcs51.opcodes import SFRS
 
 _PLACES = {"dpl": DPL, "dph": DPH, "b": B, "a": A, **{f"r{number}": number for number in range(8)}}
@@ -266,13 +266,3 @@ class LocalPlaces:
                 return "its registers hold something else"
             found.append(places[0])
         return tuple(found)
-
-    def _outlasts_a_line(self, one: LocalVariable, home: tuple[int, ...], origins: frozenset[Origin]) -> bool:
-        """Whether what its home holds is needed where a C line begins: then it is no value of the compiler's own."""
-        for address in self.line_begins:
-            held = self.flow.held[address]
-            kept = not origins.isdisjoint(frozenset[Origin]().union(*(held[place] for place in home)))
-            if kept and not self.flow.live[address].isdisjoint(home):
-                if one in self.visible(address):
-                    return True
-        return False

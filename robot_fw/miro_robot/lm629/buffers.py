@@ -81,12 +81,7 @@ class TrajectoryBuffer:
         self.velocity = 0
         self.position = 0
         self.relative = False
-        self.newer_position = False
-        self.taken_control = 0
-        self.taken_acceleration = 0
-        self.taken_velocity = 0
-        self.taken_position = 0
-        self.taken_relative = False
+        self.take()
 
     def begin(self, control: int) -> int:
         """The control word arrived. Returns how many words follow."""
