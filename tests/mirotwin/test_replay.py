@@ -13,7 +13,7 @@ from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis
-from miro_sim.scenario.places import check_places
+from miro_sim.scenario.build import check_robots
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
 from mirotwin.replay.text import frame_tables, frame_text
@@ -110,7 +110,7 @@ def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots):
     assert scenario.networks[0].robots == robots
     assert [robot.slot for robot in scenario.networks[0].robot] == list(range(robots))
     assert {robot.reference.drive_s for robot in scenario.networks[0].robot} == {0.0}
-    check_places(scenario, "a.txt")
+    check_robots(scenario, "a.txt")
     radio = scenario.networks[0].radio
     assert (radio.bit_error_rate, radio.carrier, radio.squelch) == (0.0, "on", True)
     assert scenario.duration_s * TICKS_PER_SECOND >= 1_800_000 + TICKS_PER_SECOND

@@ -11,8 +11,8 @@ depends on no other file.
 from collections.abc import Callable
 from typing import Any
 
-from miro_exact.inputs import InputError, path_beside
-from miro_protocol.toml_text import TomlError, check_numbers
+from miro_exact.inputs import path_beside
+from miro_protocol.toml_text import check_numbers
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.settings import Setting, in_text, make
 
@@ -41,20 +41,18 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     if is_path(name) and not origin:
         what = "stands in a file that depends on no other one"
         raise ScenarioError(origin, SCENARIO, what, "name a built-in scenario, or record the run again")
+    with ScenarioError.at(origin, SCENARIO):
+        path = beside(origin, name)
     try:
-        base = tables_of(beside(origin, name))
-    except InputError as error:
-        raise ScenarioError(origin, SCENARIO, error.what, error.remedy) from None
+        base = tables_of(path)
     except ScenarioError as error:
         place = ": ".join(part for part in (f"{error.path}", f"{error.place}") if part)
         raise ScenarioError(origin, SCENARIO, f"{place}: {error.what}", error.remedy) from None
     if SCENARIO in base:
         what = f"{name} is itself another scenario with keys changed"
         raise ScenarioError(origin, SCENARIO, what, f"name {base[SCENARIO]!r}, and repeat its keys")
-    try:
+    with ScenarioError.at(origin):
         check_numbers(settings, SET)  # before they are written as text
-    except TomlError as error:
-        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
     complete = {**base, **own}
     return complete, make(complete, in_text(settings), origin, SET)
 

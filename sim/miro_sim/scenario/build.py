@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_exact.raised import at_place, defined_at, raised
 from miro_exact.rng import Stream
@@ -22,6 +23,32 @@ from miro_host.wheels import Wheels
 from miro_protocol.table import DOWNLINK
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.places import camera_problem, lens_of, robot_problem
+
+
+def check_robots(scenario: sc.Scenario, origin: str) -> None:
+    """Raises ScenarioError for a camera that does not see the pitch, and for a robot that starts beside it or cannot
+    follow its reference (`places`). `origin` names the scenario.
+    """
+    if problem := camera_problem(scenario.camera, len(scenario.networks)):
+        raise ScenarioError(origin, *problem)
+    lens = lens_of(scenario.camera)
+    for number, network in enumerate(scenario.networks):
+        for index, robot in enumerate(network.robot):
+            place = f"network[{number}].robot[{index}]"
+            try:
+                reference, start = reference_and_start(robot, scenario.duration_s)
+                found = robot_problem(
+                    reference, start, robot.reference, robot.controller, scenario.duration_s, lens
+                )
+            except PluginError as error:
+                raise ScenarioError(origin, f"{place}.reference", error.what, error.remedy) from error
+            except DomainError as error:  # a heading of a million radians
+                raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
+            if found is not None:
+                key, what, remedy = found
+                raise ScenarioError(origin, f"{place}.{key}", what, remedy)
 
 
 def reference_for(robot: sc.RobotSpec, duration_s: float) -> Trajectory:

@@ -7,18 +7,15 @@ limits of z_cmd and of its change from one camera frame to the next. The robot s
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.laws.interface import LawParameters
+from miro_host.references.interface import Reference
 from miro_host.wheels import Wheels
-
-if TYPE_CHECKING:
-    from miro_host.references.interface import Reference
 
 Problem = tuple[str, str]
 """What is wrong with a reference, and the remedy."""
-Places = Iterable[tuple[float, "Reference"]]
+Places = Iterable[tuple[float, Reference]]
 """A reference at several times in s, in their order."""
 
 SLACK = 1e-6

@@ -13,12 +13,11 @@ import msgspec
 
 from miro_exact.bad_input import did_you_mean, one_line
 from miro_exact.inputs import InputError, read_input
-from miro_protocol.toml_text import TEXT_KIB, TomlError, check_numbers, tables, without_none
+from miro_protocol.toml_text import TEXT_KIB, check_numbers, tables, without_none
 from miro_sim.scenario.base import is_path, with_base
-from miro_sim.scenario.errors import Refused, ScenarioError, value_error
-from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.places import check_places
-from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
+from miro_sim.scenario.errors import ScenarioError, value_error
+from miro_sim.scenario.keys import Scenario, scenario_of
+from miro_sim.scenario.plugins import cause_of, full_message
 from miro_sim.scenario.profiles import with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.variants import with_variant
@@ -26,12 +25,8 @@ from miro_sim.scenario.variants import with_variant
 _BUILTIN = Path(__file__).parent / "builtin"
 LONGEST_S = 86_400.0
 """The longest duration that a scenario may have: a day."""
-Also = Callable[[Scenario, str], object]
+Also = Callable[[Scenario, str], object] | None
 """Another check of a scenario, whose origin is the second argument: raises ScenarioError."""
-
-
-def nothing_else(scenario: Scenario, origin: str) -> None:
-    """No other check."""
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
@@ -68,20 +63,21 @@ def builtin_text(name: str) -> str:
     return (_BUILTIN / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
+def load(source: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
     """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
     built-in. `settings` and `also` as `parse` takes them.
     """
     return of_text(source_text(source), source, settings, also)
 
 
-def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
+def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
     """As `load`, of a text that `origin` names."""
-    notes: list[str] = []
-    raw, scenario, complete = _parsed(text, origin, settings, also, notes)
-    if settings or not complete:
-        text = written(raw, origin, settings)
-    return ScenarioText(origin, text, scenario, tuple(settings), tuple(notes))
+    raw = _tables(text, origin)
+    whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
+    scenario, notes = _checked(whole, origin, settings, also, own)
+    if settings or whole is not raw:
+        text = written(whole, origin, settings)
+    return ScenarioText(origin, text, scenario, tuple(settings), notes)
 
 
 def source_text(source: str) -> str:
@@ -113,7 +109,7 @@ def decode(raw: bytes, origin: str) -> str:
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
 
 
-def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> Scenario:
+def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = None) -> Scenario:
     """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
 
     `also` checks what this package does not know: what `mirotwin.verify.checks` makes of `[expect]`.
@@ -122,57 +118,40 @@ def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = not
     may name no other one.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
-    return _parsed(text, origin, settings, also, [])[1]
+    return of_text(text, origin, settings, also).scenario
 
 
-def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = nothing_else) -> Scenario:
+def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = None) -> Scenario:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
     if not settings:
         return scenario
-    return _checked(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
-
-
-def _parsed(
-    text: str, origin: str, settings: Sequence[str], also: Also, notes: list[str]
-) -> tuple[dict[str, Any], Scenario, bool]:
-    """The tables with the settings made, the scenario, and whether the text alone says all of it."""
-    raw = _tables(text, origin)
-    whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
-    return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
+    return of_table(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
 
 
 def _tables(text: str, origin: str) -> dict[str, Any]:
-    try:
+    with ScenarioError.at(origin):
         return tables(text)
-    except TomlError as error:
-        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
 
 
-def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
+def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = (), also: Also = None) -> Scenario:
     """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
-    return _checked(raw, origin, settings)
+    return _checked(raw, origin, settings, also)[0]
 
 
 def _checked(
-    raw: dict[str, Any],
-    origin: str,
-    settings: Sequence[str],
-    also: Also = nothing_else,
-    own: Sequence[Setting] = (),
-    notes: list[str] | None = None,
-) -> Scenario:
+    raw: dict[str, Any], origin: str, settings: Sequence[str], also: Also, own: Sequence[Setting] = ()
+) -> tuple[Scenario, tuple[str, ...]]:
     """The scenario of these tables; makes the settings in them. `own`: those that its file has made.
 
-    A setting that chooses another kind of something leaves the old kind's keys out, and `notes` say which.
+    A setting that chooses another kind of something leaves the old kind's keys out; a note for each says which.
     """
     made = [*own, *make(raw, settings, origin)]
     dropped: dict[str, list[str]] = {}
     while True:
         try:
             scenario = _converted(raw, origin, also)
-            if notes is not None:
-                notes += [f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items()]
-            return scenario
+            notes = (f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items())
+            return scenario, tuple(notes)
         except ScenarioError as error:
             found = drop_other_kind(error, made)
             if found is None:
@@ -184,20 +163,20 @@ def _checked(
 
 def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
-    try:
+    from miro_sim.scenario.build import check_robots  # needs hot modules: not before the engine was chosen
+
+    with ScenarioError.at(origin, "variant"):
         complete = with_variant(raw) if "variant" in raw else raw
-    except Refused as error:
-        raise ScenarioError(origin, "variant", error.what, error.remedy) from None
     complete = _with_profiles(complete, origin)
-    try:
+    with ScenarioError.at(origin):
         check_numbers(complete)
-        scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
+    try:
+        scenario = scenario_of(complete)
     except msgspec.ValidationError as error:
         raise value_error(origin, complete, full_message(error)) from cause_of(error)
-    except TomlError as error:
-        raise ScenarioError(origin, f"{error.place}", error.what, error.remedy) from None
-    check_places(scenario, origin)
-    also(scenario, origin)
+    check_robots(scenario, origin)
+    if also is not None:
+        also(scenario, origin)
     return scenario
 
 
@@ -209,16 +188,13 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
     complete = []
     for index, network in enumerate(networks):
         if isinstance(network, dict) and isinstance(network.get("radio"), dict):
-            try:
+            with ScenarioError.at(origin, f"network[{index}].radio.profile"):
                 network = {**network, "radio": with_profiles(network["radio"])}
-            except Refused as error:
-                path = f"network[{index}].radio.profile"
-                raise ScenarioError(origin, path, error.what, error.remedy) from None
         complete.append(network)
     return {**raw, "network": complete}
 
 
-def live_scenario(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
+def live_scenario(source: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
     """The scenario that `source` names, with `settings` and then those of a live session made in it.
 
     Its hosts send nothing, because a program at a port does; it lasts a day at most. References that would leave the

@@ -5,7 +5,7 @@ Every key carries its unit. Defaults are the "realistic" set: a rendered picture
 bit-error rate of 1e-4.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -28,6 +28,7 @@ from miro_sim.plant.params import Chassis, DriveParams
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.camera_keys import Camera, PitchCm, PixelCamera
+from miro_sim.scenario.plugins import plugin_of
 
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
 
@@ -164,6 +165,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     expect: dict[str, Any] = {}
     step: tuple[dict[str, Any], ...] = ()
     networks: Annotated[tuple[NetworkSpec, ...], Meta(min_length=1)] = msgspec.field(name="network")
+    clock: ClassVar[int] = TICKS_PER_SECOND
+    """Of the world."""
 
     def __post_init__(self) -> None:
         if len(self.networks) > MAX_NETWORKS:
@@ -173,11 +176,6 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             )
 
     @property
-    def clock(self) -> int:
-        """Of the world's clock."""
-        return TICKS_PER_SECOND
-
-    @property
     def periods(self) -> int:
         """Control periods of a run, which ends by itself with the one in which its duration does."""
         return max(1, -(-ticks(self.duration_s) // CONTROL_PERIOD_TICKS))
@@ -185,6 +183,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     @property
     def end_tick(self) -> int:
         return self.periods * CONTROL_PERIOD_TICKS
+
+
+def scenario_of(tables: dict[str, Any]) -> Scenario:
+    """The scenario of complete tables. Raises msgspec.ValidationError."""
+    return msgspec.convert(tables, Scenario, dec_hook=plugin_of)
 
 
 def without_expectations(scenario: Scenario | BoardScenario) -> Scenario | BoardScenario:
