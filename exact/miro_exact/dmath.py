@@ -100,11 +100,13 @@ def sincos_within(x: float) -> tuple[float, float]:
         scaled = x * _INV_PIO2 - 0.5
     else:
         scaled = x * _INV_PIO2 + 0.5
+    # int() cuts off towards zero: with the half before it, it rounds to the nearest quadrant.
     n = int(scaled)
     high = x
     low = 0.0
     if n != 0:
         count = float(n)
+        # pi/2 in parts of 33 bits: their products with `count`, of 20, are exact (fdlibm, rem_pio2).
         rest = x - count * _PIO2_1
         carry = count * _PIO2_1T
         high = rest - carry
@@ -120,6 +122,7 @@ def sincos_within(x: float) -> tuple[float, float]:
                 rest = before - carry
                 carry = count * _PIO2_3T - ((before - rest) - carry)
                 high = rest - carry
+        # What the rounding of `high` lost; it enters both polynomials below to the first order.
         low = (rest - high) - carry
     z = high * high
     w = z * z
@@ -131,6 +134,7 @@ def sincos_within(x: float) -> tuple[float, float]:
     r = z * (_C1 + z * (_C2 + z * _C3)) + w * w * (_C4 + z * (_C5 + z * _C6))
     half = 0.5 * z
     top = 1.0 - half
+    # 1 - z/2 loses bits where z is large: they are added back (fdlibm, k_cos).
     c = top + (((1.0 - top) - half) + (z * r - high * low))
     quadrant = n & 3
     if quadrant == 0:
@@ -153,6 +157,7 @@ def atan(x: float) -> float:
 
 def _atan(a: float, more: float, supplement: bool) -> float:
     """Arc tangent of a >= 0 plus `more` (far below its last place), or pi minus that: rounded once at the end."""
+    # atan(a) = atan(c) + atan((a - c) / (1 + a c)) with c = 0, 1/2, 1, 3/2, infinity: what is left is small (fdlibm).
     if a < 0.4375:
         high = 0.0
         low = 0.0
@@ -176,6 +181,7 @@ def _atan(a: float, more: float, supplement: bool) -> float:
         a = -1.0 / a
     z = a * a
     w = z * z
+    # Odd and even powers apart, as fdlibm adds them up: the order is part of the bits.
     odd = z * (_A0 + w * (_A2 + w * (_A4 + w * (_A6 + w * (_A8 + w * _A10)))))
     even = w * (_A1 + w * (_A3 + w * (_A5 + w * (_A7 + w * _A9))))
     low = low + more
@@ -191,6 +197,7 @@ def _lost(q: float, y: float, x: float) -> float:
     """What the rounded quotient q = y / x of positive numbers lost: y / x - q (Dekker's exact product)."""
     if not (1e-140 < y < 1e140 and 1e-140 < x < 1e140 and q > 1e-140):
         return 0.0  # the split below would leave the range of float64
+    # Halves of 26 bits (Veltkamp): the four products of halves are exact, and so is their sum in this order.
     spread = q * 134217729.0  # 2**27 + 1
     q_high = spread - (spread - q)
     q_low = q - q_high
@@ -234,8 +241,10 @@ def wrap_pi(x: float) -> float:
         turns = float(int(scaled - 0.5))
     else:
         turns = float(int(scaled + 0.5))
+    # 2 pi in three parts, as in `sincos_within`.
     result = ((x - turns * _TWO_PI_1) - turns * _TWO_PI_2) - turns * _TWO_PI_2T
     if result <= -_PI:
+        # Rounding may leave the result a last place outside of the range, on either side.
         return min(result + 2.0 * _PI, _PI)
     if result > _PI:
         return max(result - 2.0 * _PI, -3.1415926535897927)  # the number after -pi
@@ -261,6 +270,7 @@ def exp_within(x: float) -> float:
         k = int(x * _INV_LN2 - 0.5)
     else:
         k = int(x * _INV_LN2 + 0.5)
+    # ln 2 in two parts, the first of 33 bits: its product with k is exact (fdlibm, e_exp).
     high = x - float(k) * _LN2_HI
     low = float(k) * _LN2_LO
     r = high - low
@@ -288,6 +298,7 @@ def log(x: float) -> float:
 def log_within(x: float) -> float:
     """`log` for whoever has seen that x is finite and positive."""
     k = 0
+    # Products with 2 and 1/2 are exact: this is frexp without a look at the bits.
     while x < 0.5 * _SQRT2:
         x = x * 2.0
         k -= 1

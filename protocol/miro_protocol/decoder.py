@@ -75,7 +75,9 @@ class Scanner:
         self._lead = form.lead
         self._white = STRING
         self._table = crc.table_of(8)
+        # The CRC begins with the layout byte, which is not sent: a frame for 3 robots is none for 5.
         self._start = crc.register(bytes([form.layout]))
+        # Over a whole frame with its CRC the register ends here, whatever the frame.
         self._intact = crc.residue()
         self._size = form.size
         self._step = form.character_ticks
@@ -222,18 +224,22 @@ class Scanner:
             if reason == _NO_SYNC:
                 self.valid += 1
                 return _FRAME
+            # Reasons are in the order of the tests: a run keeps that of the window which came nearest to a frame.
             if reason > self._reason:
                 self._reason = reason
+        # Only characters that no window reaches back to any more are given out.
         return _RUN if start + 1 == self._run_limit else 0
 
     def _test(self, start: int) -> int:
         """Why the window that starts there, with a sync, is no frame; 0 if it is one."""
         if self._last_bad >= start:
             return _BAD_STOP_BIT
+        # Not >=: before its first character a frame may have a pause, only the F - 1 spacings inside count.
         if self._last_apart > start:
             return _BAD_SPACING
         register = self._start
         for place in range(self._size - 2):
+            # Whitening begins with each frame's HDR, so it can be taken off before anything is known to be a frame.
             byte = self._data[start + 2 + place] ^ self._white[place]
             register = (register >> 8) ^ self._table[(register ^ byte) & 0xFF]
         if register == self._intact:
@@ -277,6 +283,7 @@ class Scanner:
         """Drops the first `length` characters, which are no frame; the others move up."""
         events.append(Damaged(bytes(self._data[:length]), REASONS[self._reason], self._ticks[0]))
         self._reason = _NO_SYNC
+        # What is left keeps its order: a frame may begin in the run that is given out.
         for place in range(length, self._count):
             self._data[place - length] = self._data[place]
             self._flaws[place - length] = self._flaws[place]
