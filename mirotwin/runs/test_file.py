@@ -9,7 +9,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, encodable
 from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_robot.image import Image
@@ -19,7 +19,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
-from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
+from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line, stream_files
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
 from mirotwin.verify.steps.reading import everything, steps_of
@@ -101,8 +101,8 @@ def _left(run: Run, case: str | None, result: Result, folder: Path, text: Scenar
         if failed:
             said = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
             case = case or (run.case() if run.failures else None)
-            files = {SCENARIO: text.text}
-            leave(folder, "\n".join((*said, "")), case, run.stream(), run.spec.image, files)
+            files = stream_files(case, run.stream(), run.spec.image)
+            leave(folder, "\n".join((*said, "")), {SCENARIO: encodable(text.text).encode(), **files})
             return replace(result, left=str(folder))
     except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
         with suppress(OSError, BadInput):

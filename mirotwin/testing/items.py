@@ -8,35 +8,57 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
+from miro_sim.world.machine import NotObservable
 from miro_sim.world.waits import WaitExpired
+from miro_sim.world.world import World
 from mirotwin.runs.result import Result
 from mirotwin.shell.command import shell_line
+from mirotwin.shell.outputs import RECORDING
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.rig_options import rig_options
+from mirotwin.testing.session_options import desk_of, path_option
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.cases.artifacts import case_lines, clear, leave, nothing_left, report_line
-from mirotwin.verify.cases.replay_line import foreign_path
-from mirotwin.verify.checks.interface import at
+from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
+
+if TYPE_CHECKING:
+    from mirotwin.testing.port_rig import PortRig
+
+    AnyRig = Rig | PortRig
 
 OWN = ("miro_", "mirotwin")
 """What our modules' names begin with."""
-RIG = pytest.StashKey[Rig]()
+RIG = pytest.StashKey["AnyRig"]()
+REPORTED = (ValueError, TimeoutError, NotObservable, AttributeError)
+"""Errors of a test that are shown otherwise than they were raised."""
+OF_A_TWIN = {*dir(World), *World.STATE, *World.NOT_STATE}
 
 
-def rig_for(item: pytest.Item, firmware: Path | None, seed: int) -> Rig:
+def rig_for(item: pytest.Item, seed: int) -> AnyRig:
     """The rig of a test; what its marker asks for and cannot have is an error of one line."""
+    desk = desk_of(item.config)
     try:
-        rig = Rig(rig_options(item.iter_markers("mirotwin"), item.path.parent, firmware, seed))
+        firmware = path_option(item.config, "firmware")
+        options = rig_options(item.iter_markers("mirotwin"), item.path.parent, firmware, seed)
+        if desk.port:
+            from mirotwin.testing.port_rig import PortRig  # loads pyserial
+
+            rig: AnyRig = PortRig(options, desk, item.name)
+        else:
+            rig = Rig(options)
+    except NotObservable as error:
+        pytest.skip(f"{error}")
     except ValueError as error:
-        raise pytest.fail.Exception(f"{item.nodeid}: {error}", pytrace=False) from None
+        line = f"{error}" if desk.port else f"{item.nodeid}: {error}"
+        raise pytest.fail.Exception(line, pytrace=False) from None
     item.stash[RIG] = rig
     return rig
 
@@ -53,8 +75,17 @@ def judge(item: pytest.Item) -> None:
         pytest.fail("\n".join(result.lines), pytrace=False)
 
 
-def at_the_tests_line(item: pytest.Item, error: ValueError | TimeoutError) -> BaseException:
-    """The error as the test sees it: without the frames of the world below the test's own line; a wait in words."""
+def as_the_test_sees_it(item: pytest.Item, error: BaseException) -> BaseException:
+    """The error without the frames of the machine below the test's own line, and a wait in words; a test that needs
+    what no port shows is skipped.
+    """
+    machine = item.stash[RIG].machine
+    if isinstance(error, AttributeError):
+        if error.obj is not machine or error.name not in OF_A_TWIN or isinstance(machine, World):
+            return error
+        error = NotObservable(f"world.{error.name}: not observable on a port: only a twin has it")
+    if isinstance(error, NotObservable):
+        return pytest.skip.Exception(f"{error}")
     last = trace = error.__traceback__
     while trace is not None:
         if not trace.tb_frame.f_globals.get("__name__", "").startswith(OWN):
@@ -62,80 +93,55 @@ def at_the_tests_line(item: pytest.Item, error: ValueError | TimeoutError) -> Ba
         trace = trace.tb_next
     if last is not None:
         last.tb_next = None
-    world = item.stash[RIG].world
-    shown = WaitFailed.of(error, world) if isinstance(error, WaitExpired) else error
+    shown = WaitFailed.of(error, machine) if isinstance(error, WaitExpired) else error
     return shown.with_traceback(error.__traceback__)
 
 
 def tell(
-    item: pytest.Item,
-    report: pytest.TestReport,
-    caught: pytest.ExceptionInfo[BaseException] | None,
-    firmware: Path | None,
-    artifacts: Path | None,
-    pages: bool,
+    item: pytest.Item, report: pytest.TestReport, caught: pytest.ExceptionInfo[BaseException] | None
 ) -> None:
     """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
-    rig = item.stash[RIG]
-    seed = rig.world.seed
-    nodeid = item.nodeid.replace(f"-seed{seed}]", "]").replace(f"[seed{seed}]", "")
-    file, _, name = nodeid.partition("::")
-    file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
-    again = test_line(f"{file}::{name}", seed, _relative(item.config, firmware) if firmware else None)
+    rig, seed = item.stash[RIG], item.stash[RIG].spec.seed
     if report.failed:
         with suppress(BadInput):
             rig.judge()
-    result = replace(rig.run.result(), again=again)
-    facts = {"scenario": rig.world.scenario.name, **result.facts()}
+    result = replace(rig.result(), again=test_line(item, seed))
+    facts = {"scenario": rig.spec.scenario.name, **result.facts()}
     properties = [(f"mirotwin_{key}", value) for key, value in facts.items()]
     report.user_properties += properties
     item.user_properties += properties  # JUnit takes them with the report of the teardown
-    folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
-    text = ""
-    if report.failed:
-        failed_at = _failed_at(item, report, caught, result)
-        text = story(rig, result, failed_at, [again])
+    artifacts = path_option(item.config, "artifacts")
+    folder = None if artifacts is None else folder_of(artifacts, item.nodeid)
+    if not report.failed:
+        with suppress(OSError, BadInput):
+            if folder is not None:
+                clear(folder, SUMMARY, RECORDING)
+        return
+    failed_at = _failed_at(item, report, caught, result)
+    text = story(rig, result, failed_at, [result.again])
+    files: dict[str, bytes] = {}
     if folder is not None:
+        where = _relative(item.config, folder)
+        summary = {**facts, "tick": rig.tick, "failed": result.lines}
         try:
-            clear(folder, SUMMARY)
-            if report.failed:
-                case = case_of(rig, None if caught is None else caught.value)
-                text = _leave(rig, result, failed_at, case, folder, _relative(item.config, folder), facts)
+            clear(folder, SUMMARY, RECORDING)
+            files, lines = rig.left(None if caught is None else caught.value, where)
+            more = story(rig, result, failed_at, [result.again, *lines])
+            more += f"\n{report_line(where)}" * bool(files)
+            leave(folder, f"{more}\n", {SUMMARY: json.dumps(summary, indent=2).encode() + b"\n", **files})
+            text = more
         except (OSError, BadInput) as error:  # the failure is shown, whatever becomes of its files
-            text = f"{text}\n{nothing_left(folder, error)}"
+            text, files = f"{text}\n{nothing_left(folder, error)}", {}
             with suppress(OSError, BadInput):
-                clear(folder, SUMMARY)
-            pages = False
-    if text:
-        report.sections.append(("mirotwin", text.lstrip("\n")))
-    if pages and report.failed and folder is not None and not rig.written:
+                clear(folder, SUMMARY, RECORDING)
+    report.sections.append(("mirotwin", text))
+    if files and folder is not None and item.config.getoption("--mirotwin-pages"):
         from mirotwin.report.report_command import leave_page  # loads readers of recordings
 
         try:
             leave_page(folder, item.nodeid)
         except (OSError, ValueError) as error:  # also where Bokeh is missing
             report.sections.append(("mirotwin", f"no page: {error}"))
-
-
-def _leave(
-    rig: Rig,
-    result: Result,
-    failed_at: Sequence[str],
-    case: str | None,
-    folder: Path,
-    where: str,
-    facts: Mapping[str, str],
-) -> str:
-    """Writes the folder of a failed test; the story, with the commands that read it. Raises OSError."""
-    more = [] if case is None else case_lines(where, foreign_path(rig.world.image) is None)
-    text = story(rig, result, failed_at, [result.again, *more])
-    if not rig.written:
-        text += f"\n{report_line(where)}"
-    sent = None if rig.written else rig.run.stream()
-    summary = {**facts, "tick": rig.tick, "failed": result.lines}
-    others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
-    leave(folder, text + "\n", case, sent, rig.world.image, others)
-    return text
 
 
 def let_go(item: pytest.Item) -> None:
@@ -154,11 +160,17 @@ SUMMARY = "summary.json"
 _NAME_CHARACTERS = 80
 
 
-def test_line(nodeid: str, seed: int, firmware: str | None) -> str:
-    """The command that runs the test again, with the same seed and firmware."""
-    words = ["pytest", nodeid, "--mirotwin-seed", str(seed)]
-    if firmware is not None:
-        words += ["--mirotwin-firmware", firmware]
+def test_line(item: pytest.Item, seed: int) -> str:
+    """The command that runs the test again, with the same seed and firmware, or at the same port."""
+    nodeid = item.nodeid.replace(f"-seed{seed}]", "]").replace(f"[seed{seed}]", "")
+    file, _, name = nodeid.partition("::")
+    file = os.path.relpath(Path(item.config.rootpath, file), item.config.invocation_params.dir)
+    words = ["pytest", f"{file}::{name}", "--mirotwin-seed", str(seed)]
+    if (firmware := path_option(item.config, "firmware")) is not None:
+        words += ["--mirotwin-firmware", _relative(item.config, firmware)]
+    for option in ("--mirotwin-port", "--mirotwin-allow-motion", "--mirotwin-max-speed"):
+        if value := item.config.getoption(option):
+            words += [option] if value is True else [option, f"{value}"]
     return shell_line(*words)
 
 
@@ -182,13 +194,10 @@ def _failed_at(
     return [f"failed: {place}:{crash.lineno}: {crash.message}"]
 
 
-def story(rig: Rig, result: Result, failed_at: Sequence[str], lines: Sequence[str]) -> str:
+def story(rig: AnyRig, result: Result, failed_at: Sequence[str], lines: Sequence[str]) -> str:
     """The section of a report: what ran, what failed where, the last events, and `lines` to reproduce it."""
-    image, world = rig.world.image, rig.world
     text = [
-        f"scenario {world.scenario.name}, seed {world.seed}, {at(rig.tick)}",
-        f"firmware {image.path.name}, {image.sha256[:12]}",
-        f"digest {world.digest}",
+        *rig.head(),
         *failed_at,
         *result.lines,
         "last events:",
@@ -203,14 +212,3 @@ def folder_of(artifacts: Path, nodeid: str) -> Path:
     """The test's own folder: no other test has it, whatever characters the names have."""
     name = re.sub(r"[^\w.=+-]+", "-", nodeid).strip("-")[-_NAME_CHARACTERS:]
     return artifacts / f"{name}-{hashlib.sha256(os.fsencode(nodeid)).hexdigest()[:8]}"
-
-
-def case_of(rig: Rig, caught: BaseException | None) -> str | None:
-    """The case of a failed test; None where no check can judge what failed, or its test wrote into a robot's memory."""
-    if rig.written:
-        return None
-    if isinstance(caught, WaitFailed) and caught.expect is not None:
-        case = rig.run.case_of_expect(caught.expect)
-        if case is not None:
-            return case
-    return rig.run.case() if rig.run.failures else None

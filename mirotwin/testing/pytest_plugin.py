@@ -22,12 +22,12 @@ from mirotwin.testing.session_options import (
     check_options,
     first_seed,
     number_option,
-    path_option,
 )
 
 if TYPE_CHECKING:
-    from miro_sim.world.world import World
+    from miro_sim.world.machine import Machine
     from mirotwin.testing.link import Link
+    from mirotwin.testing.port_rig import PortRig
     from mirotwin.testing.rig import Rig
     from mirotwin.testing.robot import RobotUnderTest
 
@@ -44,14 +44,15 @@ def pytest_configure(config: pytest.Config) -> None:
         "mirotwin(scenario=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
     )
     check_options(config)
-    if config.getoption("--mirotwin-port"):
-        from mirotwin.testing import port_fixtures
-
-        config.pluginmanager.register(port_fixtures.PortFixtures(config), port_fixtures.NAME)
     if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
         from mirotwin.testing.session_coverage import FirmwareCoverage
 
         config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    port = config.getoption("--mirotwin-port")
+    return f"mirotwin: robots at {port}; what a port does not show is skipped" if port else None
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -84,21 +85,27 @@ def _seed_of_the_test(request: pytest.FixtureRequest) -> int:
 
 
 @pytest.fixture(name=_RIG)
-def _rig_of_the_test(request: pytest.FixtureRequest, _mirotwin_seed: int) -> Rig:
-    """The world of the test and all that belongs to it."""
+def _rig_of_the_test(
+    request: pytest.FixtureRequest, _mirotwin_seed: int
+) -> Generator[Rig | PortRig, None, None]:
+    """The machine of the test and all that belongs to it."""
     from mirotwin.testing import items
 
-    return items.rig_for(request.node, path_option(request.config, "firmware"), _mirotwin_seed)
+    rig = items.rig_for(request.node, _mirotwin_seed)
+    yield rig
+    rig.close()
 
 
 @pytest.fixture
-def world(mirotwin_rig: Rig) -> World:
-    """A world of the test's own: one robot that is up, a silent host, an ideal radio; see the marker `mirotwin`."""
-    return mirotwin_rig.world
+def world(mirotwin_rig: Rig | PortRig) -> Machine:
+    """A world of the test's own: one robot that is up, a silent host, an ideal radio; see the marker `mirotwin`. At a
+    port: the robots there.
+    """
+    return mirotwin_rig.machine
 
 
 @pytest.fixture
-def links(mirotwin_rig: Rig) -> list[Link]:
+def links(mirotwin_rig: Rig | PortRig) -> list[Link]:
     """The hosts' ends of all networks."""
     return mirotwin_rig.links
 
@@ -110,7 +117,7 @@ def link(links: list[Link]) -> Link:
 
 
 @pytest.fixture
-def robots(mirotwin_rig: Rig) -> list[RobotUnderTest]:
+def robots(mirotwin_rig: Rig | PortRig) -> list[RobotUnderTest]:
     """All robots, by network and slot."""
     return mirotwin_rig.robots
 
@@ -133,8 +140,11 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 
     try:
         result = yield
-    except (ValueError, TimeoutError) as error:
-        raise items.at_the_tests_line(item, error) from None
+    except items.REPORTED as error:
+        shown = items.as_the_test_sees_it(item, error)
+        if shown is error:
+            raise
+        raise shown from None
     items.judge(item)
     return result
 
@@ -148,8 +158,7 @@ def pytest_runtest_makereport(
         from mirotwin.testing import items
 
         if call.when == "call":
-            paths = path_option(item.config, "firmware"), path_option(item.config, "artifacts")
-            items.tell(item, report, call.excinfo, *paths, item.config.getoption("--mirotwin-pages"))
+            items.tell(item, report, call.excinfo)
         else:
             items.let_go(item)
     return report

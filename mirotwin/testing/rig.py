@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from miro_sim.world.events import Event
+from miro_sim.world.events import BoardLog, HostLog
+from miro_sim.world.machine import Machine
 from miro_sim.world.world import World
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
@@ -12,8 +13,11 @@ from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
 from mirotwin.testing.link import Link
 from mirotwin.testing.rig_options import RigOptions
 from mirotwin.testing.robot import RobotUnderTest
-from mirotwin.testing.waiting import in_words
+from mirotwin.testing.waiting import WaitFailed, in_words
+from mirotwin.verify.cases.artifacts import case_lines, stream_files
 from mirotwin.verify.cases.case import Trace
+from mirotwin.verify.cases.replay_line import foreign_path
+from mirotwin.verify.checks.interface import at
 
 LAST_EVENTS = 240
 LAST_LINES = 12
@@ -22,20 +26,26 @@ _STATES: dict[tuple[bytes, int, str], bytes] = {}
 """Saved worlds of this process, by scenario, seed and firmware."""
 
 
+Left = tuple[dict[str, bytes], list[str]]
+"""Files of a failed test by name, none where nobody can run it again, and commands that read them."""
+
+
 class Rig:
-    """The world of one test. `links`: by network; `robots`: by network and slot."""
+    """The world of one test. `links`: by network; `robots`: by network and slot; `tick`: where it ended, -1 before."""
 
     def __init__(self, options: RigOptions) -> None:
-        self.options = options
+        self.options, self.spec = options, options.spec
         self.run = run_for(options)
-        self.world = self.run.world
+        self.world = self.machine = self.run.world
         self.links = [Link(self.world, network.index) for network in self.world.networks]
         self.robots = [RobotUnderTest(self.world, robot.network, robot.slot) for robot in self.world.robots]
 
     @property
     def tick(self) -> int:
-        """Where the test ended, -1 while it runs."""
         return self.run.tick
+
+    def close(self) -> None:
+        """Nothing of a world has to be closed."""
 
     def judge(self) -> Result:
         """What came of the test's run, which is over; lets a control period end first.
@@ -47,27 +57,59 @@ class Rig:
             if not self.world.stopped and (self.world.in_period or not self.world.finished):
                 self.world.run_to(self.world.period_end)
             self.run.finish()
+        return self.result()
+
+    def result(self) -> Result:
+        """The same as far as it is known."""
         return self.run.result()
 
-    @property
-    def written(self) -> bool:
-        """Whether the test has put something into a robot's memory by itself."""
-        return any(robot.written for robot in self.robots)
+    def head(self) -> list[str]:
+        """What ran, a line each."""
+        image, world = self.world.image, self.world
+        return [
+            f"scenario {world.scenario.name}, seed {world.seed}, {at(self.tick)}",
+            f"firmware {image.path.name}, {image.sha256[:12]}",
+            f"digest {world.digest}",
+        ]
 
     def last_events(self) -> list[str]:
         """The last things that happened up to the end of the test, a line each."""
-        events: list[Event] = []
-        for network in self.world.networks:
-            events += [event for _, event in network.log.since(network.log.end - LAST_EVENTS)]
-        for robot in self.world.robots:
-            events += [event for _, event in robot.log.since(robot.log.end - LAST_EVENTS)]
-        end_tick = self.tick if self.tick >= 0 else self.world.tick
-        events = sorted((event for event in events if event.tick <= end_tick), key=lambda event: event.tick)
-        return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
+        return last_events(self.world, self.tick)
+
+    def left(self, caught: BaseException | None, where: str) -> Left:
+        """The case, where a check can judge what failed; nothing if the test wrote into a robot's memory by itself.
+
+        `where`: the folder as commands name it.
+        """
+        if any(robot.written for robot in self.robots):
+            return {}, []
+        case = self._case(caught)
+        own = foreign_path(self.world.image) is None
+        lines = [] if case is None else case_lines(where, own)
+        return stream_files(case, self.run.stream(), self.world.image), [*lines]
+
+    def _case(self, caught: BaseException | None) -> str | None:
+        if isinstance(caught, WaitFailed) and caught.expect is not None:
+            case = self.run.case_of_expect(caught.expect)
+            if case is not None:
+                return case
+        return self.run.case() if self.run.failures else None
 
     def __repr__(self) -> str:
         world = self.world
         return f"Rig({world.scenario.name!r}, seed={world.seed}, tick={world.tick})"
+
+
+def last_events(machine: Machine, end_tick: int) -> list[str]:
+    """What happened last up to `end_tick` (-1: now), a line each."""
+    logs: list[HostLog | BoardLog] = [network.log for network in machine.networks]
+    logs += [robot.log for robot in machine.robots]
+    end_tick = machine.tick if end_tick < 0 else end_tick
+    events = [
+        event for log in logs for _, event in log.since(log.end - LAST_EVENTS) if event.tick <= end_tick
+    ]
+    events.sort(key=lambda event: event.tick)
+    return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
 
 
 def run_for(options: RigOptions) -> Run:

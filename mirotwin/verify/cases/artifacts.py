@@ -36,18 +36,15 @@ def clear(folder: Path, *others: str) -> None:
         folder.rmdir()
 
 
-def leave(
-    folder: Path, report: str, case: str | None, sent: str | None, image: Image, others: Mapping[str, str]
-) -> None:
-    """Writes all of it into the folder, or nothing. `case`, `sent`: streams; the second where there is no first.
+def leave(folder: Path, report: str, files: Mapping[str, bytes]) -> None:
+    """Writes the report and these files, by name, into the folder, or nothing. Raises OSError, OutputError."""
+    write_files(folder, {REPORT: encodable(report).encode(), **files}, _REMEDY)
 
-    `others`: more files, by name. Raises OSError, OutputError.
-    """
+
+def stream_files(case: str | None, sent: str, image: Image) -> dict[str, bytes]:
+    """The case, or where there is none what was sent, with the image."""
     name, stream = (SENT, sent) if case is None else (CASE, case)
-    streams = {} if stream is None else {name: stream}
-    texts = {REPORT: report, **others, **streams}
-    files = {name: encodable(text).encode() for name, text in texts.items()}
-    write_files(folder, files | (_image_content(image) if streams else {}), _REMEDY)
+    return {name: encodable(stream).encode(), **_image_content(image)}
 
 
 def nothing_left(folder: Path, error: OSError | BadInput) -> str:

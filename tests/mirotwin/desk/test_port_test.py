@@ -214,6 +214,29 @@ def test_fixtures_run_at_a_port_and_what_it_does_not_show_is_skipped(pytester):
     found.stdout.fnmatch_lines_random(SKIPPED)
 
 
+def test_a_failed_test_at_a_port_leaves_its_recording_and_its_story(pytester, mirotwin):
+    pytester.makepyfile(
+        test_desk="from mirotwin import Telemetry, ms\n"
+        "def test_answer(link):\n    link.poll()\n    link.expect(Telemetry, within=ms(80), accepted=9)\n"
+    )
+    found = pytester.runpytest_inprocess(
+        "-p", "no:xdist", f"--mirotwin-port={ROBOT}", "--mirotwin-max-speed=0.1", "--mirotwin-artifacts=left"
+    )
+    found.assert_outcomes(failed=1)
+    (folder,) = (pytester.path / "left").iterdir()
+    lines = (folder / "report.txt").read_text().splitlines()
+    assert lines[1] == f"robots at {ROBOT}"
+    assert any("net0/pc: answer telemetry" in line for line in lines)
+    again = f"pytest test_desk.py::test_answer --mirotwin-seed 0 --mirotwin-port '{ROBOT}' --mirotwin-max-speed 0.1"
+    assert lines[-3:] == [
+        f"  {again}",
+        f"  mirotwin replay left/{folder.name}",
+        f"page: mirotwin report left/{folder.name}",
+    ]
+    code, out, _ = mirotwin("replay", folder)
+    assert (code, "the robot answers as its twin does" in out) == (0, True)
+
+
 def test_a_port_that_is_not_there_is_told_once_for_each_test(pytester):
     pytester.makepyfile("def test_answer(link): link.poll()")
     found = pytester.runpytest_inprocess("-p", "no:xdist", "--mirotwin-port=/dev/nope")

@@ -403,10 +403,10 @@ def test_a_symbol_that_is_no_function_is_refused(robot):
 
 
 def test_writing_into_a_robots_memory_is_remembered(one, robot):
-    assert not one.written
+    assert not robot.written
     robot.write("last_left", -5)
     assert robot.read("last_left") == -5
-    assert one.written
+    assert robot.written
 
 
 def test_a_reset_forgets_what_the_firmware_counted_and_comes_up_again(world, link, robot):

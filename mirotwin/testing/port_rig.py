@@ -1,0 +1,64 @@
+"""What one test works with at a port: the robots there, which are told to stand when it is over."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from io import BytesIO
+from typing import NoReturn
+
+import pytest
+
+from miro_sim.world.machine import why_not
+from mirotwin.desk.guard import DeskOptions
+from mirotwin.desk.robot_port import LACKS, port_for_test
+from mirotwin.runs.at_port import twin_source
+from mirotwin.runs.result import Line, Result
+from mirotwin.shell.command import command_line, operand
+from mirotwin.shell.outputs import RECORDING
+from mirotwin.testing.link import Link
+from mirotwin.testing.rig import Left, last_events
+from mirotwin.testing.rig_options import RigOptions
+from mirotwin.verify.checks.interface import at
+
+
+class PortRig:
+    """Robots at `desk.port`, as a `Rig`. Raises BadInput, and NotObservable for a test that needs more than a port."""
+
+    def __init__(self, options: RigOptions, desk: DeskOptions, name: str) -> None:
+        self.spec, self.desk, self.tick = options.spec, desk, -1
+        self.notes: list[str] = []
+        self.recording = BytesIO()
+        self.opened = ExitStack()
+        scenario = self.spec.scenario
+        self.machine = self.opened.enter_context(port_for_test(desk, scenario, name, self.notes.append))
+        self.machine.record(self.recording, twin_source(scenario, 0, self.spec.image))
+        self.links = [Link(self.machine)]
+
+    @property
+    def robots(self) -> NoReturn:
+        pytest.skip(f"robot: not observable {LACKS['inside']}")
+
+    def close(self) -> None:
+        """From now on the robots stand."""
+        self.tick = self.machine.tick if self.tick < 0 else self.tick
+        self.opened.close()
+
+    def judge(self) -> Result:
+        self.close()
+        return self.result()
+
+    def result(self) -> Result:
+        names = self.spec.scenario.expect
+        lines = [why_not(self.machine, f"expectation {name}", "inside") for name in names]
+        said: list[Line] = [("not observable", line) for line in (*lines, *self.notes)]
+        return Result(verdict="passed", said=said, tick=self.tick)
+
+    def head(self) -> list[str]:
+        return [f"scenario {self.spec.scenario.name}, {at(self.tick)}", f"robots at {self.desk.port}"]
+
+    def last_events(self) -> list[str]:
+        return last_events(self.machine, self.tick)
+
+    def left(self, caught: BaseException | None, where: str) -> Left:
+        """The recording, which `replay` compares with what a twin does."""
+        return {RECORDING: self.recording.getvalue()}, [command_line("replay", operand(where))]
