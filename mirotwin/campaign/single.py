@@ -11,6 +11,7 @@ from pathlib import Path
 from time import perf_counter
 
 import msgspec
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image, parse_hex
@@ -65,14 +66,7 @@ def run_single(job: Work) -> RunOutcome:
 def _run(job: Work) -> RunOutcome:
     image = image_of(job.firmware)
     text, expected, steps = prepared(job.origin, job.text, job.settings)
-    spec = RunSpec(
-        scenario=text.scenario,
-        image=image,
-        seed=job.seed,
-        expected=expected,
-        steps=steps,
-        origin=job.origin,
-    )
+    spec = replace(RunSpec.of(text, image, job.seed, steps), expected=expected)
     run = Run(spec)
     tracks = Tracks(delay_frames=text.scenario.camera.delay_frames)
     began_s = perf_counter()

@@ -46,7 +46,6 @@ from miro_exact.clock import (
     ticks,
 )
 from miro_robot.faults import FirmwareFault
-from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, live_scenario
 from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
@@ -56,6 +55,7 @@ from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 from mirotwin.ports.session import Pace
 from mirotwin.ports.url import parse_url
 from mirotwin.recording.recorder import Recorder, source_of
+from mirotwin.runs.runner import observed
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
@@ -367,17 +367,11 @@ def _recorded(world: World, text: ScenarioText, folder: OutputFolder) -> Iterato
     with folder:
         folder.keep = KEPT
         stream = folder.part(RECORDING).open("wb", buffering=0)
-        with stream, Recorder(stream, source) as recorder:
-
-            def write(period: Period) -> None:
-                recorder.write(period)
-                recorder.flush_if_due()
-
-            world.observers.append(write)
-            try:
-                yield
-                if world.in_period and not world.stopped:
-                    world.run_to(world.period_end)
-                recorder.write_faults(world.robots)
-            finally:
-                world.observers.remove(write)
+        with (
+            stream,
+            Recorder(stream, source) as recorder,
+            observed(world, recorder, lambda period: recorder.flush_if_due()),
+        ):
+            yield
+            if world.in_period and not world.stopped:
+                world.run_to(world.period_end)

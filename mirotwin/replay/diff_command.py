@@ -181,7 +181,7 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         tell_notes(text.notes)
         refuse_steps(text.scenario, text.origin)
         image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
-        spec = RunSpec(scenario=text.scenario, image=image, seed=seed, origin=on)
+        spec = RunSpec.of(text, image, seed)
     end_tick = min(end_tick, options.compare.rule.to_tick or end_tick)
     end_tick = -(-end_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS  # what is compared are whole ones
     spec = replace(spec, until_tick=end_tick, cut=True)

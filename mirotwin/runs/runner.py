@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
@@ -21,10 +22,27 @@ def run(
     on_period: Callable[[Period], object] = lambda period: None,
     move: Callable[[], object] | None = None,
 ) -> None:
-    """Steps the world until it is finished, or as `move` does it.
+    """Steps the world until it is finished, or as `move` does it; `observed` meanwhile.
 
-    Every period goes to `recorder`, with `full` (but not with `move`) each LM629 sample as well, and the firmware
-    faults at the end, also when something raises: a recording up to then is worth having.
+    With `full` (but not with `move`) each LM629 sample is recorded as well.
+    """
+    with observed(world, recorder, on_period):
+        if move is not None:
+            move()
+        while move is None and not world.finished:
+            if full and recorder is not None:
+                _run_samples(world, recorder)
+            world.step()
+
+
+@contextmanager
+def observed(
+    world: World,
+    recorder: Recorder | None = None,
+    on_period: Callable[[Period], object] = lambda period: None,
+) -> Iterator[None]:
+    """Within it every period goes to `recorder`, and at the end the firmware faults, also when something raises: a
+    recording up to then is worth having.
     """
 
     def keep(period: Period) -> None:
@@ -34,12 +52,7 @@ def run(
 
     world.observers.append(keep)
     try:
-        if move is not None:
-            move()
-        while move is None and not world.finished:
-            if full and recorder is not None:
-                _run_samples(world, recorder)
-            world.step()
+        yield
     finally:
         world.observers.remove(keep)
         if recorder is not None:
