@@ -1,4 +1,4 @@
-"""A value that two runs have otherwise, and how it is said."""
+"""A value in which two runs differ, as a line and as JSON."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.channels import PERIOD, topic_name
 
 WORDS = ("recorded", "replayed")
-"""What the two sides of a replay are called; `mirotwin diff` calls them by its arguments."""
+"""Names of the two runs of a replay; `mirotwin diff` has A and B."""
 
 
 DIGEST = "digest"
-"""The channel of the states' digests: of what a control period leaves behind, nothing of which need be recorded."""
+"""The channel of the states' digests. A digest may differ where nothing that is recorded does."""
 
 
 class Difference(msgspec.Struct, frozen=True):
@@ -42,22 +42,22 @@ class Difference(msgspec.Struct, frozen=True):
         return topic_name(self.channel, self.network, self.slot)
 
     def values(self) -> tuple[str, str]:
-        """Both as people read them."""
+        """Both as text."""
         if self.channel == DIGEST:
             return f"{self.recorded}"[:12], f"{self.replayed}"[:12]
         return shown(self.recorded), shown(self.replayed)
 
-    def said(self, words: tuple[str, str] = WORDS) -> str:
-        """One line; `words` name the two runs."""
+    def line(self, names: tuple[str, str] = WORDS) -> str:
+        """One line; `names` of the two runs."""
         recorded, replayed = self.values()
-        values = f"{words[0]} {recorded}, {words[1]} {replayed}"
+        values = f"{names[0]} {recorded}, {names[1]} {replayed}"
         return f"{moment(self.tick, self.clock)}, {self.topic}: {values}"
 
     def __str__(self) -> str:
-        return self.said()
+        return self.line()
 
-    def as_json(self, words: tuple[str, str] = WORDS) -> dict[str, Any]:
-        """What `--json` says of it."""
+    def as_json(self, names: tuple[str, str] = WORDS) -> dict[str, Any]:
+        """For `--json`."""
         return {
             "tick": self.tick,
             "t_s": self.tick / self.clock,
@@ -65,8 +65,8 @@ class Difference(msgspec.Struct, frozen=True):
             "network": None if self.network < 0 else self.network,
             "slot": None if self.slot < 0 else self.slot,
             "channel": self.channel,
-            words[0]: self.recorded,
-            words[1]: self.replayed,
+            names[0]: self.recorded,
+            names[1]: self.replayed,
         }
 
 

@@ -1,4 +1,4 @@
-"""Options that say how two runs are compared, for `replay` and `diff`, and what they come to."""
+"""Options of `replay` and `diff`: how two runs are compared."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def refuse_given(file: str, what: str, given: Sequence[str]) -> None:
 
 
 class CompareOptions(Options, frozen=True, kw_only=True):
-    """How to compare and what to tell."""
+    """How to compare and what to print."""
 
     kind: Annotated[
         Kind,
         Option(
             "--compare",
             type=click.Choice(KINDS),
-            help="bits: all that robots did. bytes: the characters the PC heard. commands: the commands of each LM629."
+            help="bits: all that robots did. bytes: the characters the PC received. commands: those of each LM629."
             " wheels: positions and desired velocities. answers: what robots at a port answer, the only one there. All"
             " but the first have tolerances.",
         ),
@@ -95,7 +95,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
 
     @property
     def rule(self) -> CompareRule:
-        """The comparison that was asked for."""
+        """The comparison that the options describe."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
         from_tick, to_tick = window(self.from_time, self.to_time)
         usual = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
@@ -131,13 +131,13 @@ class CompareOptions(Options, frozen=True, kw_only=True):
     def extent(self, periods: Sequence[Period]) -> str:
         """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
         rule = self.rule
-        said = f"all {amount(rule.compared(periods), 'control period')}"
+        whole = f"all {amount(rule.compared(periods), 'control period')}"
         if rule.kind in _APPLIES["within_ms"]:
-            return f"{said} ({rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms)"
+            return f"{whole} ({rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms)"
         if rule.kind == "wheels":
             per_sample = f"{rule.within_counts_per_sample:g} counts per sample"
-            return f"{said} (wheels, within {rule.within_counts} counts and {per_sample})"
-        return said
+            return f"{whole} (wheels, within {rule.within_counts} counts and {per_sample})"
+        return whole
 
     def rule_as_json(self) -> dict[str, Any]:
         rule = self.rule

@@ -84,27 +84,27 @@ def replay(options: ReplayOptions) -> int:
 
     FILE is a run.mcap, a text stream, or the folder of a run or of a failed test.
 
-    Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3. The first
-    difference is said on stderr, and the first of each channel in a table. Where another --firmware makes it differ,
-    the first instruction that both execute otherwise is looked for.
+    Exit code 4 when it differs from the recording; if a firmware fault comes of it too, the code is 4. The first
+    difference is printed on stderr, and the first of each channel in a table. Where the runs differ, both are repeated
+    to find the first tick and field in which their states do, and with another --firmware the first instruction.
 
-    A recording that was broken off, or a part of one, is compared as far as it goes, with a note.
-    A text stream runs over an ideal link in the default
-    scenario, and there is nothing to compare. A capture (pcapng) is made one by `mirotwin export`; of bytes without
-    times write one, a line `TICK > HEX BYTES` a transmission.
+    A recording that was broken off, or a part of one, is compared as far as it goes, with a note. A text stream runs
+    over an ideal link in the default scenario, and there is nothing to compare. `mirotwin export` makes one of a
+    capture (pcapng); for bytes without times add a time to each line first: `TICK > HEX BYTES` a transmission.
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
-    1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
+    1, or 3 for a firmware fault. 0: fixed by your change of firmware or settings. 4: it no longer fails, unchanged.
     A case of `mirotwin fuzz --bare` needs --firmware, and --check FILE.py:FUNCTION if its check is in a file.
 
-    Where --expect is given, that decides: a difference is only told, and the exit code is 1 if a check fails, else 0.
+    Where --expect is given, that decides: a difference is only reported, and the exit code is 1 if a check fails, else
+    0.
     What the recorded scenario expects is judged too, but a difference goes before it.
 
     With --port the bytes go to a real robot, at their times. What it answers is recorded, and compared with what its
     twin answers to the same bytes at the same times (--compare answers). A recording made at a port is compared so,
     too. Nothing that moves a robot is sent without --allow-motion.
 
-    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
+    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC received them.
     """
     if not options.desk.port and (given := options.given("out", "force")):
         raise click.UsageError(f"{given[0]} needs --port.")

@@ -1,4 +1,4 @@
-"""What `replay` and `diff` say of two runs: lines and tables."""
+"""Lines and tables of `replay` and `diff`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
     """Where `subject` differs first, and what was found by repeating both runs; the notes are not in it."""
     if not found.differences:
         return
-    yield f"{subject} in control period {found.period}, {found.differences[0].said(found.names)}"
+    yield f"{subject} in control period {found.period}, {found.differences[0].line(found.names)}"
     if found.state is not None:
         yield f"their states differ from {found.state} on"
     if found.instruction is not None:
@@ -146,7 +146,7 @@ def frame_tables(
 
 
 def response_table(replayed: Sequence[Period]) -> Table:
-    """What the robots made of a stream: there is no recording to compare with."""
+    """How the robots reacted to a stream: there is no recording to compare with."""
     names = ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]")
     table = plain_table(*names, justify="right")
     for index, robot in enumerate(replayed[-1].robots):
@@ -162,7 +162,7 @@ def response_table(replayed: Sequence[Period]) -> Table:
 
 
 def frame_text(row: DecodedRow) -> str:
-    """What a frame or a damaged run says."""
+    """The content of a frame, or of a run of damaged bytes."""
     text = described(row)
     if isinstance(row.event, Damaged):
         more = " .." if len(row.event.data) > SHOWN_BYTES else ""

@@ -201,7 +201,7 @@ def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one, shift):
 def test_a_difference_has_a_line_for_people_and_json_for_programs():
     found = Difference(24_000, 0, 1, 2, "pwm left sign", 1, None)
     assert str(found) == "tick 24000 (0.001000 s), /net1/robot2/pwm left sign: recorded 1, replayed nothing"
-    assert found.said(("A", "B")).endswith("A 1, B nothing")
+    assert found.line(("A", "B")).endswith("A 1, B nothing")
     place = {"tick": 24_000, "t_s": 0.001, "period": 0, "network": 1, "slot": 2, "channel": "pwm left sign"}
     assert found.as_json(("a", "b")) == {**place, "a": 1, "b": None}
 
