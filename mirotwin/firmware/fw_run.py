@@ -20,7 +20,7 @@ from typing import Annotated
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
     STDIN,
@@ -43,6 +43,7 @@ LEAVE = b"\x1d"  # Ctrl-]
 SLICE_S = 0.01  # of machine time between two looks at the keyboard
 LATEST_S = 0.1  # a machine that is later than this is not sped up to catch up
 READ_BYTES = 1024
+LOOK_TICKS = 12 * CONTROL_PERIOD_TICKS  # between two looks at how far a run is
 
 
 def check_terminal(options: BareOptions) -> None:
@@ -71,7 +72,7 @@ def run_world(world: World, options: BareOptions) -> None:
     end_tick, cpu = limit_tick(options), board_of(world).cpu
     with ProgressBar("running", options.max_cycles) as bar:
         while not world.finished and world.tick < end_tick:
-            world.run_to(min(end_tick, world.period_end))
+            world.run_to(min(end_tick, world.tick + LOOK_TICKS))
             bar.to(cpu.cycles)
 
 

@@ -3,7 +3,7 @@ from miro_robot.mcs51.uart cimport Uart
 from miro_robot.processor_board cimport ProcessorBoard
 
 cdef long long CYCLE_TICKS, NEVER_TICK, STOPPED_TICK, _CHECK_CYCLES
-cdef int ENDED, FAULT, REACHED, ASLEEP, BREAKPOINT, REPLAN, STOPPED, _EA, _SOURCES, _IE, _PAGE, _BYTES, _DATA_BITS, _ROLLOVERS
+cdef int ENDED, FAULT, REACHED, ASLEEP, BREAKPOINT, REPLAN, STOPPED, _EA, _SOURCES, _IE, _PAGE, _BYTES, _DATA_BITS, _ROLLOVERS, _OLD, _FRESH
 
 
 cdef class EmptyBoard(ProcessorBoard):
@@ -33,4 +33,6 @@ cdef class EmptyBoard(ProcessorBoard):
     @cython.locals(uart=Uart)
     cdef tuple _bits(self)
     cpdef bytes xram(self)
+    cpdef begin_period(self)
+    cdef bytes _content(self, int least)
     cdef _put_code(self)

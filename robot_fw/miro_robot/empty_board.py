@@ -4,7 +4,8 @@ A program has ended when no input can make it do anything more: in power-down, a
 or in a jump to itself while no interrupt is enabled. ENDED is noted when its last character has been sent. Only a reset
 makes it go on.
 
-RAM counts by pages of 256 bytes: those that were never written are no part of the state.
+RAM counts by pages of 256 bytes: those that were never written are no part of the state. A digest is made of those that
+were written since the last one, which holds the others.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ _IE = 0xA8
 _DATA_BITS, _ROLLOVERS = 8, 16  # of a character; of the serial clock in a bit
 _PAGE = 256  # bytes, and so many pages
 _BYTES = 0x10000
+_OLD, _FRESH = 1, 2  # of a page: it was written, .. since the last digest
 
 
 class EmptyBoard(ProcessorBoard):
@@ -50,7 +52,9 @@ class EmptyBoard(ProcessorBoard):
         "next_check": TICK,
         "ends": Items("q", _BYTES, 0, 0xFFFF),
         "pages": Octets(_PAGE * (1 + 2 * _PAGE)),
+        "fresh_pages": Octets(_PAGE * (1 + 2 * _PAGE)),
     }
+    NOT_HASHED = ("pages",)
     NOT_STATE = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),
@@ -244,7 +248,7 @@ class EmptyBoard(ProcessorBoard):
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
         self.memory[address] = value
-        self.touched[address >> 8] = 1
+        self.touched[address >> 8] = _FRESH
         if self.shared:
             self.wrote[address] = 1
             self.cpu.write_code(address, value)
@@ -293,17 +297,16 @@ class EmptyBoard(ProcessorBoard):
         code = self.image.code
         return [at for first, end in self.image.used for at in range(first, end) if self.ram[at] != code[at]]
 
+    def begin_period(self) -> None:
+        """A digest was made: no page is fresh."""
+        for page in range(_PAGE):
+            if self.touched[page]:
+                self.touched[page] = _OLD
+
     @property
     def pages(self) -> bytes:
         """The pages that were written: number, content, and with `code_in_xram` which bytes of it are code."""
-        found = []
-        for page in range(_PAGE):
-            if self.touched[page]:
-                first = page * _PAGE
-                found.append(bytes([page]) + self.ram[first : first + _PAGE])
-                if self.shared:
-                    found.append(bytes(self.written[first : first + _PAGE]))
-        return b"".join(found)
+        return self._content(_OLD)
 
     @pages.setter
     def pages(self, pages: bytes) -> None:
@@ -324,7 +327,32 @@ class EmptyBoard(ProcessorBoard):
             self.ram[first : first + _PAGE] = pages[at : at + _PAGE]
             if self.shared:
                 self.written[first : first + _PAGE] = pages[at + _PAGE : at + 2 * _PAGE]
-            self.touched[page] = 1
+            self.touched[page] = _OLD
+
+    @property
+    def fresh_pages(self) -> bytes:
+        """Those of them that were written since the last digest."""
+        return self._content(_FRESH)
+
+    @fresh_pages.setter
+    def fresh_pages(self, pages: bytes) -> None:
+        """After `pages`. Raises ValueError for what is not of these."""
+        for at in range(0, len(pages), 1 + _PAGE + (_PAGE if self.shared else 0)):
+            if not self.touched[pages[at]]:
+                raise ValueError(f"page {pages[at]} of RAM was not written")
+            self.touched[pages[at]] = _FRESH
+        if self.fresh_pages != pages:
+            raise ValueError("the pages written last are not those of RAM")
+
+    def _content(self, least: int) -> bytes:
+        found = []
+        for page in range(_PAGE):
+            if self.touched[page] >= least:
+                first = page * _PAGE
+                found.append(bytes([page]) + self.ram[first : first + _PAGE])
+                if self.shared:
+                    found.append(bytes(self.written[first : first + _PAGE]))
+        return b"".join(found)
 
     def after_load(self) -> None:
         """Code lies where it lay, in RAM if program and data share it."""

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from miro_protocol.actions import Action
 from miro_sim.periods import Period
-from miro_sim.scenario.keys import NetworkSpec, Scenario
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
+    from miro_sim.scenario.keys import NetworkSpec, Scenario
     from miro_sim.world.conditions import Condition
     from miro_sim.world.device import Device
     from miro_sim.world.events import Event, HostLog

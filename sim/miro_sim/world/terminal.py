@@ -62,6 +62,8 @@ class SerialInput:
         "polls": TICK,
         "bit_ticks": ("q", 0, 1 << 40),
     }
+    NOT_HASHED = ("pieces",)
+    """What waits to be sent: it may be long, and when it was added changes nothing before it is sent."""
     NOT_STATE = ("seen", "cpu", "baud", "crystal_hz", "gap_ticks", "live", "wait")
 
     def __init__(

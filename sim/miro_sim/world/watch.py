@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import groupby
-from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_protocol.toml_text import struct_of
-from miro_robot.board import Board
-from miro_robot.inspect.tap import PLACES, CpuTap, port_pins
-from miro_robot.inspect.watcher import attach, detach
-from miro_robot.processor_board import ProcessorBoard
-from miro_sim.world.conditions import CONDITIONS, PORT_PINS, Condition, Edge, Reached, WheelSpeeds, When
+from miro_sim.world.conditions import CONDITIONS, Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
     from miro_sim.world.machine import Machine
+    from miro_sim.world.pin_watch import PinWatch
 
-_EDGES, _TRUE = 1 << 40, 1 << 41
+EDGES, _TRUE = 1 << 40, 1 << 41
 """Serial numbers of what is in no log: an edge adds the place of its pin, since at one tick there is one of each."""
 Entry = tuple[tuple[int, int, int, int], Event]
 """An event and what it is sorted by: (tick, network, slot, serial number in its log)."""
-_PLACE = {name: place for place, name in enumerate(PLACES)}
-_BY_TICK = itemgetter(0)
 
 
 class Watch:
@@ -76,6 +68,12 @@ class Watch:
         for robot_id, condition in self.conditions:
             if isinstance(condition, Edge):
                 pins.setdefault(robot_id, set()).add(condition.pin)
+        if not pins:
+            return
+        from miro_sim.world.pin_watch import (
+            PinWatch,  # with it the robot's board, which another one does not need
+        )
+
         self.pins = [
             PinWatch(robot_id, self.world.device(*robot_id).board, pins[robot_id]) for robot_id in pins
         ]
@@ -130,45 +128,3 @@ class Watch:
         image = self.world.image
         assert image is not None  # a machine with an inside
         return msgspec.structs.replace(condition, symbol=None, address=image.code_address(condition.symbol))
-
-
-class PinWatch:
-    """Edges of some `pins` of a robot with exact ticks, from now until `close`. It costs the CPU its fast loop."""
-
-    def __init__(self, robot_id: tuple[int, int], board: ProcessorBoard, pins: set[str]) -> None:
-        self.robot_id = robot_id
-        self.board = board
-        self.pins = sorted(pins)
-        self.tap = CpuTap(board if isinstance(board, Board) else None, lambda: None)
-        attach(board.cpu, self.tap)
-        self._levels = list(self.tap.start)
-        self._shown = {pin: self._level(pin) for pin in self.pins}
-
-    def close(self) -> None:
-        detach(self.board.cpu, self.tap)
-        self.tap.detach()
-
-    def take(self, known_tick: int) -> list[Entry]:
-        """The edges up to `known_tick` that were not taken yet."""
-        found: list[Entry] = []
-        network, slot = self.robot_id
-        events = self.tap.events
-        events.sort(key=_BY_TICK)
-        done = bisect_right(events, known_tick, key=_BY_TICK)
-        for tick, changes in groupby(events[:done], key=_BY_TICK):
-            for _, place, level in changes:
-                self._levels[place] = level
-            for number, pin in enumerate(self.pins):
-                level = self._level(pin)
-                if level != self._shown[pin]:
-                    self._shown[pin] = level
-                    edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
-                    found.append(((tick, network, slot, _EDGES + number), edge))
-        del events[:done]
-        return found
-
-    def _level(self, pin: str) -> int:
-        if pin not in PORT_PINS:
-            return self._levels[_PLACE[pin]]
-        port, bit = PORT_PINS[pin]
-        return port_pins(self._levels, port) >> bit & 1

@@ -80,6 +80,10 @@ class Wire(Medium):
         board: EmptyBoard = self.devices[0].board
         return board
 
+    def begin_period(self, tick: int) -> None:
+        Medium.begin_period(self, tick)
+        self.board.begin_period()
+
     def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
         """See `World.inject`."""
         if self.terminal is not None:

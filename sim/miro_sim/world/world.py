@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
@@ -28,19 +28,21 @@ from miro_robot.image import Image
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.radio.params import LinkState
 from miro_sim.scenario.board import MOST_PERIODS, BoardScenario
-from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.actions import SETTLE_TICKS
-from miro_sim.world.bodies import Bodies, Pair
 from miro_sim.world.conditions import Condition
 from miro_sim.world.device import Device
 from miro_sim.world.events import Event
 from miro_sim.world.machine import Feature
 from miro_sim.world.medium import Medium
-from miro_sim.world.network import Network, networks_of
-from miro_sim.world.robot import Robot
 from miro_sim.world.saved import Identity, opened, sealed
 from miro_sim.world.waits import Waits
 from miro_sim.world.wire import Wire
+
+if TYPE_CHECKING:  # a board alone needs none of these, which take longer to import than all the rest
+    from miro_sim.scenario.keys import Scenario
+    from miro_sim.world.bodies import Bodies, Pair
+    from miro_sim.world.network import Network
+    from miro_sim.world.robot import Robot
 
 
 class Mark(NamedTuple):
@@ -92,17 +94,21 @@ class World:
         self.periods = scenario.periods
         self.clock = scenario.clock
         _check_senders(script or (), 1 if isinstance(scenario, BoardScenario) else len(scenario.networks))
+        self.bodies: Bodies | None = None
         if isinstance(scenario, BoardScenario):
             self.lines: list[Medium] = [Wire(scenario, 0, image, script)]
         else:
+            from miro_sim.world.bodies import Bodies
+            from miro_sim.world.network import networks_of
+
             self.lines = [*networks_of(scenario, seed, image, script)]
+            self.bodies = Bodies(self.robots)
         self.tick = 0
         self.index = 0
         self.in_period = False
         self.stopped = False
         self.chain = b""
         self.last: Period | None = None
-        self.bodies = Bodies(self.robots)
         self.waits = Waits(self)
         self.observers: list[Callable[[Period], object]] = []
         self._state: Flat | None = None
@@ -130,6 +136,8 @@ class World:
     @property
     def networks(self) -> list[Network]:
         """The lines that are radio networks."""
+        from miro_sim.world.network import Network
+
         return [line for line in self.lines if isinstance(line, Network)]
 
     @property
@@ -140,6 +148,8 @@ class World:
     @property
     def robots(self) -> list[Robot]:
         """The devices that are robots."""
+        from miro_sim.world.robot import Robot
+
         return [device for device in self.devices if isinstance(device, Robot)]
 
     @property
@@ -217,6 +227,8 @@ class World:
 
     def robot(self, network: int = 0, slot: int = 0) -> Robot:
         """The robot in `slot` of `network`. Raises ValueError where there is none."""
+        from miro_sim.world.robot import Robot
+
         device = self.device(network, slot)
         if not isinstance(device, Robot):
             raise ValueError(f"net{network} is a wire with a board, and no robot")
@@ -296,15 +308,16 @@ class World:
             line.send_due(tick)
         for line in self.lines:
             line.settle(tick)
-        if self.bodies.pairs:
-            self.bodies.begin(self.tick, tick)
+        bodies = self.bodies
+        if bodies is not None and bodies.pairs:
+            bodies.begin(self.tick, tick)
         self.tick = tick
         for line in self.lines:
             self.stopped = line.run(tick) or self.stopped
         for line in self.lines:
             line.hear(tick)
-        if self.bodies.pairs:
-            for touch_tick, one, other in self.bodies.look():
+        if bodies is not None and bodies.pairs:
+            for touch_tick, one, other in bodies.look():
                 there = (other.network, other.slot)
                 touch = Event(tick=touch_tick, what="touch", network=one.network, value=one.slot, other=there)
                 self.lines[one.network].log.note(touch)
@@ -331,14 +344,15 @@ class World:
     def mark(self) -> Mark:
         """Where the world is, to go back to within the same period."""
         records = [line.records() for line in self.lines]
-        return Mark(self.state.save(), records, self.bodies.touching)
+        return Mark(self.state.save(), records, [] if self.bodies is None else self.bodies.touching)
 
     def go_back(self, mark: Mark) -> None:
         """To where `mark` was given."""
         self.state.load(mark.state)
         for line, records in zip(self.lines, mark.records, strict=True):
             line.put_back(records)
-        self.bodies.start_again(mark.touching)
+        if self.bodies is not None:
+            self.bodies.start_again(mark.touching)
 
     def counters(self) -> dict[str, dict[str, int | None]]:
         """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
@@ -387,7 +401,8 @@ class World:
     def go_on_from(self, flat: bytes) -> None:
         """The same from what `state.save` gave of this world, which has no seal to be checked."""
         self.state.load(flat)
-        self.bodies.start_at(self.tick)
+        if self.bodies is not None:
+            self.bodies.start_at(self.tick)
         self.waits.forget()
 
     def after_load(self) -> None:
@@ -405,6 +420,8 @@ class World:
     def identity(self) -> Identity:
         """What a saved world must belong to so that this one can load it."""
         if self._own is None:
+            from miro_sim.scenario.keys import without_expectations
+
             bare = without_expectations(self.scenario)
             scenario = hashlib.sha256(msgspec.json.encode(bare, order="sorted")).hexdigest()
             firmware = self.image.sha256 or hashlib.sha256(self.image.code).hexdigest()  # "": not from a file

@@ -235,3 +235,28 @@ def test_however_it_is_cut_saved_and_waited_on_the_bits_are_the_same(data, cuts,
     cut.run_to(max(end_tick, cut.tick))
     if cut.tick == whole.tick:
         assert (cut.digest, bits(cut)) == (whole.digest, bits(whole))
+
+
+def test_a_digest_holds_the_ram_that_was_written_since_the_last_one():
+    text = (
+        "l:\nMOV DPTR,#1234h\nMOVX A,@DPTR\nINC A\nMOVX @DPTR,A\nMOV DPTR,#2000h\nMOVX @DPTR,A\nend:\nSJMP $"
+    )
+    one, other = board_world(text), board_world(text)
+    one.run_to(24_000)
+    other.run_to(24_000)
+    pages = board_of(other).pages
+    other.state.load(bits(other).replace(pages, pages[:-1] + b"\x77"))
+    assert board_of(other).xram()[0x20FF] == 0x77
+    one.step()
+    other.step()
+    assert one.digest != other.digest
+
+
+def test_input_that_waits_is_saved_and_no_part_of_the_digest():
+    worlds = [board_world(ECHO, terminal=TerminalSpec(live=True)) for _ in range(2)]
+    worlds[0].run_to(CONTROL_PERIOD_TICKS - 24)
+    worlds[0].lines[0].terminal.input.add(b"x")
+    for world in worlds:
+        world.run_to(CONTROL_PERIOD_TICKS)
+    assert worlds[0].digest == worlds[1].digest
+    assert bits(worlds[0]) != bits(worlds[1])

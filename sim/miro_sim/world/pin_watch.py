@@ -1,0 +1,60 @@
+"""Edges of the pins of one board, with exact ticks, for a wait."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from itertools import groupby
+from operator import itemgetter
+
+from miro_robot.board import Board
+from miro_robot.inspect.tap import PLACES, CpuTap, port_pins
+from miro_robot.inspect.watcher import attach, detach
+from miro_robot.processor_board import ProcessorBoard
+from miro_sim.world.conditions import PORT_PINS
+from miro_sim.world.events import Event
+from miro_sim.world.watch import EDGES, Entry
+
+_PLACE = {name: place for place, name in enumerate(PLACES)}
+_BY_TICK = itemgetter(0)
+
+
+class PinWatch:
+    """Edges of some `pins` of a robot with exact ticks, from now until `close`. It costs the CPU its fast loop."""
+
+    def __init__(self, robot_id: tuple[int, int], board: ProcessorBoard, pins: set[str]) -> None:
+        self.robot_id = robot_id
+        self.board = board
+        self.pins = sorted(pins)
+        self.tap = CpuTap(board if isinstance(board, Board) else None, lambda: None)
+        attach(board.cpu, self.tap)
+        self._levels = list(self.tap.start)
+        self._shown = {pin: self._level(pin) for pin in self.pins}
+
+    def close(self) -> None:
+        detach(self.board.cpu, self.tap)
+        self.tap.detach()
+
+    def take(self, known_tick: int) -> list[Entry]:
+        """The edges up to `known_tick` that were not taken yet."""
+        found: list[Entry] = []
+        network, slot = self.robot_id
+        events = self.tap.events
+        events.sort(key=_BY_TICK)
+        done = bisect_right(events, known_tick, key=_BY_TICK)
+        for tick, changes in groupby(events[:done], key=_BY_TICK):
+            for _, place, level in changes:
+                self._levels[place] = level
+            for number, pin in enumerate(self.pins):
+                level = self._level(pin)
+                if level != self._shown[pin]:
+                    self._shown[pin] = level
+                    edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
+                    found.append(((tick, network, slot, EDGES + number), edge))
+        del events[:done]
+        return found
+
+    def _level(self, pin: str) -> int:
+        if pin not in PORT_PINS:
+            return self._levels[_PLACE[pin]]
+        port, bit = PORT_PINS[pin]
+        return port_pins(self._levels, port) >> bit & 1
