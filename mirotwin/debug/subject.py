@@ -11,16 +11,11 @@ import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
-from miro_robot.board_spec import BoardSpec
-from miro_sim.scenario.board import BoardScenario
-from miro_sim.world.world import World
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.subject import SubjectOptions, open_run
-from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
 from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.runs.job import Job
 from mirotwin.runs.result import Result
@@ -31,9 +26,8 @@ from mirotwin.shell.options import AT, RESUME
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
 from mirotwin.verify.cases.artifacts import CASES
-from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.expectations import CHECK
+from mirotwin.verify.expectations import EXPECT, as_settings
 
 
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
@@ -42,9 +36,10 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     resume: Annotated[str | None, RESUME.saying("Scenario: begin with a saved world of it.")] = None
-    check: Annotated[
-        str | None, CHECK.saying("Case of a bare processor: FILE.py:FUNCTION, where its check is in a file.")
-    ] = None
+    expected: Annotated[
+        tuple[str, ...],
+        EXPECT.saying("Case: a check that judges it, such as FILE.py:CLASS, where that is in a file."),
+    ] = ()
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
 
@@ -54,7 +49,7 @@ def launched(given: Mapping[str, Any]) -> DebugSubject:
 
     `linesFrom` is `--lines-from` there.
     """
-    fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "check")]
+    fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "expected")]
     options = ["set" if name == "settings" else name.replace("_", "-") for name in fields]
     keys = {re.sub("-(.)", lambda found: found[1].upper(), option): option for option in options}
     words: list[str] = []
@@ -80,7 +75,8 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     if os.path.isdir(subject):
         subject = file_in(subject, (*RECORDINGS, *CASES))
         options = msgspec.structs.replace(options, subject=subject)
-    run, verdict = _opened(options)
+    settings = (*options.settings, *as_settings(options.expected))
+    run, verdict = open_run(msgspec.structs.replace(options, settings=settings)), None
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
@@ -93,8 +89,8 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     elif files and not any(map(symbols.sources.path, files)):
         said.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
-        if run.job is not None and run.job.case.verdict:
-            verdict = _judged(timeline, run.world, run.job)
+        if run.job is not None and (run.job.case.verdict or run.job.alone):
+            verdict = _judged(timeline, run, run.job)
         if verdict is not None:
             why = "case"
             said += verdict.texts
@@ -105,29 +101,18 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     return debugger, said, why
 
 
-def _opened(options: DebugSubject) -> tuple[InspectedRun, Result | None]:
-    """The run, and the verdict on a case of a bare processor."""
-    path = options.subject
-    if is_bare_case(path):
-        image = load_case_firmware(path, options.firmware)
-        again, verdict = rerun_bare_case(path, image, options.check)
-        end_tick = again.end_tick if again.failure is None else max(again.end_tick, again.failure.tick)
-        board = BoardSpec(crystal_hz=again.line.crystal_hz, bound_stack=False)
-        scenario = BoardScenario(board=board, bit_ticks=again.line.bit_ticks)
-        return InspectedRun(World(scenario, 0, image, again.script), end_tick=end_tick), verdict
-    if options.check is not None:
-        raise BadInput(path, "--check", "is for a case of a bare processor", "leave it out")
-    return open_run(options), None
-
-
-def _judged(timeline: Timeline, world: World, job: Job) -> Result:
+def _judged(timeline: Timeline, run: InspectedRun, job: Job) -> Result:
     """What the check of a case says this time."""
+    if job.alone:  # its checks look at moments of their own, at which the timeline does not stop
+        result = job.judge_case()
+        ends = (run.end_tick or 0, *(failure.tick for failure in result.failures))
+        run.end_tick = max(ends)
+        return result
     job.check_case()
-    run = Run(job.spec, world)
-    end_tick = job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS
-    timeline.go_to(end_tick, timeline.interrupted)
-    run.finish()
-    return job.result_of_case(run)
+    again = Run(job.spec, run.world)
+    timeline.go_to(job.case.end_tick or run.world.scenario.end_tick, timeline.interrupted)
+    again.finish()
+    return job.result_of_case(again)
 
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:

@@ -330,8 +330,6 @@ class Moment:
         cpu = self.core.cpu
         if space == "sfr" and address < 0x80:
             raise NoValue(f"{address:#04x} is no special function register", "they begin at sfr[0x80]")
-        if space == "xram" and self.core.board is None:
-            return bytes(cpu.bus.movx_read((address + at) & 0xFFFF, 0) for at in range(count))
         return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
 
 

@@ -124,8 +124,8 @@ def look(
         raise BadInput(
             options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
-    if run.board is not None:
-        return report_lines(fault_lines(run.world.robots))
+    if run.job is not None or run.board is not None:
+        return report_lines(fault_lines(run.world.devices))
     return report(run.world, options.bare)
 
 
@@ -167,12 +167,12 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
 
 
 def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
-    """(network, place among its robots) of the robot that was asked for. Raises BadInput."""
+    """(network, place among its devices) of the one that was asked for. Raises BadInput."""
     network = options.network or 0
-    if network >= len(world.networks):
-        remedy = use_one_of(map(str, range(len(world.networks))))
+    if network >= len(world.lines):
+        remedy = use_one_of(map(str, range(len(world.lines))))
         raise BadInput(options.subject, f"--network {network}", "there is no such network", remedy)
-    slots = [robot.spec.slot for robot in world.networks[network].robots]
+    slots = [device.slot for device in world.lines[network].devices]
     if options.slot is None:
         return network, 0
     if options.slot not in slots:

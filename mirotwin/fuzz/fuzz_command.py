@@ -6,7 +6,7 @@ This is one of the few places that know the wall clock.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
@@ -48,9 +48,8 @@ from mirotwin.shell.program import Terminated, complain, show_line
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType, wall_time
 from mirotwin.shell.verdicts import VERDICTS
-from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.expectations import CHECK, EXPECT, as_settings
+from mirotwin.verify.expectations import EXPECT, as_settings, in_files, table_alone
 
 if TYPE_CHECKING:
     from rich.progress import ProgressColumn
@@ -97,7 +96,6 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
         tuple[str, ...],
         EXPECT.saying(
             "A check that judges each input that found something new, as for `run`; may be repeated.",
-            apart="bare",
         ),
     ] = ()
     covering: Annotated[
@@ -152,17 +150,9 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             needs="bare",
         ),
     ] = None
-    check: Annotated[
-        str | None,
-        CHECK.saying(
-            "A check in Python that judges each input that found something new: by its name, or FILE.py:FUNCTION.",
-            heading=BARE,
-            needs="bare",
-        ),
-    ] = None
-    check_all: Annotated[
+    expect_all: Annotated[
         bool,
-        Option(help="--check judges each input, not only those that are new.", heading=BARE, needs="check"),
+        Option(help="--expect judges each input, not only those that are new.", heading=BARE, needs="bare"),
     ] = False
 
 
@@ -188,6 +178,8 @@ def fuzz(options: FuzzOptions) -> int:
     """
     if options.bare and options.image is None:
         raise click.UsageError("--bare needs an IMAGE.ihx.")
+    if options.expect_all and not options.expected:
+        raise click.UsageError("--expect-all needs --expect.")
     firmware = load_firmware(options.image, SPACE_BYTES if options.bare else FLASH_BYTES)
     robots = int(options.robots)
     if options.slot >= robots:
@@ -201,7 +193,7 @@ def fuzz(options: FuzzOptions) -> int:
         robots=robots,
         slot=options.slot,
         protocol=options.protocol or "",
-        check=(options.check or "") if options.check_all else "",
+        expected=options.expected if options.expect_all else (),
         baud=options.baud or 0,
         after_ticks=None
         if options.after is None
@@ -209,20 +201,16 @@ def fuzz(options: FuzzOptions) -> int:
         parameters={name: value for name, value in parameters.items() if value is not None},
         engine=cast(Literal["compiled", "python"], engines.active()),
     )
-    check = None if options.check is None else check_named(options.check)
-    expected = _expected(options.expected) if check is None else {check.name: True}
-    return _campaign(spec, firmware, options, check, expected)
+    return _campaign(spec, firmware, options, _expected(options))
 
 
-def _campaign(
-    spec: TargetSpec, image: Image, options: FuzzOptions, check: NamedCheck | None, expected: dict[str, Any]
-) -> int:
+def _campaign(spec: TargetSpec, image: Image, options: FuzzOptions, expected: dict[str, Any]) -> int:
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
     check_outside(folder.path, options.corpus)
     covering = _covering(options.covering, image)
     target = make_target(spec)
-    oracle = oracle_of(target, check)
+    oracle = oracle_of(target, expected)
     inputs = dict.fromkeys(filter(None, target.seeds()))
     if options.corpus is not None:
         found, notes = read_corpus(options.corpus, spec.input, spec.robots)
@@ -241,8 +229,7 @@ def _campaign(
         tell = (lambda crash: None) if options.quiet else _tell
         campaign = Campaign(engine, triage, expected, covering, tell)
         campaign.begin_with(failing, (*passing, *silent))
-        check_in_file = check.text if check is not None and check.from_file else None
-        return _run(campaign, options.time_s if passing else 0.0, options.quiet, check_in_file)
+        return _run(campaign, options.time_s if passing else 0.0, options.quiet, in_files(options.expected))
 
 
 def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, options: FuzzOptions) -> Engine:
@@ -269,7 +256,7 @@ def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], l
     return failing, passing, silent
 
 
-def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | None) -> int:
+def _run(campaign: Campaign, time_s: float, quiet: bool, in_files: Mapping[str, str]) -> int:
     """The campaign to its end, whatever ends it; the exit code."""
     stopped: BaseException | None = None
     left = 0
@@ -291,7 +278,7 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, check_in_file: str | No
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
-    code = _report(Results(campaign, left, stopped is None, check_in_file), quiet)
+    code = _report(Results(campaign, left, stopped is None, in_files), quiet)
     if stopped is not None:
         raise stopped
     return code
@@ -364,11 +351,12 @@ def _tell(crash: Crash) -> None:
     complain(f"{kind}: {crash.name}: {crash.verdict}")
 
 
-def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
+def _expected(options: FuzzOptions) -> dict[str, Any]:
     """The checks of --expect as a table. Raises BadInput for one that there is not, or with wrong parameters."""
-    if not checks:
-        return {}
-    return dict(changed(silent_scenario(()), "fuzz", as_settings(checks), expectations_of).expect)
+    if options.bare:
+        return table_alone(options.expected, "fuzz")
+    settings = as_settings(options.expected)
+    return dict(changed(silent_scenario(()), "fuzz", settings, expectations_of).expect) if settings else {}
 
 
 def _covering(symbol: str | None, image: Image) -> Covering | None:

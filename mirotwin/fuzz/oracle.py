@@ -1,6 +1,6 @@
 """Who has the last word on an input: it is played once more from power-on, without the machinery that found it.
 
-input ──► Target.script ──► a World: ideal radio, carrier on, the robot of the target alone; or a bare processor
+input ──► Target.script ──► a World: ideal radio, carrier on, the robot of the target alone; or a board alone
                                   │ checks: the one that the crash names, and those that are always on
                                   ▼
                          failed: a case            passed: kept apart, as not confirmed
@@ -17,11 +17,10 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.robot_rules import TOLERANCE_TICKS
 from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
-from mirotwin.fuzz.bare import BareTarget
-from mirotwin.fuzz.target import RobotTarget, Target, TargetFailure
-from mirotwin.runs.bare_case import BareRerun, after_ticks, rerun_bare
+from mirotwin.fuzz.board_target import NO_FAULT, BoardTarget
+from mirotwin.fuzz.target import NEVER_SLEEPS, RobotTarget, Target, TargetFailure
+from mirotwin.runs.board_case import after_ticks, board_spec
 from mirotwin.runs.run import Run, robot_spec
-from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
 from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, struct_of
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
@@ -31,8 +30,6 @@ SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 Expected = Mapping[str, Any]
 """Checks by name with their parameters, as the table `[expect]` of a scenario."""
-OracleVerdict = Run | BareRerun
-"""What an input did that was played again."""
 
 
 class RobotOracle:
@@ -61,34 +58,39 @@ class RobotOracle:
         return Run.traced(spec).play()
 
 
-class BareProcessorOracle:
-    """Judges by a bare processor; `check` judges where it is asked to. Raises BadInput where the check fails itself."""
+class BoardOracle:
+    """Judges by a World with the board of `target` alone. `expected`: the checks of the campaign."""
 
-    def __init__(self, target: BareTarget, check: NamedCheck | None = None) -> None:
+    def __init__(self, target: BoardTarget, expected: Expected) -> None:
         self.target = target
-        self.check = check
+        self.expected = expected
 
-    def confirm(self, data: bytes, failure: TargetFailure) -> BareRerun:
+    def confirm(self, data: bytes, failure: TargetFailure) -> Run:
+        """Judges an input in which the target failed so."""
         # a build that is slower, and no better, comes to its fault later
-        later = after_ticks(self.target.line) if failure.check == NO_FAULT else 0
-        return self._rerun(data, failure.check, failure.tick + later)
+        later = after_ticks(self.target.scenario) if failure.check == NO_FAULT else 0
+        expected = {failure.check: self.expected.get(failure.check, True)}
+        return self.rerun(data, expected, failure.tick + later)
 
-    def judged(self, data: bytes, expected: Expected) -> BareRerun:
+    def judged(self, data: bytes, expected: Expected) -> Run:
+        """Judges an input by these checks, and by no_fault. Raises PluginError where one raises."""
         self.target.run(data)
-        return self._rerun(data, next(iter(expected), NO_FAULT), self.target.end_tick())
+        return self.rerun(data, expected, self.target.end_tick())
 
-    def _rerun(self, data: bytes, name: str, until_tick: int) -> BareRerun:
+    def rerun(self, data: bytes, expected: Expected, until_tick: int) -> Run:
+        """An input from power-on to `until_tick`."""
         target = self.target
-        return rerun_bare(target.image, target.line, target.script(data), until_tick, name, self.check)
+        spec = board_spec(target.image, target.scenario, target.script(data), expected, until_tick)
+        return Run.traced(spec).play()
 
 
-Oracle = RobotOracle | BareProcessorOracle
+Oracle = RobotOracle | BoardOracle
 
 
-def oracle_of(target: Target, check: NamedCheck | None = None) -> Oracle:
-    """The oracle for a target of the product's own. `check`: as of --check, for a bare processor."""
-    if isinstance(target, BareTarget):
-        return BareProcessorOracle(target, check)
+def oracle_of(target: Target, expected: Expected) -> Oracle:
+    """The oracle for a target of the product's own, in a campaign with these checks."""
+    if isinstance(target, BoardTarget):
+        return BoardOracle(target, expected)
     assert isinstance(target, RobotTarget)
     return RobotOracle(target)
 

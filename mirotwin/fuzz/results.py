@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import msgspec
@@ -25,14 +25,14 @@ SUMMARY = "summary.json"
 class Results:
     """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
 
-    `check`: FILE.py:FUNCTION of --check.
+    `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS.
     """
 
-    def __init__(self, campaign: Campaign, left: int, complete: bool, check: str | None) -> None:
+    def __init__(self, campaign: Campaign, left: int, complete: bool, in_files: Mapping[str, str]) -> None:
         self.campaign = campaign
         self.left = left
         self.complete = complete
-        self.check = check
+        self.in_files = in_files
         self.triage = campaign.triage
         self.out = campaign.triage.folder.path
         self.progress = campaign.progress()
@@ -113,12 +113,11 @@ class Results:
         again = f"; {amount(more, 'more input')}" if more else ""
         before, after = crash.sizes
         yield f"  {crash.name}{where}: {crash.verdict} ({amount(after, 'byte')}, found with {before}{again})"
-        check = self.check
-        in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
+        expected = (self.in_files[crash.check],) if crash.check in self.in_files else ()
         stream = self.out / crash.folder / f"{crash.name}.stream"
         image = foreign_path(self.triage.target.image)
-        yield f"    {replay_line(stream, image, in_file)}"
-        yield f"    {debug_line(stream, image, check=in_file)}"
+        yield f"    {replay_line(stream, image, expected)}"
+        yield f"    {debug_line(stream, image, expected=expected)}"
 
     def _summary(self) -> dict[str, Any]:
         campaign, progress, tracefile = self.campaign, self.progress, self.coverage.tracefile

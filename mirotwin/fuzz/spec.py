@@ -24,10 +24,10 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
 
     `board`: "miro" is the robot's, "bare" a CPU with a UART. `image`: path of an Intel HEX file, "" is the robot's own
     firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session"). `robots` and `slot` are the
-    MIRO's. `protocol`: name of the wire format of frames, "" for the board's own; `check`: name of the check that
-    judges in each execution, "" for the board's own; `baud`: rate of the bare CPU's UART, 0 for what its maker takes;
-    `after_ticks`: how long a run goes on after its last character, None for the harness's own. `parameters`: what else
-    a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
+    MIRO's. `protocol`: name of the wire format of frames, "" for the board's own; `expected`: checks as --expect takes
+    them, which judge each execution beside the board's own; `baud`: rate of the bare CPU's UART, 0 for what its maker
+    takes; `after_ticks`: how long a run goes on after its last character, None for the harness's own. `parameters`: all
+    else that a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
     `maker`: "module:function" in the place of the board's own maker.
     """
 
@@ -37,7 +37,7 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     robots: Whole = 3
     slot: Whole = 0
     protocol: str = ""
-    check: str = ""
+    expected: tuple[str, ...] = ()
     baud: Whole = 0
     after_ticks: Whole | None = None
     parameters: dict[str, Any] = {}

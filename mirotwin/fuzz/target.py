@@ -23,8 +23,9 @@ from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.inputs import seeds
 from mirotwin.fuzz.spec import MAP_SIZE, TargetSpec
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, load_firmware, not_up
-from mirotwin.verify.bare.exchange import NEVER_SLEEPS
 
+NEVER_SLEEPS = "never_sleeps"
+"""That the firmware did not go back to sleep. On the robot's board what follows from it is judged."""
 NEVER_SLEEPS_CODE = len(NAMES)
 
 

@@ -24,8 +24,9 @@ from mirotwin.firmware.coverage_files import Report, collect, write
 from mirotwin.fuzz.cause import Cause
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
+from mirotwin.fuzz.oracle import Expected, Oracle
 from mirotwin.fuzz.target import TargetFailure
+from mirotwin.runs.run import Run
 from mirotwin.verify.checks.interface import Failure
 
 MINIMISE_S = 10.0
@@ -117,7 +118,7 @@ class Triage:
             found = self._failure(one)
             return found is not None and (found.check, found.pc or None) == group
 
-        def judged(one: bytes) -> tuple[OracleVerdict, str]:
+        def judged(one: bytes) -> tuple[Run, str]:
             again = self._failure(one) or failure
             return self.oracle.confirm(one, again), again.what
 
@@ -126,7 +127,7 @@ class Triage:
     def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Crash | None:
         """An input in whose World one of the checks in `expected` failed; the crash, if it is a new one."""
 
-        def judged(one: bytes) -> tuple[OracleVerdict, str]:
+        def judged(one: bytes) -> tuple[Run, str]:
             return self.oracle.judged(one, expected), ""
 
         def fails(one: bytes) -> bool:
@@ -141,7 +142,7 @@ class Triage:
         group: tuple[str, int | None],
         tries: int,
         fails: Callable[[bytes], bool],
-        judged: Callable[[bytes], tuple[OracleVerdict, str]],
+        judged: Callable[[bytes], tuple[Run, str]],
     ) -> Crash | None:
         """`fails`: whether an input is still of the group; `judged`: the verdict on one, and what the target says."""
         if self._in_vain[group] >= SAME_TRIED:
@@ -179,9 +180,7 @@ class Triage:
         self._in_vain[group] += 1
         self._last[group] = known
 
-    def _key(
-        self, group: tuple[str, int | None], data: bytes, verdict: OracleVerdict | None, what: str
-    ) -> CrashKey:
+    def _key(self, group: tuple[str, int | None], data: bytes, verdict: Run | None, what: str) -> CrashKey:
         """By what an input is told apart. A fault needs no verdict for that."""
         check, pc = group
         if pc is not None:
@@ -192,9 +191,7 @@ class Triage:
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None
 
-    def _keep(
-        self, key: CrashKey, data: bytes, what: str, verdict: OracleVerdict, sizes: tuple[int, int]
-    ) -> Crash:
+    def _keep(self, key: CrashKey, data: bytes, what: str, verdict: Run, sizes: tuple[int, int]) -> Crash:
         failure, cause = verdict.failure, key.cause
         crash = Crash(
             name=key.name,

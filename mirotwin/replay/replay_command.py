@@ -31,10 +31,9 @@ from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.cases.artifacts import CASES
-from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_path
 from mirotwin.verify.checks.expect import says_anything
-from mirotwin.verify.expectations import as_settings
+from mirotwin.verify.expectations import as_settings, in_files
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
 _OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
@@ -94,7 +93,7 @@ def replay(options: ReplayOptions) -> int:
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault. 0: fixed by your change of firmware or settings. 4: it no longer fails, unchanged.
-    A case of `mirotwin fuzz --bare` needs --firmware, and --check FILE.py:FUNCTION if its check is in a file.
+    A case of `mirotwin fuzz --bare` needs --firmware, and --expect FILE.py:CLASS if its check is in a file.
 
     Where --expect is given, that decides: a difference is only reported, and the exit code is 1 if a check fails, else
     0.
@@ -109,8 +108,6 @@ def replay(options: ReplayOptions) -> int:
     if not options.desk.port and (given := options.given("out", "force")):
         raise click.UsageError(f"{given[0]} needs --port.")
     file = file_in(options.file, (*RECORDINGS, *CASES))
-    if is_bare_case(file):
-        return _replay_bare_case(file, options)
     job, images = _loaded(file, options)
     if options.desk.port:
         job = _sent_to_port(job, options)
@@ -119,18 +116,9 @@ def replay(options: ReplayOptions) -> int:
     if options.compare.kind == "answers":
         what = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
-    if job.case.verdict:
+    if job.case.verdict or job.alone:
         return _replay_case(job, options)
     return _compare_with_recorded(job, images, options)
-
-
-def _replay_bare_case(file: str, options: ReplayOptions) -> int:
-    from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case  # loads the bare processor
-
-    refuse_given(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD, "port"))
-    image = load_case_firmware(file, options.firmware)
-    verdict = rerun_bare_case(file, image, options.check)[1]
-    return _report_case(verdict, debug_line(file, options.firmware, check=options.check), options.quiet)
 
 
 def _replay_case(job: Job, options: ReplayOptions) -> int:
@@ -140,7 +128,9 @@ def _replay_case(job: Job, options: ReplayOptions) -> int:
     )
     with ProgressBar("replaying", job.end_tick, options.quiet) as bar:
         result = job.judge_case(bar.to)
-    return _report_case(result, debug_line(job.spec.origin, foreign_path(job.spec.image)), options.quiet)
+    own_files = tuple(in_files(options.expected).values())
+    line = debug_line(job.spec.origin, foreign_path(job.spec.image), expected=own_files)
+    return _report_case(result, line, options.quiet)
 
 
 def _report_case(result: Result, line: str, quiet: bool) -> int:
@@ -154,12 +144,13 @@ def _report_case(result: Result, line: str, quiet: bool) -> int:
 
 def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     """What is replayed, and the images of --lines-from. Raises BadInput for options that mean nothing there."""
-    refuse_given(file, "is for a case of a bare processor", options.given("check"))
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     keys = (*options.settings, *as_settings(options.expected))
     job = load_job(file, options.firmware, keys, options.seed, options.stack_from)
     complain(*job.notes)
+    if job.alone and options.desk.port:
+        raise BadInput(file, "--port", "is not for a case of a bare processor", "leave it out")
     if not job.recorded and not options.desk.port:
         refuse_given(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
@@ -194,7 +185,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
     complain(*result.texts)
-    if options.shows and says_anything(job.spec.scenario):
+    if options.shows and says_anything(job.spec.robot_scenario):
         show(expectations_text(result.expectations))
     complain(*difference_lines(found, "the replay differs"), *found.notes)
     if found.differences and options.shows:

@@ -120,7 +120,7 @@ def frame_tables(
     job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None
 ) -> Iterator[Table | str]:
     """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
-    robots = {index: network.robots for index, network in enumerate(job.spec.scenario.networks)}
+    robots = {index: network.robots for index, network in enumerate(job.spec.robot_scenario.networks)}
     found = sorted(
         rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
         key=lambda row: row.event.start_tick,

@@ -27,7 +27,6 @@ from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
-from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
 
 SUMMARIES = ("summary.json", "summary.part.json")
@@ -99,10 +98,8 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
     """
     window(wanted.from_time, wanted.to_time)
     file = _file_of(wanted.subject)
-    if is_bare_case(file):
-        what = "is a case of a bare processor, which has no robot to show"
-        raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
     job = load_job(file, wanted.firmware)
+    _ = job.spec.robot_scenario
     complain(*job.notes)
     if job.origin:
         return port_page(job, wanted.quiet)

@@ -93,9 +93,9 @@ def send(
     with (
         folder,
         folder.part(RECORDING).open("wb") as stream,
-        RobotPort(desk, spec.scenario, spec.origin, note) as port,
+        RobotPort(desk, spec.robot_scenario, spec.origin, note) as port,
     ):
-        port.record(stream, twin_source(spec.scenario, spec.seed, spec.image, firmware))
+        port.record(stream, twin_source(spec.robot_scenario, spec.seed, spec.image, firmware))
         port.greet(sent=sent)
         folder.keep = (RECORDING,)  # of a talk that was broken off
         shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS
@@ -119,7 +119,7 @@ def beside_twin(
 ) -> PortComparison:
     """Runs the twin with what was sent at the port; the recorded answers beside its own."""
     again = job.run(len(job.recorded) * CONTROL_PERIOD_TICKS, progress)
-    return compare(job.recorded, again.periods, job.spec.scenario.networks[0].robots, rule)
+    return compare(job.recorded, again.periods, job.spec.robot_scenario.networks[0].robots, rule)
 
 
 def play_at_port(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from msgspec.structs import replace
@@ -17,20 +19,22 @@ from miro_protocol import stream
 from miro_protocol.actions import Power, Reset, ScriptItem
 from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import Image, Symbol, Symbols, parse_hex
+from miro_robot.image import SPACE_BYTES, Image, Symbol, Symbols, parse_hex
 from miro_sim.periods import Period
 from miro_sim.radio.params import Radio
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
-from miro_sim.scenario.settings import in_text
+from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
 from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import SCENARIO_ATTACHMENT, RunSource
 from mirotwin.recording.writer import MAGIC
+from mirotwin.runs.board_case import board_of_stream, board_spec, check_board_script, end_of_board
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
@@ -101,9 +105,6 @@ def scenario_of_stream(sent: Sequence[ScriptItem], header: Header | None = None)
     Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
     day, or that have no place in the scenario of the header; ScenarioError for that scenario.
     """
-    if header is not None and header.bare is not None:
-        what = "is for a bare processor and not for the robot"
-        raise BadInput("", "header: bare", what, "`mirotwin replay FILE --firmware IMAGE.ihx` plays it")
     script = script_of_stream(sent)
     if header is None or header.scenario is None:
         if not script:
@@ -212,6 +213,11 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
             return self.case.end_tick or scenario.end_tick
         return min(self.recorded[-1].index + 1, scenario.periods) * CONTROL_PERIOD_TICKS
 
+    @property
+    def alone(self) -> bool:
+        """Whether it is of a board alone."""
+        return isinstance(self.spec.scenario, BoardScenario)
+
     def check_case(self) -> None:
         """Raises BadInput where the scenario does not expect the check that the case is about."""
         name = self.case.verdict.partition(":")[0]
@@ -270,7 +276,7 @@ def load_job(
         return _job_of_recording(recording, file, settings, runs_on, seed)
     given = _stream(data, file)
     header = given.header
-    image = load_firmware(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
+    image = _image_for(given, firmware or image_beside(file, header.firmware_sha256), stack_from)
     wanted, notes = header.firmware_sha256, []
     if wanted not in (None, image.sha256):
         what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
@@ -278,6 +284,16 @@ def load_job(
             raise BadInput(file, "header", what, "name the image with --firmware")
         notes = [f"{file}: {what}"]  # to run another one is what a replay is for
     return replace(_job_of_stream(given, file, settings, image, seed), notes=notes)
+
+
+def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from: int | None = None) -> Image:
+    """The image that a stream runs on: `firmware`, or the robot's own. Raises BadInput for a board that has none."""
+    if given.header.bare is None:
+        return load_firmware(firmware, stack_from=stack_from)
+    if firmware is None:
+        what = "is for a bare processor, which has no firmware of its own"
+        raise BadInput(given.source, "", what, "give --firmware IMAGE.ihx")
+    return load_firmware(firmware, SPACE_BYTES, stack_from=stack_from)
 
 
 def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
@@ -309,7 +325,8 @@ def recording_notes(recording: Recording, path: str) -> list[str]:
 def load_stream(file: str, firmware: str | None) -> Job:
     """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
-    return _job_of_stream(_stream(read_input(file), file), file, (), load_firmware(firmware), None)
+    given = _stream(read_input(file), file)
+    return _job_of_stream(given, file, (), _image_for(given, firmware), None)
 
 
 _PAIRS = re.compile(rb"^\s*[0-9a-fA-F]{2}", re.MULTILINE)
@@ -372,6 +389,8 @@ def _job_of_recording(
 def _job_of_stream(
     given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
+    if given.header.bare is not None:
+        return _job_of_board(given, path, settings, image, seed)
     header, sent = given.header, given.script()
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
     script, own = script_of_stream(sent), header.seed or 0
@@ -392,3 +411,27 @@ def _job_of_stream(
         origin=path,
     )
     return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))
+
+
+def _job_of_board(
+    given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
+) -> Job:
+    header, script = given.header, script_of_stream(given.script())
+    own: dict[str, Any] = {"expect": dict(header.expect or {})}
+    tables = copy.deepcopy(own)
+    made = make(tables, settings, path)
+    for one in made:
+        if not one.text.startswith(EXPECT):
+            raise BadInput(path, one.place, "is not for a case of a bare processor", "leave it out")
+    if seed is not None:
+        raise BadInput(path, "--seed", "is not for a case of a bare processor", "leave it out")
+    scenario = board_of_stream(given)
+    check_board_script(script, path, scenario)
+    end_tick = header.end_tick or end_of_board(script, scenario)
+    spec = board_spec(image, scenario, script, tables["expect"], end_tick, path)
+    try:
+        spec = replace(spec, expected=expectations_of(spec.scenario, path))
+    except ScenarioError as error:
+        raise blamed(error, made, tables) from None
+    other = header.firmware_sha256 not in (None, image.sha256) or tables != own
+    return Job(spec=spec, case=Case(header.verdict or "", end_tick, other))

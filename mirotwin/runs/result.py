@@ -8,6 +8,7 @@ import msgspec
 
 from miro_exact.bad_input import amount
 from miro_exact.clock import NEVER_TICK
+from miro_sim.world.device import Device
 from miro_sim.world.robot import Robot
 from mirotwin.shell.verdicts import VERDICTS, Verdict
 from mirotwin.verify.checks.expect import ALWAYS_ON
@@ -89,13 +90,14 @@ def expectation_lines(checks: Checks) -> Iterator[Line]:
             yield "failed", f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times"
 
 
-def fault_lines(robots: Sequence[Robot], to_tick: int = NEVER_TICK) -> Iterator[Line]:
-    """What the firmware did wrong up to `to_tick`, a line for each robot."""
-    for robot in robots:
-        faults = [fault for fault in robot.board.faults if fault.tick <= to_tick]
+def fault_lines(devices: Sequence[Device], to_tick: int = NEVER_TICK) -> Iterator[Line]:
+    """What the firmware did wrong up to `to_tick`, a line for each robot, or for a board alone."""
+    for device in devices:
+        faults = [fault for fault in device.board.faults if fault.tick <= to_tick]
         if faults:
             more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-            yield "fault", f"firmware fault: net{robot.network}/robot{robot.slot}: {faults[0]}{more}"
+            place = f"net{device.network}/robot{device.slot}: " if isinstance(device, Robot) else ""
+            yield "fault", f"firmware fault: {place}{faults[0]}{more}"
 
 
 def expectations_text(expectations: Sequence[Expectation]) -> str:

@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_protocol.actions import ScriptItem
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
+from miro_sim.scenario.board import BoardScenario
 from mirotwin.runs import runner
 from mirotwin.runs.result import Result, expectation_lines, fault_lines
 from mirotwin.runs.spec import RunSpec, silent_scenario
@@ -30,6 +32,7 @@ from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.checks.sleep import Sleep
 from mirotwin.verify.steps.keys import ConditionStep, WaitStep
 from mirotwin.verify.steps.player import Player, player_of
 
@@ -38,6 +41,10 @@ if TYPE_CHECKING:
     from mirotwin.recording.recorder import Recorder, RunSource
     from mirotwin.recording.track import Tracks
     from mirotwin.shell.held_signals import Hold
+
+
+ANSWER_LOOK_TICKS = 24_000
+"""Between two looks at whether a board has sent its answer."""
 
 
 class Run:
@@ -111,13 +118,27 @@ class Run:
         Raises TransmissionError for a script that cannot be sent.
         """
         world, until_tick = self.world, self.spec.until_tick
-        end_tick = world.periods * CONTROL_PERIOD_TICKS if until_tick is None else until_tick
         world.observers.append(self.periods.append)
-        while not world.stopped and world.tick < end_tick:
-            world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
-            progress(world.tick)
+        self._go_to(world.scenario.end_tick if until_tick is None else until_tick, progress)
+        if self.checks.sleep is not None:
+            self._let_answer(self.checks.sleep, progress)
         self.finish()
         return self
+
+    def _go_to(self, end_tick: int, progress: Callable[[int], object]) -> None:
+        world, sleep = self.world, self.checks.sleep
+        while not world.stopped and world.tick < end_tick:
+            world.run_to(
+                min(end_tick, world.period_end, NEVER_TICK if sleep is None else sleep.next_tick(world.tick))
+            )
+            progress(world.tick)
+
+    def _let_answer(self, sleep: Sleep, progress: Callable[[int], object]) -> None:
+        """A board that has gone to sleep in time goes on until its answer is sent, which belongs to the run."""
+        world, last_tick = self.world, self.world.tick + LONGEST_ANSWER_TICKS
+        sleep.next_tick(world.tick)
+        while sleep.answers and not world.stopped and world.tick < last_tick:
+            self._go_to(sleep.cpu.cycles * CYCLE_TICKS + ANSWER_LOOK_TICKS, progress)
 
     def finish(self) -> None:
         """It is over, by itself or because it was broken off."""
@@ -151,7 +172,7 @@ class Run:
         said = [line for group in self.judges for line in expectation_lines(group)]
         if player is not None and player.failure is not None:
             said.insert(0, ("failed", f"step failed: {player.failure}"))
-        said += fault_lines(world.robots, NEVER_TICK if self.spec.until_tick is None else self.tick)
+        said += fault_lines(world.devices, NEVER_TICK if self.spec.until_tick is None else self.tick)
         parts = [group.verdict() for group in self.judges]
         parts += [verdict for verdict, _ in said if verdict in ("fault", "failed")]
         return Result(
@@ -179,11 +200,18 @@ class Run:
 
     def case(self) -> str:
         """The case of the first failure. Raises ValueError if nothing failed."""
-        return case_of_checks(self.world, self._known_trace(), self.checks)
+        return case_of_checks(self.world, self._known_trace(), self.checks, self._end_tick)
+
+    @property
+    def _end_tick(self) -> int | None:
+        """Where a case of it ends. That of a board leaves another build time to come to its fault."""
+        if not isinstance(self.world.scenario, BoardScenario):
+            return None
+        return max(self.world.scenario.end_tick, *(failure.tick for failure in self.failures[:1]), 0)
 
     def stream(self, expect: Mapping[str, Any] = {}, verdict: str = "") -> str:
         """The same run as a stream: the case of the check in `expect`, of which nothing is expected without one."""
-        return case_text(self.world, self._known_trace(), expect, verdict)
+        return case_text(self.world, self._known_trace(), expect, verdict, self._end_tick)
 
     def case_of_step(self) -> str | None:
         """The case of the step that has just failed; None where no check can judge it."""

@@ -12,6 +12,7 @@ from miro_exact.bad_input import BadInput
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks.expect import expectations_of
@@ -32,7 +33,7 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     ended before it is over. `origin`: the file that messages name.
     """
 
-    scenario: Scenario
+    scenario: Scenario | BoardScenario
     image: Image
     seed: int = 0
     script: Sequence[ScriptItem] | None = None
@@ -54,6 +55,14 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
         if self.expected is not None:
             return self.expected
         return expectations_of(self.scenario, self.origin or self.scenario.name)
+
+    @property
+    def robot_scenario(self) -> Scenario:
+        """The scenario of robots. Raises BadInput for a board alone."""
+        if isinstance(self.scenario, BoardScenario):
+            what = "is for a board alone, which has no robot to show"
+            raise BadInput(self.origin, "", what, "`mirotwin replay` says what it comes to")
+        return self.scenario
 
     def world(self, image: Image | None = None) -> World:
         """A new one, at its first tick, with another image if one is given. Raises BadInput where the saved world is

@@ -29,7 +29,7 @@ class PortRig:
         self.notes: list[str] = []
         self.recording = BytesIO()
         self.opened = ExitStack()
-        scenario = self.spec.scenario
+        scenario = self.spec.robot_scenario
         self.machine = self.opened.enter_context(port_for_test(desk, scenario, name, self.notes.append))
         self.machine.record(self.recording, twin_source(scenario, 0, self.spec.image))
         self.links = [Link(self.machine)]

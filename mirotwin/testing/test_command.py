@@ -7,9 +7,10 @@ judged by the checks that are always on.
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -30,46 +31,22 @@ from mirotwin.shell.program import show_line, show_traceback, tell_notes
 from mirotwin.shell.verdicts import VERDICTS, exit_code
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
-from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.interface import in_ms
-from mirotwin.verify.expectations import CHECK, Expected, as_settings
+from mirotwin.verify.expectations import Expected, as_settings, in_files
 
 
-class CaseTests:
-    """Runs cases on `firmware` (None: the robot's own). `checks`: those of --check; `unused`: those without a case."""
-
-    def __init__(self, firmware: str | None, checks: Sequence[str]) -> None:
-        self.firmware = firmware
-        self.checks = checks
-        self.unused = set(checks)
-
-    def run(self, path: str) -> Result:
-        """Runs one; a case that cannot be run is a result, too."""
-        check = None
-        try:
-            if is_bare_case(path):
-                from mirotwin.runs.bare_case import check_of_case  # loads the bare processor
-
-                name = check_of_case(path)
-                check = next((text for text in self.checks if text.rpartition(":")[2] == name), None)
-                result = self._run_bare(path, check)
-            else:
-                result = self._run(path)
-        except BadInput as error:
-            result = cannot_be_run(path, error)
-        return replace(result, again=replay_line(path, self.firmware, check))
-
-    def _run(self, path: str) -> Result:
-        return _as_test(path, load_stream(path, self.firmware).judge_case())
-
-    def _run_bare(self, path: str, check: str | None) -> Result:
-        from mirotwin.runs.bare_case import load_case_firmware, rerun_bare_case
-
-        image = load_case_firmware(path, self.firmware)
-        self.unused.discard(check or "")
-        result = rerun_bare_case(path, image, check)[1]
-        return _as_test(path, replace(result, firmware_sha256=image.sha256 or ""))
+def run_case(path: str, options: TestOptions) -> Result:
+    """Runs one on --firmware; a case that cannot be run is a result, too."""
+    expected: Sequence[str] = ()
+    try:
+        job = load_stream(path, options.firmware)
+        own_files = in_files(options.expected)
+        expected = [own_files[name] for name in job.spec.scenario.expect if name in own_files]
+        result = _as_test(path, job.judge_case())
+    except BadInput as error:
+        result = cannot_be_run(path, error)
+    return replace(result, again=replay_line(path, options.firmware, tuple(expected)))
 
 
 def _as_test(path: str, result: Result) -> Result:
@@ -92,10 +69,6 @@ class TestOptions(Options, frozen=True, kw_only=True):
     ] = ()
     expected: Expected = ()
     firmware: Firmware = None
-    checks: Annotated[
-        tuple[str, ...],
-        CHECK.saying("FILE.py:FUNCTION, for cases of a bare processor whose check is in a file."),
-    ] = ()
     engine: Engine = None
     junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
     artifacts: Annotated[
@@ -179,10 +152,10 @@ def test(options: TestOptions) -> int:
     left_out: dict[str, None] = {}
     results: list[Result] = []
     told: list[TestCase] = []
-    cases = CaseTests(options.firmware, options.checks)
+    as_settings(options.expected)  # cases may name the checks of files, which are known from now on
     for file in chosen:
         began_s = time.perf_counter()
-        result = cases.run(file) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
+        result = run_case(file, options) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
         told.append(_test_case(result, time.perf_counter() - began_s))
         results.append(result)
         tell_notes(note for note in result.left_out if note not in left_out)
@@ -197,10 +170,17 @@ def test(options: TestOptions) -> int:
     if junit is not None:  # the verdicts are told first, whatever becomes of their file
         with whole_file(junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin", told))
-    if cases.unused:
-        what = f"no case is judged by {sorted(cases.unused)[0]}"
-        raise BadInput("", "--check", what, "leave it out, or name the one that the cases have in [expect]")
+    if all(file.endswith(CASE_SUFFIX) for file in chosen):
+        _refuse_unused(in_files(options.expected).values(), results)
     return code
+
+
+def _refuse_unused(files: Iterable[str], results: Sequence[Result]) -> None:
+    """Raises BadInput for a check in a file that none of the cases names."""
+    used = {word for result in results for word in shlex.split(result.again)}
+    for text in sorted(set(files) - used):
+        what = f"no case is judged by {text}"
+        raise BadInput("", "--expect", what, "leave it out, or name the one that the cases have in [expect]")
 
 
 def _show(result: Result, quiet: bool) -> None:

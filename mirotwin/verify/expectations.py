@@ -1,15 +1,19 @@
-"""The options by which commands are given checks: `--expect` of a run, and `--check` of a bare processor."""
+"""`--expect`, the option by which commands are given checks: by their names, or in files."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 from miro_exact.bad_input import BadInput
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
+from miro_sim.scenario.settings import blamed, make
 from mirotwin.shell.command import Option
-from mirotwin.verify.checks.expect import CHECKS
+from mirotwin.verify.checks.expect import CHECKS, checks_of_table, expectations_of
+from mirotwin.verify.checks.interface import Check
 
 _IN_FILE = re.compile(r"(.+?\.py):(\w+)((?:=.*)?)", re.DOTALL)
 EXPECT = Option(
@@ -19,11 +23,6 @@ EXPECT = Option(
     " one of your own; may be repeated. Exit code 1 when one fails.",
 )
 Expected = Annotated[tuple[str, ...], EXPECT]
-CHECK = Option(
-    "--check",
-    metavar="NAME",
-    help="For a bare processor: a check in Python by its name, or FILE.py:FUNCTION.",
-)
 
 
 def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
@@ -39,6 +38,34 @@ def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
     CHECKS.in_files.clear()
     keys = [one if isinstance(one, str) else f"{_brought(one[1], one[2])}{one[3]}" for one in named]
     return tuple(f"{EXPECT_KEY}{key}" if "=" in key else f"{EXPECT_KEY}{key}=true" for key in keys)
+
+
+def table_alone(expected: Sequence[str], origin: str) -> dict[str, Any]:
+    """What --expect says of a board alone, as its table `[expect]`. Raises BadInput."""
+    raw: dict[str, Any] = {}
+    settings = make(raw, as_settings(expected), origin)
+    table: dict[str, Any] = raw.get("expect", {})
+    try:
+        expectations_of(BoardScenario(expect=table), origin)
+    except ScenarioError as error:
+        raise blamed(error, settings, raw) from None
+    return table
+
+
+def checks_alone(expected: Sequence[str]) -> list[Check]:
+    """The checks that --expect names and that can judge a board alone. Raises BadInput."""
+    if not expected:  # which would forget the checks of files
+        return []
+    found = checks_of_table(BoardScenario(), "", "expect", table_alone(expected, "fuzz")).values()
+    return [check for check in found if check is not None and "board" in check.SUBJECTS]
+
+
+def in_files(expected: Sequence[str]) -> dict[str, str]:
+    """The names of checks that --expect brought from files, and what it was given for them."""
+    given = {match[2]: text for text in expected if (match := _IN_FILE.fullmatch(text))}
+    return {
+        name: given[struct.__name__] for name, struct in CHECKS.in_files.items() if struct.__name__ in given
+    }
 
 
 def _brought(path: str, name: str) -> str:

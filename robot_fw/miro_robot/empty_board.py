@@ -43,6 +43,7 @@ class EmptyBoard(ProcessorBoard):
     (REPLAN). `input_tick`: that of the next level that the outside puts on a pin; NEVER_TICK if none will come.
     """
 
+    HAS_XRAM = True
     STATE = {
         "fault_count": TICK,
         "held": FLAG,

@@ -9,7 +9,7 @@ from intelhex import IntelHex
 from mirotwin.fuzz.afl.settings import missing
 from mirotwin.shell.processes import python_module
 from tests import children
-from tests.mirotwin.verify.bare.firmwares import POLLS
+from tests.mirotwin.verify.firmwares import POLLS
 from tests.robot.mcs51.asm import assemble
 
 OTHERS = ("msgspec", "numpy", "click", "hypothesis", "pyarrow", "conftest")

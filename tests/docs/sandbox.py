@@ -76,10 +76,8 @@ def put_parts(hidden):
     install(hidden, "example-checks", "1.0", check, "checks", turning_check=text("checks/turning_check.py"))
     slip = text("fuzz-slip/slip_protocol.py")
     install(hidden, "example-slip", "1.0", {"slip": "slip_protocol:Slip"}, "protocols", slip_protocol=slip)
-    lamps = {"lamps_as_told": "dimmer_check:lamps_as_told"}
-    install(
-        hidden, "example-dimmer", "1.0", lamps, "bare_checks", dimmer_check=text("fuzz-slip/dimmer_check.py")
-    )
+    lamps = {"lamps_as_told": "dimmer_check:LampsAsTold"}
+    install(hidden, "example-dimmer", "1.0", lamps, "checks", dimmer_check=text("fuzz-slip/dimmer_check.py"))
     law = (ROOT / "host/README.md").read_text("utf-8").split("```python\n")[2].partition("\n\npilot = ")[0]
     install(hidden, "mine", "1.0", {"smooth": "my_module:Parameters"}, my_module=law)
 

@@ -15,7 +15,7 @@ from tests.mutants.sdcc import needs_sdcc
 
 EXAMPLE = EXAMPLES / "fuzz-slip"
 CRYSTAL_HZ = 11_059_200
-CHECK = f"{EXAMPLE / 'dimmer_check.py'}:lamps_as_told"
+CHECK = f"{EXAMPLE / 'dimmer_check.py'}:LampsAsTold"
 CASES = sorted((EXAMPLE / "cases").glob("*.stream"))
 
 
@@ -43,11 +43,11 @@ def slip():
 
 
 def target(image, kind="frames", check=False):
-    from mirotwin.fuzz.bare import BareTarget
-    from mirotwin.verify.bare.exchange import check_named
+    from mirotwin.fuzz.board_target import BoardTarget
+    from mirotwin.verify.expectations import checks_alone
 
-    judge = check_named(CHECK) if check else None
-    return BareTarget(image, kind, slip(), judge, crystal_hz=CRYSTAL_HZ)
+    checks = checks_alone([CHECK]) if check else ()
+    return BoardTarget(image, kind, slip(), checks, crystal_hz=CRYSTAL_HZ)
 
 
 @given(st.lists(st.binary(min_size=1, max_size=40), max_size=4))
@@ -79,11 +79,11 @@ def test_the_firmware_answers_what_the_format_says(images, name):
         (b"\x01\x03\x00", None),  # no such lamp
     ):
         assert dimmer.run(bytes([len(body) - 1]) + body) == 0
-        run = dimmer.exchange()
-        assert run.sent_bytes == (b"" if answer is None else slip().encode(answer))
+        sent = bytes(value for value, _ in dimmer.processor.bus.said)
+        assert sent == (b"" if answer is None else slip().encode(answer))
     dimmer.run(b"\x02\x01\x02\x64")
-    assert run.memory["level"] == [0, 0, 100]
-    assert run.memory["level[2]"] == 100
+    assert dimmer.subject.memory["level"] == [0, 0, 100]
+    assert dimmer.subject.memory["level[2]"] == 100
 
 
 @needs_sdcc
@@ -97,13 +97,14 @@ def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images
 @needs_sdcc
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
-    from mirotwin.runs.bare_case import rerun_bare_case
+    from mirotwin.runs.job import load_stream
+    from mirotwin.verify.expectations import as_settings
 
-    _, again = rerun_bare_case(path, images["dimmer"], CHECK)
-    assert again.failures
+    as_settings([CHECK])
+    again = load_stream(f"{path}", f"{images['dimmer'].path}").judge_case()
     assert again.texts[0].startswith("fails as recorded: ")
     assert again.code == (3 if "no_fault" in path.stem else 1)
-    _, cured = rerun_bare_case(path, images["mended"], CHECK)
+    cured = load_stream(f"{path}", f"{images['mended'].path}").judge_case()
     assert (cured.code, cured.texts[0].partition(":")[0]) == (0, "cured")
 
 
@@ -113,7 +114,7 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
     """Its finds are given as seeds, so that a second is enough."""
     for name, code in (("dimmer", 1), ("mended", 0)):
         out = tmp_path / name
-        options = ["--bare", "--crystal", CRYSTAL_HZ, "--check", CHECK, "--check-all", "--time", "1s"]
+        options = ["--bare", "--crystal", CRYSTAL_HZ, "--expect", CHECK, "--expect-all", "--time", "1s"]
         options += ["--corpus", EXAMPLE / "cases", "--out", out]
         done = run(EXAMPLE, MIROTWIN, "fuzz", images[name].path, *options)
         assert done.returncode == code, done.stdout + done.stderr

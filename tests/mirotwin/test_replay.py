@@ -173,7 +173,7 @@ def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(network
     recorded = [msgspec.structs.replace(PERIOD, wire=sent)]
     scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3)] * networks)
     (table,) = frame_tables(
-        SimpleNamespace(spec=SimpleNamespace(scenario=scenario), recorded=recorded), [], True, None
+        SimpleNamespace(spec=SimpleNamespace(robot_scenario=scenario), recorded=recorded), [], True, None
     )
     network = "net0 " if networks > 1 else ""
     assert list(table.columns[3].cells) == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]

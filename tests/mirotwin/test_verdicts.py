@@ -14,7 +14,7 @@ from mirotwin.shell.verdicts import INTERRUPTED, VERDICTS, judge
 from tests.mirotwin.conform.images import FAULTS, HANGS
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.testing.sessions import session
-from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
+from tests.mirotwin.verify.firmwares import POLLS, SLEEPS, image
 
 ROOT = Path(__file__).parents[2]
 EXPECTED = {

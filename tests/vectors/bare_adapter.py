@@ -5,26 +5,21 @@ from typing import Any, NamedTuple
 
 from miro_exact.state import Flat
 from miro_robot.image import load_hex
-from mirotwin.firmware.bare_options import board_of, ended, load_bare_image, make_world, target_of, wire_of
+from mirotwin.firmware.bare_options import ended, load_bare_image, make_world, target_of, wire_of
 from mirotwin.firmware.fw_run import FwRunOptions, run, run_world
-from mirotwin.fuzz.bare import BareTarget
-from mirotwin.fuzz.oracle import BareProcessorOracle
-from mirotwin.runs.bare_case import rerun_bare_case
+from mirotwin.fuzz.board_target import BoardTarget
+from mirotwin.fuzz.oracle import BoardOracle
+from mirotwin.runs.job import load_stream
+from mirotwin.runs.run import Run
 from mirotwin.shell.command import _read
-from mirotwin.verify.bare.exchange import check_named
-from mirotwin.verify.bare.run import BarePlayback
+from mirotwin.verify.expectations import checks_alone
+from tests.mirotwin.verify.own_checks import source_of
 from tests.vectors.bare_runs import program_of
 
+COUNTED = "self.subject.memory.iram[0x30]"
 CHECKS = {
-    "too_long": """
-def too_long(run):
-    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None
-""",
-    "counts": """
-def counts(run):
-    received, counted = len(run.received), run.memory.iram[0x30]
-    return f"it counted {counted} of {received}" if counted > 2 else None
-""",
+    "too_long": ("len(self.sent) > 2", "f'{len(self.sent)} are too many'"),
+    "counts": (f"{COUNTED} > 2", f"f'it counted {{{COUNTED}}} of {{len(self.received)}}'"),
 }
 
 
@@ -47,42 +42,42 @@ def run_image(entry, folder):
     for name, text in entry.inputs.items():
         (folder / name).write_bytes(text.encode())
         words = [f"{folder / name}" if word == name else word for word in words]
-    given = run.make_context("run", words, resilient_parsing=False).params
-    options = _read(FwRunOptions, given)
+    options = _read(FwRunOptions, run.make_context("run", words).params)
     image = load_bare_image(options.image, options.bare, named=False)
     world = make_world(image, options.bare, target_of(options.image, image, options.bare))
     run_world(world, options.bare)
     sent = [(event.value, event.tick) for _, event in wire_of(world).log.since(0, ("heard",))]
-    board, why = board_of(world), ended(world, options.bare.max_cycles)
-    return _end(board.cpu, board.xram(), sent, world.faults[:100], f"{why}")
+    why = ended(world, options.bare.max_cycles)
+    return _end(world, sent, f"{why}")
 
 
 def run_case(entry, folder):
     """A case played again from power-on, by its file."""
     program = program_of(entry.program, folder)
-    image = load_hex(program)
-    check = None
+    checks = []
     if entry.check:
         file = folder / f"{entry.check}.py"
-        file.write_text(CHECKS[entry.check])
-        check = f"{file}:{entry.check}"
+        file.write_text(source_of("Own", entry.check, *CHECKS[entry.check]))
+        checks = checks_alone([f"{file}:Own"])
     path = entry.data
     if isinstance(path, bytes):
         path = folder / "case.stream"
-        judge = check_named(check) if check else None
-        target = BareTarget(image, entry.input, None, judge, entry.crystal_hz, entry.baud)
+        image = load_hex(program)
+        target = BoardTarget(image, entry.input, None, checks, entry.crystal_hz, entry.baud)
         assert target.run(entry.data)
-        path.write_text(BareProcessorOracle(target, judge).confirm(entry.data, target.failure).case())
-    if entry.other:
-        image = load_hex(program_of(entry.other, folder, "other.ihx"))
-    again, verdict = rerun_bare_case(path, image, check)
-    processor = BarePlayback(image, again.line, again.script, again.end_tick).play().processor
-    xram, sent = processor.bus.content(), processor.bus.said
-    return _end(processor.cpu, xram, sent, processor.faults, verdict.verdict, verdict.texts[0])
+        path.write_text(BoardOracle(target, {}).confirm(entry.data, target.failure).case())
+    firmware = program_of(entry.other, folder, "other.ihx") if entry.other else program
+    job = load_stream(f"{path}", f"{firmware}")
+    again = Run(job.spec).play()
+    sent = [(event.value, event.tick) for _, event in again.world.devices[0].log.since(0, ("transmitted",))]
+    begin_tick = job.spec.scenario.begin_tick
+    result = job.result_of_case(again)
+    return _end(again.world, [one for one in sent if one[1] >= begin_tick], result.verdict, result.texts[0])
 
 
-def _end(cpu, xram, sent, faults, why, verdict=""):
-    flat = Flat(cpu)
-    faults = [(int(fault.kind), fault.tick, fault.pc) for fault in faults]
+def _end(world, sent, why, verdict=""):
+    board = world.devices[0].board
+    flat = Flat(board.cpu)
+    faults = [(int(fault.kind), fault.tick, fault.pc) for fault in world.faults[:100]]
     fields = flat.decode(flat.save())
-    return End(fields, cpu.cycles, xram, list(sent), faults, why, verdict)
+    return End(fields, board.cpu.cycles, board.xram(), sent, faults, why, verdict)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from tests.children import ROOT
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.verify.bare.firmwares import POLLS, SERIAL, SLEEPS
+from tests.mirotwin.verify.firmwares import POLLS, SERIAL, SLEEPS
 from tests.robot.mcs51.asm import assemble
 from tests.vectors.paths import CASES
 

@@ -65,7 +65,7 @@ def run_page(material: Material) -> bytes:
     """The page. Raises BadInput where Bokeh is not installed."""
     from mirotwin.report.page.plots import KIND_COLOURS, figures_of  # loads Bokeh
 
-    scenario, again = material.job.spec.scenario, material.again
+    scenario, again = material.job.spec.robot_scenario, material.again
     steered = [network.host != SILENT for network in scenario.networks]
     delay_frames = getattr(scenario.camera, "delay_frames", 0)
     tracks = tracks_of(material.periods, steered, delay_frames)

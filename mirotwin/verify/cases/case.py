@@ -32,6 +32,7 @@ from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN
 from miro_robot.image import Image
 from miro_sim.periods import Period
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Failure
@@ -56,8 +57,8 @@ class Trace:
         """Transmissions of hosts that have been put on the air, and actions that were done, in the order of time."""
         found = list(self._happened)
         if self.world.in_period:
-            for network in self.world.networks:
-                found += [*network.sent, *network.actions.done]
+            for line in self.world.lines:
+                found += [*line.sent, *line.actions.done]
         return tuple(sorted(found, key=lambda one: one.tick))
 
     def __repr__(self) -> str:
@@ -67,9 +68,25 @@ class Trace:
 SUFFIX = ".stream"
 
 
-def case_text(world: World, trace: Trace, expect: Mapping[str, Any], verdict: str) -> str:
-    """The case of `world` as it is now. `expect`: the check that failed, as in `[expect]`; `verdict`: what it said."""
-    more = {"end_tick": world.tick, "expect": dict(expect), "scenario": tables_of(world.scenario)}
+def case_text(
+    world: World, trace: Trace, expect: Mapping[str, Any], verdict: str, end_tick: int | None = None
+) -> str:
+    """The case of `world`, which ends at `end_tick`; default: where the world is now.
+
+    `expect`: the check that failed, as in `[expect]`; `verdict`: what it said.
+    """
+    scenario = world.scenario
+    end_tick = world.tick if end_tick is None else end_tick
+    if isinstance(scenario, BoardScenario):
+        expected = {"expect": dict(expect)} if expect else {}
+        bare = {
+            "crystal_hz": scenario.board.crystal_hz,
+            "bit_ticks": scenario.bit_ticks,
+            "begin_tick": scenario.begin_tick,
+        }
+        more = {"end_tick": end_tick, **expected, "bare": bare}
+        return stream_text(trace.script(), world.image, {}, verdict, more)
+    more = {"end_tick": end_tick, "expect": dict(expect), "scenario": tables_of(scenario)}
     return stream_text(trace.script(), world.image, {"seed": world.seed}, verdict, more)
 
 
@@ -121,12 +138,15 @@ def expect_of_failure(checks: Checks, failure: Failure) -> dict[str, Any]:
     raise ValueError(f"no check {failure.check!r} judges net{failure.network}/robot{failure.slot}")
 
 
-def case_of_checks(world: World, trace: Trace, checks: Checks) -> str:
-    """The case of the first failure of `checks`. Raises ValueError if nothing failed."""
+def case_of_checks(world: World, trace: Trace, checks: Checks, end_tick: int | None = None) -> str:
+    """The case of the first failure of `checks`; it ends at `end_tick`, default where the world is now.
+
+    Raises ValueError if nothing failed.
+    """
     if not checks.failures:
         raise ValueError("no check has failed")
     first = checks.failures[0]
-    return case_text(world, trace, expect_of_failure(checks, first), str(first))
+    return case_text(world, trace, expect_of_failure(checks, first), str(first), end_tick)
 
 
 def write_case(path: str | os.PathLike[str], text: str) -> None:
@@ -142,11 +162,6 @@ def is_case(path: str | Path) -> bool:
         return stream.read(path).header.expect is not None
     except ValueError:
         return True
-
-
-def is_bare_case(path: str | Path) -> bool:
-    """Whether a file is a stream for a bare processor. Raises StreamError for a stream file that is wrong."""
-    return has_header(path) and stream.read(path).header.bare is not None
 
 
 def has_header(path: str | Path) -> bool:

@@ -10,7 +10,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import FIRMWARE, NAME
-from mirotwin.verify.expectations import CHECK, Expected
+from mirotwin.verify.expectations import Expected
 
 
 class CaseOptions(Options, frozen=True, kw_only=True):
@@ -23,9 +23,6 @@ class CaseOptions(Options, frozen=True, kw_only=True):
         FIRMWARE.saying("Image to run instead of the recorded one (of the robot's own, for a text stream)."),
     ] = None
     expected: Expected = ()
-    check: Annotated[
-        str | None, CHECK.saying("FILE.py:FUNCTION, for a case of a bare processor whose check is in a file.")
-    ] = None
 
 
 class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
@@ -39,22 +36,22 @@ def debug_line(
     file: str | PathLike[str],
     firmware: str | PathLike[str] | None = None,
     at_tick: int | None = None,
-    check: str | None = None,
+    expected: tuple[str, ...] = (),
 ) -> str:
     """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
     image, at = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
-    return DebugLineOptions(file=f"{file}", firmware=image, at=at, check=check).command_line()
+    return DebugLineOptions(file=f"{file}", firmware=image, at=at, expected=expected).command_line()
 
 
 def replay_line(
-    stream: str | PathLike[str], firmware: str | PathLike[str] | None = None, check: str | None = None
+    stream: str | PathLike[str], firmware: str | PathLike[str] | None = None, expected: tuple[str, ...] = ()
 ) -> str:
     """The command that plays a stream or a case again, on that image (None: the robot's own).
 
-    `check`: FILE.py:FUNCTION, which a case cannot name.
+    `expected`: checks in files, FILE.py:CLASS, which a case cannot name.
     """
     image = None if firmware is None else f"{firmware}"
-    return CaseOptions(file=f"{stream}", firmware=image, check=check).command_line()
+    return CaseOptions(file=f"{stream}", firmware=image, expected=expected).command_line()
 
 
 def foreign_path(image: Image) -> Path | None:

@@ -21,5 +21,6 @@ OWN = {
     "tracks_within_cm": "mirotwin.verify.checks.course:TracksWithin",
     "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
     "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
+    "never_sleeps": "mirotwin.verify.checks.serial:NeverSleeps",
 }
 """Our own checks: name -> `module:class`. A room above that brings a check adds it here; this file imports nothing."""

@@ -20,12 +20,15 @@ from miro_exact.bad_input import BadInput
 from miro_exact.plugins import PluginError, Registry
 from miro_exact.raised import raised
 from miro_sim.periods import RobotId
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks import OWN
 from mirotwin.verify.checks.interface import Check, problem_of_class
 
 ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
+ALONE_ALWAYS_ON = "no_fault"
+"""Of a board alone."""
 
 CHECKS: Registry[object] = Registry(
     "mirotwin.checks",
@@ -49,9 +52,12 @@ def struct_of(name: str) -> type[Check]:
     return cast(type[Check], CHECKS.find(name))
 
 
-def expectations_of(scenario: Scenario, origin: str) -> dict[RobotId, list[Check]]:
+def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[RobotId, list[Check]]:
     """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
     for_all = checks_of_table(scenario, origin, "expect", scenario.expect)
+    if isinstance(scenario, BoardScenario):
+        wanted = {ALONE_ALWAYS_ON: struct_of(ALONE_ALWAYS_ON)(), **for_all}
+        return {(0, 0): [check for check in wanted.values() if check is not None]}
     found: dict[RobotId, list[Check]] = {}
     for index, network in enumerate(scenario.networks):
         for at, robot in enumerate(network.robot):
@@ -62,8 +68,10 @@ def expectations_of(scenario: Scenario, origin: str) -> dict[RobotId, list[Check
     return found
 
 
-def named_in(scenario: Scenario) -> set[str]:
+def named_in(scenario: Scenario | BoardScenario) -> set[str]:
     """Checks that a scenario or one of its steps names: a run that has no occasion for one of them has not passed."""
+    if isinstance(scenario, BoardScenario):
+        return set(scenario.expect)
     robots = [robot for network in scenario.networks for robot in network.robot]
     steps = [step.get("check") for step in scenario.step]
     tables = [scenario.expect, *(robot.expect for robot in robots), *steps]
@@ -76,7 +84,7 @@ def says_anything(scenario: Scenario) -> bool:
 
 
 def checks_of_table(
-    scenario: Scenario, origin: str, path: str, table: Mapping[str, Any]
+    scenario: Scenario | BoardScenario, origin: str, path: str, table: Mapping[str, Any]
 ) -> dict[str, Check | None]:
     """The checks of one table at `path`; None for one that is not expected. Raises ScenarioError."""
     found: dict[str, Check | None] = {}
@@ -153,7 +161,9 @@ def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
     return f"{name} takes a table", remedy
 
 
-def _wrong(scenario: Scenario, origin: str, place: str, name: str, value: Any, message: str) -> ScenarioError:
+def _wrong(
+    scenario: Scenario | BoardScenario, origin: str, place: str, name: str, value: Any, message: str
+) -> ScenarioError:
     """What msgspec found, at the path of the scenario."""
     what, _, inner = message.partition(" - at `$")
     if what.startswith("Object missing required field"):

@@ -29,6 +29,7 @@ class NoFault(FaultCheck, frozen=True, kw_only=True, tag="no_fault"):
     """The firmware never does what it must not: no firmware fault of any kind."""
 
     KINDS = tuple(FaultKind)
+    SUBJECTS = ("robot", "board")
     WANTED = "no firmware fault"
 
 
@@ -54,6 +55,7 @@ class MainLoopAlive(FaultCheck, frozen=True, kw_only=True, tag="main_loop_alive"
 class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
     """The stack pointer never leaves the stack: what the linker's map gives it, all of internal RAM without a map."""
 
+    SUBJECTS = ("robot", "board")
     KINDS = STACK_FAULTS
     WANTED = "a stack clear of data"
 

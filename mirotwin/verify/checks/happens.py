@@ -13,7 +13,7 @@ from msgspec import Meta
 from miro_exact.clock import NEVER_TICK
 from miro_sim.world.conditions import Condition, Recorded
 from miro_sim.world.events import PC, Event
-from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, SubjectKind, in_ms
 
 Tick = Annotated[int, Meta(ge=-1, lt=NEVER_TICK)]
 
@@ -21,6 +21,7 @@ Tick = Annotated[int, Meta(ge=-1, lt=NEVER_TICK)]
 class ConditionCheck(Check, frozen=True, kw_only=True):
     """A condition after `after_tick`, up to `until_tick`."""
 
+    SUBJECTS: ClassVar[tuple[SubjectKind, ...]] = ("robot", "board")
     condition: Recorded
     after_tick: Tick = -1
     until_tick: Tick
@@ -59,7 +60,8 @@ class ConditionMonitor(Monitor[ConditionCheck]):
         slot = check.condition.at_slot(subject.first_slot)
         place = (check.condition.network, subject.first_slot if slot == PC else slot)
         self.done = place != (subject.network, subject.slot)
-        duration = in_ms(check.until_tick - max(check.after_tick, 0))
+        hertz = subject.ticks_per_second
+        duration = in_ms(check.until_tick - max(check.after_tick, 0), hertz)
         within = f"{check.condition} within {duration}"
         self.wanted = within if check.KIND == "liveness" else f"no {check.condition} for {duration}"
 

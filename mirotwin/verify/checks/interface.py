@@ -20,23 +20,27 @@ is part of no saved world.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args
+from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar, get_args
 
 import msgspec
 
 from miro_exact.bad_input import did_you_mean
-from miro_exact.clock import ticks
+from miro_exact.clock import TICKS_PER_SECOND, ticks
 from miro_exact.plugins import PluginError
 from miro_exact.raised import at_place, defined_at
-from miro_protocol.table import TICKS_PER_MS
 from miro_robot.faults import FirmwareFault
+from miro_robot.image import Image
+from miro_robot.mcs51.cpu import Cpu
 from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
 from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
 from mirotwin.shell.verdicts import Verdict
+from mirotwin.verify.checks.memory import Memory
+from mirotwin.verify.checks.sleep import Sleep
 
 Kind = Literal["safety", "liveness"]
+SubjectKind = Literal["robot", "board"]
 EVENT_KINDS = (
     *("sent", "heard", "answer", "received", "transmitted", "frame", "damaged", "command", "fault"),
     *("reset", "power", "radio", "touch", "start_lost", "wheel_lost"),
@@ -47,7 +51,10 @@ KEPT = 100
 
 
 class Failure(msgspec.Struct, frozen=True):
-    """`check` failed for a robot at `tick`: what was wanted, what was found. `fault`: it is a firmware fault."""
+    """`check` failed for a device at `tick`: what was wanted, what was found. `fault`: it is a firmware fault.
+
+    `alone_hz`: the crystal of a board alone, 0 for a robot.
+    """
 
     check: str
     network: int
@@ -56,33 +63,79 @@ class Failure(msgspec.Struct, frozen=True):
     wanted: str
     found: str
     fault: bool = False
+    alone_hz: int = 0
+
+    @property
+    def what(self) -> str:
+        """What is wrong."""
+        if self.alone_hz and (self.fault or not self.wanted):  # a fault says by itself what is wrong
+            return self.found
+        return f"wanted {self.wanted}, found {self.found}"
 
     def __str__(self) -> str:
-        place = f"{self.check}: net{self.network}/robot{self.slot}"
-        return f"{place}: {at(self.tick)}: wanted {self.wanted}, found {self.found}"
+        if self.alone_hz:
+            return f"{self.check}: {at(self.tick, self.alone_hz)}: {self.what}"
+        return f"{self.check}: net{self.network}/robot{self.slot}: {at(self.tick)}: {self.what}"
+
+
+class JudgedDevice(Protocol):
+    """A robot, a board alone, or the fuzzer's processor. `board` has a `cpu`."""
+
+    network: int
+    slot: int
+
+    @property
+    def board(self) -> Any: ...
 
 
 class Subject(msgspec.Struct, frozen=True):
-    """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself.
+    """The device that is judged: a robot, or a board alone, which runs `image`. `end_tick`: when the run is over by
+    itself. `ticks_per_second`: of its clock. `begin_tick`: what happens before is not judged.
 
-    `first_slot`: of the robots that are present in its network; `radio`: from the PC to them. `cut`: it may be ended
-    before: what was still to come does not fail then.
+    Of a robot: `robots`: slots of its network; `first_slot`: of the robots that are present there; `radio`: from the PC
+    to them. `cut`: the run may be ended before: what was still to come does not fail then. Of a board alone: `sleep`.
     """
 
-    robot: Robot
-    robots: int
+    device: JudgedDevice
+    image: Image
     end_tick: int
+    robots: int = 0
     first_slot: int = 0
     radio: Downlink | None = None
     cut: bool = False
+    ticks_per_second: int = TICKS_PER_SECOND
+    begin_tick: int = 0
+    sleep: Sleep | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """Raises PluginError for a board alone."""
+        if not isinstance(self.device, Robot):
+            raise PluginError("it looks at the robot of a board alone", "take `subject.device`")
+        return self.device
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is a board alone."""
+        return not isinstance(self.device, Robot)
+
+    @property
+    def cpu(self) -> Cpu:
+        cpu: Cpu = self.device.board.cpu
+        return cpu
+
+    @property
+    def memory(self) -> Memory:
+        """The memories of its processor as they are now, variables by their names in C."""
+        return Memory(self.cpu, self.image)
 
     @property
     def network(self) -> int:
-        return self.robot.network
+        return self.device.network
 
     @property
     def slot(self) -> int:
-        return self.robot.slot
+        return self.device.slot
 
 
 class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="check"):
@@ -90,11 +143,12 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     Derive with `frozen=True, kw_only=True, tag="name_of_the_check"`, give each key its unit and its range
     (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `monitor`. `MAIN` is the parameter that a bare value
-    in `[expect]` stands for; a check without one is written `name = true`.
+    in `[expect]` stands for; a check without one is written `name = true`. `SUBJECTS`: what it can judge.
     """
 
     KIND: ClassVar[Kind]
     MAIN: ClassVar[str] = ""
+    SUBJECTS: ClassVar[tuple[SubjectKind, ...]] = ("robot",)
 
     @property
     def name(self) -> str:
@@ -120,6 +174,8 @@ class Monitor(Generic[C_co]):
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
     unseen = ""
     """Why no run of this robot shows what is judged, such as a symbol that its image lacks: "not observable"."""
+    missed = ""
+    """Why this run had no occasion for it, if there is more to say than that."""
     LATER = False
     """Whether it may be told of several control periods at once, which it is if no check hears events of the board. If
     so, it must not read the robot except in `period_over` and `end`."""
@@ -137,8 +193,10 @@ class Monitor(Generic[C_co]):
             raise TypeError(f"fail() needs the tick as an int, got {tick!r:.40}")
         self.failed += 1
         if len(self.failures) < KEPT:
-            place = (self.subject.network, self.subject.slot)
-            self.failures.append(Failure(self.check.name, *place, tick, wanted, found, fault))
+            subject = self.subject
+            alone_hz = subject.ticks_per_second if subject.alone else 0
+            place = (subject.network, subject.slot)
+            self.failures.append(Failure(self.check.name, *place, tick, wanted, found, fault, alone_hz))
 
     def event(self, event: Event) -> None:
         """Something that happened, of the kinds in `EVENTS`."""
@@ -170,14 +228,14 @@ def ms_ticks(time_ms: float) -> int:
     return ticks(time_ms / 1000.0)
 
 
-def in_ms(duration_ticks: int) -> str:
+def in_ms(duration_ticks: int, ticks_per_second: int = TICKS_PER_SECOND) -> str:
     """A duration for people."""
-    return f"{duration_ticks / TICKS_PER_MS:.3f} ms"
+    return f"{duration_ticks * 1000 / ticks_per_second:.3f} ms"
 
 
-def at(tick: int) -> str:
+def at(tick: int, ticks_per_second: int = TICKS_PER_SECOND) -> str:
     """A tick for people."""
-    return f"tick {tick} ({in_ms(tick)})"
+    return f"tick {tick} ({in_ms(tick, ticks_per_second)})"
 
 
 class FirstFailure(msgspec.Struct, frozen=True):

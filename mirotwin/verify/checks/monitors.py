@@ -27,9 +27,10 @@ from miro_exact.raised import raised
 from miro_protocol.events import Damaged, Received
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period, RobotId
+from miro_sim.world.device import Device
 from miro_sim.world.events import Cursor, Event
+from miro_sim.world.medium import Medium
 from miro_sim.world.network import Network
-from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
 from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_of, named_in
@@ -42,6 +43,7 @@ from mirotwin.verify.checks.interface import (
     Subject,
     checked_monitor,
 )
+from mirotwin.verify.checks.sleep import Sleep
 
 
 def reception(received: Event, found: Received | Damaged, fresh: bool | None) -> Event:
@@ -90,17 +92,17 @@ class Checks:
         names = {check.name for checks in expected.values() for check in checks}
         self.named = names - (set(ALWAYS_ON) - named_in(world.scenario))
         self.cut = cut
-        self.robots = [
-            _RobotMonitors(world, network, robot, expected.get((network.index, robot.slot), ()), cut)
-            for network in world.networks
-            for robot in network.robots
+        self.devices = [
+            _DeviceMonitors(world, line, device, expected.get((line.index, device.slot), ()), cut)
+            for line in world.lines
+            for device in line.devices
         ]
-        self._each(_RobotMonitors.begin)
-        self.at_ends = [(one, monitor) for one in self.robots for monitor in one.that_have("period_over")]
+        self._each(_DeviceMonitors.begin)
+        self.at_ends = [(one, monitor) for one in self.devices for monitor in one.that_have("period_over")]
         self.finished = False
         self.index = world.index
         self.untold: list[tuple[Period, int]] = []  # and where the world stood at their end
-        self.together = TOGETHER if all(watched.later for watched in self.robots) else 1
+        self.together = TOGETHER if all(watched.later for watched in self.devices) else 1
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
@@ -129,11 +131,11 @@ class Checks:
             self.finished = True
             self.world.observers.remove(self._look)
             self._tell()
-            self._each(_RobotMonitors.end)
+            self._each(_DeviceMonitors.end)
 
-    def _each(self, tell: Callable[[_RobotMonitors], None]) -> None:
-        """Calls `tell` for each robot. A monitor may be a user's own: what it raises is a PluginError with its name."""
-        for watched in self.robots:
+    def _each(self, tell: Callable[[_DeviceMonitors], None]) -> None:
+        """Calls `tell` for each device. A monitor may be a user's: what it raises is a PluginError with its name."""
+        for watched in self.devices:
             try:
                 tell(watched)
             except (Exception, SystemExit) as error:
@@ -142,7 +144,7 @@ class Checks:
     @property
     def monitors(self) -> list[Monitor[Any]]:
         self._tell()
-        return [monitor for watched in self.robots for monitor in watched.monitors]
+        return [monitor for watched in self.devices for monitor in watched.monitors]
 
     @property
     def failures(self) -> list[Failure]:
@@ -159,7 +161,7 @@ class Checks:
         by_name: dict[str, list[Monitor[Any]]] = {}
         for monitor in self.monitors:
             by_name.setdefault(monitor.check.name, []).append(monitor)
-        lost = any(watched.lost for watched in self.robots)
+        lost = any(watched.lost for watched in self.devices)
         reason = ENDED if self.ended_early else NO_OCCASION
         return tuple(_verdict(name, monitors, lost, reason) for name, monitors in by_name.items())
 
@@ -167,6 +169,11 @@ class Checks:
     def ended_early(self) -> bool:
         """Whether who runs the world ended it: what was still to come counts neither for nor against it."""
         return self.cut and self.world.tick < self.world.periods * CONTROL_PERIOD_TICKS
+
+    @property
+    def sleep(self) -> Sleep | None:
+        """Of a board alone: who drives the run stops where it wants to look."""
+        return self.devices[0].subject.sleep
 
     def verdict(self) -> Verdict:
         """Of all checks together. Those that are always on, and are named by nobody, need no occasion."""
@@ -179,26 +186,25 @@ class Checks:
         )
 
 
-class _RobotMonitors:
-    """One robot and its monitors. `check`: whose monitor is being told something. `lost`: events that the log no longer
-    held when they were asked for.
+class _DeviceMonitors:
+    """One device and its monitors. `check`: whose monitor is being told something. `lost`: events that the log did not
+    hold any more when they were asked for.
     """
 
     def __init__(
-        self, world: World, network: Network, robot: Robot, checks: Sequence[Check], cut: bool
+        self, world: World, line: Medium, device: Device, checks: Sequence[Check], cut: bool
     ) -> None:
         self.world = world
-        self.network = network
-        self.robot = robot
-        self.place = world.robots.index(robot)
+        self.line = line
+        self.device = device
+        self.place = world.devices.index(device)
         self.checks = checks
-        end_tick, first_slot = world.periods * CONTROL_PERIOD_TICKS, network.robots[0].slot
-        self.subject = Subject(robot, network.spec.robots, end_tick, first_slot, network.downlink, cut)
+        self.subject = _subject(world, line, device, cut)
         self.monitors: list[Monitor[Any]] = []
         self.of_events: dict[str, list[Monitor[Any]]] = {}
         self.receiver: RobotReceiver | None = None
-        self.of_board, self.of_pc = Cursor(robot.log), Cursor(network.log)
-        self.faults = len(robot.board.faults)
+        self.of_board, self.of_pc = Cursor(device.log), Cursor(line.log)
+        self.faults = len(device.board.faults)
         self.waiting: list[Event] = []
         self.lost = 0
 
@@ -206,7 +212,7 @@ class _RobotMonitors:
         """Makes the monitors."""
         for check in self.checks:
             self.check = check
-            monitor = checked_monitor(check, self.subject)
+            monitor = self._monitor(check)
             self.monitors.append(monitor)
             for what in monitor.EVENTS:
                 self.of_events.setdefault(what, []).append(monitor)
@@ -214,9 +220,20 @@ class _RobotMonitors:
         self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
         self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
         if any(what in self.of_events for what in _FROM_RECEIVED):
-            self.receiver = RobotReceiver(self.network.spec.robots)
+            self.receiver = self._receiver()
             self.heard_of_board.add("received")
         self.later = not self.heard_of_board and all(monitor.LATER for monitor in self.monitors)
+
+    def _monitor(self, check: Check) -> Monitor[Any]:
+        kind = "board" if self.subject.alone else "robot"
+        if kind in check.SUBJECTS:
+            return checked_monitor(check, self.subject)
+        monitor: Monitor[Any] = Monitor(check, self.subject)
+        monitor.unseen = "it judges robots" if self.subject.alone else "it judges a board alone"
+        return monitor
+
+    def _receiver(self) -> RobotReceiver | None:
+        return RobotReceiver(self.subject.robots) if self.subject.robots else None
 
     def that_have(self, method: str) -> list[Monitor[Any]]:
         """The monitors with a method of their own; telling the others would cost time."""
@@ -224,7 +241,7 @@ class _RobotMonitors:
 
     def look(self, periods: Sequence[tuple[Period, int]]) -> None:
         """Tells the monitors of control periods, each with the first tick after it."""
-        faults = self.robot.board.faults
+        faults = self.device.board.faults
         for fault in faults[self.faults :]:
             for monitor in self.monitors:
                 self.check = monitor.check
@@ -253,7 +270,7 @@ class _RobotMonitors:
                 break
             told += 1
             if event.what in _RESTARTS:
-                if event.slot != self.robot.slot:
+                if event.slot != self.device.slot:
                     continue
                 self._restart(event.tick)
             self._tell_one(event)
@@ -267,12 +284,14 @@ class _RobotMonitors:
 
     def _restart(self, tick: int) -> None:
         if self.receiver is not None:
-            self.receiver = RobotReceiver(self.network.spec.robots)
+            self.receiver = self._receiver()
         for monitor in self.monitors:
             self.check = monitor.check
             monitor.restarted(tick)
 
     def _tell_one(self, event: Event) -> None:
+        if event.tick < self.subject.begin_tick:
+            return
         for monitor in self.of_events.get(event.what, ()):
             self.check = monitor.check
             monitor.event(event)
@@ -288,10 +307,24 @@ class _RobotMonitors:
 
     def cannot_judge(self, check: Check, error: BaseException) -> PluginError:
         """What to raise for what a check raised."""
-        named = f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
+        place = "" if self.subject.alone else f"net{self.line.index}/robot{self.device.slot}: "
+        named = f"{place}check {check.name!r} cannot judge"
         if isinstance(error, PluginError):
             return PluginError(f"{named}: {error.what}", error.remedy)
         return PluginError(f"{named}: {raised(error)}", "repair the check")
+
+
+def _subject(world: World, line: Medium, device: Device, cut: bool) -> Subject:
+    end_tick = world.scenario.end_tick
+    if isinstance(line, Network):
+        slot = line.devices[0].slot
+        return Subject(device, world.image, end_tick, line.spec.robots, slot, line.downlink, cut)
+    begin_tick = world.scenario.begin_tick
+    sleep = Sleep(device.board.cpu, begin_tick, end_tick)
+    hertz = world.clock
+    return Subject(
+        device, world.image, end_tick, cut=cut, ticks_per_second=hertz, begin_tick=begin_tick, sleep=sleep
+    )
 
 
 NO_OCCASION = "the run had no occasion for it"
@@ -304,7 +337,8 @@ def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool, reason: st
     verdict: Verdict = "failed" if failed else "passed"
     if not failed and judged == 0:
         unseen = next((one.unseen for one in monitors if one.unseen), "")
-        verdict, reason = ("not observable", unseen) if unseen else ("not judged", reason)
+        missed = next((one.missed for one in monitors if one.missed), reason)
+        verdict, reason = ("not observable", unseen) if unseen else ("not judged", missed)
     elif not failed and lost and any(monitor.EVENTS for monitor in monitors):
         verdict, reason = "not judged", LOST
     failures = (one for monitor in monitors for one in monitor.failures)

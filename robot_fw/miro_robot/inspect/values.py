@@ -13,13 +13,14 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import byte_of_bit
 
 _FIRST_SFR = 0x80
+_XRAM_BYTES = 0x10000
 
 
 def read_value(cpu: Cpu, image: Image, name: str, as_type: str = "") -> Any:
     """What the variable `name` holds now: int (pointers too), float, bool, a list for an array, a dict for a struct.
 
     `name` and `as_type` as in `find_variable`. Ports are read at their latch. Raises BadInput for a name that is not
-    there, and one in external RAM, which no board has.
+    there, and one in external RAM that the board lacks.
     """
     variable, variables = find_variable(image, name, as_type)
     return value_of(variable.type, bytes_at(cpu, image, variable), variables.fields(variable))
@@ -59,4 +60,6 @@ def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
         return bytes(cpu.peek_iram(place) for place in places)
     if space == "sfr" and address >= _FIRST_SFR and places.stop <= 0x100:
         return bytes(cpu.sfr(place) for place in places)
+    if space == "xram" and cpu.bus.HAS_XRAM and places.stop <= _XRAM_BYTES:
+        return bytes(cpu.bus.movx_read(place, 0) for place in places)
     raise BadInput(image.path, variable.name, f"is in {space}: the board has no such memory")

@@ -11,6 +11,8 @@ class Bus:
     """A CPU on an empty board. Boards override what they have wired."""
 
     NOT_STATE: tuple[str, ...] = ()
+    HAS_XRAM = False
+    """Whether all 64 KB of external RAM are there."""
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         """Latch of P0..P3 (`port` 0..3) is now `latch`; the pins follow at `tick`, S1P1 of the next cycle."""
@@ -21,6 +23,10 @@ class Bus:
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
         """/WR goes high at `tick` with `value` on P0."""
+
+    def xram(self) -> bytes:
+        """All of the external RAM; empty where the board has none."""
+        return b""
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """The firmware did what it must not (`miro_robot.faults.FaultKind`) at the instruction at `pc`."""

@@ -16,6 +16,7 @@ class XramBus(Bus):
     With `code_of` set, the RAM is also that CPU's code memory (EA low, one space for both).
     """
 
+    HAS_XRAM = True
     STATE = {"memory": "65536B"}
     NOT_STATE: tuple[str, ...] = ("code_of", "faulted", "sent", "listening")
 
@@ -53,5 +54,5 @@ class XramBus(Bus):
         for address in range(0x10000):
             self.memory[address] = content[address]
 
-    def content(self) -> bytes:
-        return bytes([self.memory[address] for address in range(0x10000)])
+    def xram(self) -> bytes:
+        return bytes(self.memory[:0x10000])

@@ -6,12 +6,13 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_robot.board_spec import BoardSpec
 from miro_sim.scenario.terminal import TerminalSpec
 
 MOST_PERIODS = 1 << 34
 """Ticks up to then fit into 64 bits, and so do the products that are made of them."""
+LATEST_BEGIN_TICK = 1 << 50
 FASTEST_BIT_TICKS = 32
 """A bit of the fastest receiver there is: mode 2 with SMOD."""
 
@@ -22,6 +23,7 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     The wire's host is the `terminal`, or who injects, or a script. `bit_ticks`: length of the host's bits, 0 for those
     of the board's receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before an instruction at
     one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first firmware fault.
+    `begin_tick`: the firmware has started up, and is judged from then on.
     Raises ValueError for values out of range.
     """
 
@@ -32,12 +34,16 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     stop_at_end: bool = False
     bit_ticks: int = 0
     terminal: TerminalSpec | None = None
+    begin_tick: int = 0
     expect: dict[str, Any] = {}
 
     def __post_init__(self) -> None:
         if self.bit_ticks and not FASTEST_BIT_TICKS <= self.bit_ticks <= self.board.crystal_hz:
             limits = f"{FASTEST_BIT_TICKS}..{self.board.crystal_hz}"
             raise ValueError(f"a bit of {self.bit_ticks} ticks is outside {limits}")
+
+        if not 0 <= self.begin_tick <= LATEST_BEGIN_TICK:
+            raise ValueError(f"begin_tick {self.begin_tick} is outside 0..{LATEST_BEGIN_TICK}")
 
     @property
     def name(self) -> str:
@@ -53,3 +59,7 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         if self.duration_ticks is None:
             return MOST_PERIODS
         return max(1, -(-self.duration_ticks // CONTROL_PERIOD_TICKS))
+
+    @property
+    def end_tick(self) -> int:
+        return NEVER_TICK if self.duration_ticks is None else self.duration_ticks

@@ -133,7 +133,7 @@ def stacks(run, end_tick, share):
 
 def assembled(source):
     """A run of a program in assembler on the bare processor."""
-    from tests.mirotwin.verify.bare.firmwares import image
+    from tests.mirotwin.verify.firmwares import image
 
     return InspectedRun(Alone(image(source), stop_on_fault=False).world)
 

@@ -16,7 +16,7 @@ from tests.alone import Alone
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.debug.runs import debugger_of, robot_run
 from tests.mirotwin.program import COMMAND
-from tests.mirotwin.verify.bare.firmwares import image
+from tests.mirotwin.verify.firmwares import image
 from tests.robot.mcs51.asm import assemble
 
 NO_MESSAGE = "mirotwin: error: --dap: the client sends no message of the protocol"

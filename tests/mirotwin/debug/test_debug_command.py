@@ -14,9 +14,10 @@ from tests.mirotwin import program
 from tests.mirotwin.conftest import hex_file, hex_text
 from tests.mirotwin.debug.runs import ASM, robot_run
 from tests.mirotwin.mutated_files import ECHO, ECHO_CDB, ECHO_MAP
-from tests.mirotwin.verify.bare.firmwares import SLEEPS
-from tests.mirotwin.verify.bare.test_case import CHECK
-from tests.mirotwin.verify.bare.test_case import case as bare_case
+from tests.mirotwin.verify.firmwares import SLEEPS
+from tests.mirotwin.verify.own_checks import source_of
+from tests.mirotwin.verify.test_board_case import CHECKS, WRONG
+from tests.mirotwin.verify.test_board_case import case as bare_case
 from tests.mutants.sdcc import needs_sdcc
 from tests.robot.mcs51.asm import assemble
 
@@ -125,18 +126,25 @@ def test_a_case_of_a_bare_processor_stands_at_its_fault_and_goes_back(mirotwin, 
     assert mirotwin.refuses("debug", file, *commands("where")).endswith("give --firmware IMAGE.ihx")
 
 
+def test_a_case_of_a_bare_processor_is_waited_in_as_a_robots_world(mirotwin, console, tmp_path):
+    firmware = hex_file(tmp_path / "sleeps.ihx", assemble(SLEEPS))
+    out = console(
+        bare_case(tmp_path, b"ab!"), "--firmware", firmware, lines=("rcontinue", "until received byte=0x62")
+    )
+    assert "received 62h" in out
+
+
 def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
     firmware, check = hex_file(tmp_path / "sleeps.ihx", assemble(SLEEPS)), tmp_path / "mine.py"
-    said = "f'{len(run.sent)} are too many'"
-    check.write_text(f"def too_long(run):\n    return {said} if len(run.sent) > 2 else None\n")
-    file = bare_case(tmp_path, b"abc", check=CHECK)
+    check.write_text(source_of("TooLong", "too_long", *WRONG))
+    file = bare_case(tmp_path, b"abc", checks=CHECKS)
     given = ("debug", file, "--firmware", firmware)
-    out = mirotwin.succeeds(*given, "--check", f"{check}:too_long", *commands("rstepi"))
+    out = mirotwin.succeeds(*given, "--expect", f"{check}:TooLong", *commands("rstepi"))
     assert out.splitlines()[1].startswith("fails as recorded: too_long: tick ")
     assert "  case: " in out
-    assert mirotwin.refuses(*given, *commands("where")).endswith("give it: --check FILE.py:too_long")
-    err = mirotwin.refuses("debug", "fig6", "--check", f"{check}:too_long", *commands("where"))
-    assert "is for a case of a bare processor" in err
+    err = mirotwin.refuses(*given, "--expect", "no_fault", *commands("where"))
+    assert "expect.too_long: there is no such check; " in err
+    assert "--expect FILE.py:CLASS takes one of your own" in err
 
 
 @pytest.mark.parametrize(

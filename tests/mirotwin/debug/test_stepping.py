@@ -24,7 +24,7 @@ from tests.mirotwin.debug import proofs
 from tests.mirotwin.debug.proofs import LIBRARY, MIX
 from tests.mirotwin.debug.runs import ASM, SECOND, debugger_of, golden_digest, robot_run
 from tests.mirotwin.shell.test_screen import Screen
-from tests.mirotwin.verify.bare.firmwares import image
+from tests.mirotwin.verify.firmwares import image
 from tests.mutants.sdcc import needs_sdcc
 from tests.naive.debugger import history, next_line
 

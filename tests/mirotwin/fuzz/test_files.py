@@ -5,7 +5,7 @@ import pytest
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.shell.outputs import OutputError
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.verify.bare.firmwares import SLEEPS
+from tests.mirotwin.verify.firmwares import SLEEPS
 from tests.robot.mcs51.asm import assemble
 
 REFUSAL = "another process is writing into the folder; wait until it has finished, or choose another folder"

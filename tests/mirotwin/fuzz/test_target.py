@@ -66,13 +66,13 @@ engine.select({engine!r})
 from miro_protocol.miro_wire import Miro
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.board_target import BoardTarget
 from mirotwin.fuzz.target import RobotTarget
-from tests.mirotwin.verify.bare.firmwares import SLEEPS, image
+from tests.mirotwin.verify.firmwares import SLEEPS, image
 
 draw = random.Random(3)
 for kind in ("bytes", "frames", "session"):
-    for target in (RobotTarget(load_hex(image_path()), kind), BareTarget(image(SLEEPS), kind, Miro())):
+    for target in (RobotTarget(load_hex(image_path()), kind), BoardTarget(image(SLEEPS), kind, Miro())):
         edges = bytearray(target.map_size)
         target.use_map(edges)
         said = (b"", b"ab!", b"a?" if kind == "bytes" else b"b", draw.randbytes(12), draw.randbytes(30))

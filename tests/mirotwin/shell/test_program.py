@@ -85,10 +85,10 @@ def test_help_and_version_load_click_and_nothing_that_is_slow(word, more):
 
 
 @pytest.mark.parametrize("words", [["replay", "--help"], ["test", "--help"], ["conform", "--list"]])
-def test_a_command_without_a_port_loads_nothing_for_ports_or_the_bare_processor(words):
+def test_a_command_without_a_port_loads_nothing_for_ports(words):
     found = loaded(*words)
     assert "mirotwin.desk.guard" in found
-    assert not {"serial", "mirotwin.desk.robot_port", "mirotwin.verify.bare"} & found.keys()
+    assert not {"serial", "mirotwin.desk.robot_port"} & found.keys()
 
 
 @pytest.mark.parametrize(("words", "ours"), [([], []), (["trace"], ["mirotwin.firmware.fw_trace"])])

@@ -12,6 +12,7 @@ from mirotwin.report.page import document
 from mirotwin.runs.test_file import collect
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
+from tests.mirotwin.verify.own_checks import source_of
 
 ROOT = Path(__file__).parents[3]
 HEAD = 'scenario = "silent"\nduration_s = 0.5\n'
@@ -273,11 +274,10 @@ def test_a_case_whose_check_has_no_occasion_any_more_fails(mirotwin, tmp_path):
     assert "    expectation not judged: acts_within_ms: the run had no occasion for it" in out.splitlines()
 
 
-@pytest.mark.parametrize("options", [(), ("--check", "mine.py:judge")])
-def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path, options):
+def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
     (tmp_path / "a.stream").write_text("# mirotwin stream 2\nx\n")
     (tmp_path / "b.stream").write_text(PASSES.replace("2\n", "2\n#: expect.no_fault = true\n", 1))
-    code, out, _ = mirotwin("test", tmp_path, *options)
+    code, out, _ = mirotwin("test", tmp_path)
     assert code == 2
     assert f"{tmp_path}/a.stream:2:1: " in out
     assert out.splitlines()[-1] == "1 cannot be run, 1 passed"
@@ -285,5 +285,6 @@ def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path, options):
 
 def test_a_check_that_no_case_names_is_refused(mirotwin, tmp_path):
     (tmp_path / "b.stream").write_text(PASSES)
-    err = mirotwin.ends(2, "test", tmp_path / "b.stream", "--check", "mine.py:judge")
-    assert "--check: no case is judged by mine.py:judge; leave it out" in err
+    (tmp_path / "mine.py").write_text(source_of("Mine", "mine", "True", "'wrong'"))
+    err = mirotwin.ends(2, "test", tmp_path / "b.stream", "--expect", tmp_path / "mine.py:Mine")
+    assert f"--expect: no case is judged by {tmp_path}/mine.py:Mine; leave it out" in err

@@ -43,7 +43,7 @@ def differences(code, checkpoints, stride=STRIDE):
         found = list(s51.cpu_differences(seen, cpu, ALIKE_AFTER_MOVX))
         if 12 * (cpu.cycles - begin) != seen.ticks:
             found.append(f"ticks ours {12 * (cpu.cycles - begin)} ucsim {seen.ticks}")
-        if bus.content()[:FAR_BYTES] != reader.raw(dump, FAR_BYTES):
+        if bus.xram()[:FAR_BYTES] != reader.raw(dump, FAR_BYTES):
             found.append("external RAM")
         if found:
             yield f"checkpoint {number}: " + ", ".join(found)

@@ -88,7 +88,7 @@ class Walker:
                 continue
             done.append(self._step(pc, moved, state))
             moved = False
-        return Walk(cpu.code, done, self.bus.content())
+        return Walk(cpu.code, done, self.bus.xram())
 
     def _scatter(self):
         """Puts the CPU into a random state at a random place; the state's offset."""

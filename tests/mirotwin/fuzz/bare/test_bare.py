@@ -2,6 +2,7 @@
 
 import re
 import sys
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,18 +13,19 @@ from hypothesis import strategies as st
 from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
 from miro_protocol.protocol import Damage, Frame, Protocol
-from mirotwin.fuzz.bare import (
+from mirotwin.fuzz.board_target import (
     CHECK_CODE,
     NEVER_SLEEPS_CODE,
     NO_FAULT_CODE,
-    BareTarget,
+    BoardTarget,
     frame_input,
-    protocol_named,
 )
-from mirotwin.verify.bare.exchange import NamedCheck
-from mirotwin.verify.bare.run import BarePlayback
+from mirotwin.fuzz.oracle import BoardOracle
+from mirotwin.fuzz.protocols import protocol_named
+from mirotwin.verify.checks.serial import Character
 from tests.exact import distribution
-from tests.mirotwin.verify.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
+from tests.mirotwin.verify.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
+from tests.mirotwin.verify.own_checks import check_of
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])
 
@@ -35,30 +37,36 @@ class Counted(Protocol, frozen=True, tag="counted"):
         return bytes([255 if number is None else number]) + body
 
 
-def check(function):
-    return NamedCheck(function.__name__, "test", function, False)
+def received(target):
+    return [Character(value, tick, bool(stop)) for value, stop, tick in target.processor.bus.heard]
+
+
+def sent(target):
+    return [Character(value, tick) for value, tick in target.processor.bus.said]
+
+
+def text(characters):
+    return bytes(one.value for one in characters)
 
 
 def test_characters_come_in_at_the_rate_of_the_receiver_and_answers_go_out():
-    target = BareTarget(image(SLEEPS), "bytes")
+    target = BoardTarget(image(SLEEPS), "bytes")
     assert target.run(b"hello") == 0
-    run = target.exchange()
-    assert run.received_bytes == run.sent_bytes == b"hello"
-    assert {later.tick - one.tick for one, later in zip(run.received, run.received[1:], strict=False)} == {
-        10 * target.line.bit_ticks
-    }
-    assert all(one.stop_good for one in run.received)
-    assert run.fault is None
-    assert run.begin_tick < run.received[0].tick < run.end_tick
+    heard = received(target)
+    assert text(heard) == text(sent(target)) == b"hello"
+    assert {later.tick - one.tick for one, later in pairwise(heard)} == {10 * target.scenario.bit_ticks}
+    assert all(one.stop_good for one in heard)
+    assert target.processor.fault() is None
+    assert target.scenario.begin_tick < heard[0].tick < target.end_tick()
 
 
 def test_firmware_that_sleeps_before_its_timer_has_overflowed_once_is_heard():
     """TL1 is not preloaded: its first overflow, which starts the serial clock, comes after the first sleep."""
     slow = SLEEPS.replace("MOV TL1,#0FDh\n", "")
     assert slow != SLEEPS
-    target = BareTarget(image(slow), "bytes")
+    target = BoardTarget(image(slow), "bytes")
     assert target.run(b"hello") == 0
-    assert target.exchange().sent_bytes == b"hello"
+    assert text(sent(target)) == b"hello"
 
 
 def test_a_wire_format_that_fails_itself_is_named():
@@ -66,7 +74,7 @@ def test_a_wire_format_that_fails_itself_is_named():
         def repair(self, body, number=None):
             return "text"
 
-    target = BareTarget(image(SLEEPS), "frames", protocol=Broken())
+    target = BoardTarget(image(SLEEPS), "frames", protocol=Broken())
     with pytest.raises(
         BadInput, match=r"--protocol: `repair` failed: TypeError: .*test_bare.py:\d+ in .*Broken.repair\)"
     ):
@@ -74,35 +82,33 @@ def test_a_wire_format_that_fails_itself_is_named():
 
 
 def test_a_run_is_over_when_firmware_sleeps_and_has_sent_all_it_had():
-    target = BareTarget(image(SLEEPS), "bytes")
+    target = BoardTarget(image(SLEEPS), "bytes")
     target.run(b"abc")
-    run = target.exchange()
-    assert len(run.sent) == 3
-    assert run.end_tick - run.sent[-1].tick < 2 * 24_000
+    assert len(sent(target)) == 3
+    assert target.end_tick() - sent(target)[-1].tick < 2 * 24_000
 
 
 def test_firmware_that_polls_for_ever_is_listened_to_for_a_while_and_nothing_is_wrong_with_it():
-    target = BareTarget(image(POLLS), "bytes")
+    target = BoardTarget(image(POLLS), "bytes")
     assert target.run(b"abc") == 0
-    run = target.exchange()
-    assert run.received_bytes == b"abc"
-    assert run.end_tick - run.received[-1].tick == pytest.approx(10 * 24_000, rel=0.05)
+    assert text(received(target)) == b"abc"
+    assert target.end_tick() - received(target)[-1].tick == pytest.approx(10 * 24_000, rel=0.05)
 
 
 @pytest.mark.parametrize("firmware", [POLLS, SLEEPS])
 def test_a_fault_is_found_with_tick_and_place(firmware):
-    target = BareTarget(image(firmware), "bytes")
+    target = BoardTarget(image(firmware), "bytes")
     assert target.run(b"ab!cd") == NO_FAULT_CODE
     found = target.failure
     assert (found.check, found.pc) == ("no_fault", 0x4000)
     assert "executed outside the loaded image at 0x4000" in found.what
-    assert found.tick > target.exchange().received[2].tick
+    assert found.tick > received(target)[2].tick
     assert target.run(b"abcd") == 0
     assert target.failure is None
 
 
 def test_firmware_that_sleeps_no_more_is_found_and_only_where_it_is_one_that_sleeps():
-    target = BareTarget(image(SLEEPS), "bytes")
+    target = BoardTarget(image(SLEEPS), "bytes")
     assert target.run(b"a?") == NEVER_SLEEPS_CODE
     assert target.failure.check == "never_sleeps"
     assert target.run(b"a") == 0
@@ -113,9 +119,9 @@ def test_firmware_that_waits_for_its_transmitter_is_awake_and_not_stuck():
     text = SLEEPS.replace(
         "answer:\nMOV SBUF,A\n", "answer:\nMOV R7,#200\nmore:\nMOV SBUF,A\nJNB TI,$\nCLR TI\nDJNZ R7,more\n"
     )
-    target = BareTarget(image(text), "bytes")
+    target = BoardTarget(image(text), "bytes")
     assert target.run(b"a") == 0
-    assert len(target.exchange().sent) == 200
+    assert len(sent(target)) == 200
 
 
 @settings(max_examples=60)
@@ -123,85 +129,82 @@ def test_firmware_that_waits_for_its_transmitter_is_awake_and_not_stuck():
 def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, firmware, data):
     target = TARGETS[kind, firmware]
     code = target.run(data)
-    run = target.exchange()
     beyond = 240 if code == NO_FAULT_CODE else 0
-    again = (
-        BarePlayback(target.image, target.line, target.script(data), run.end_tick + beyond).play().processor
-    )
-    whole = again.exchange()
-    assert whole.received == run.received
-    assert whole.sent[: len(run.sent)] == run.sent
-    assert (whole.fault, whole.memory.iram, whole.memory.xram) == (
-        run.fault,
-        run.memory.iram,
-        run.memory.xram,
-    )
+    check_of("listens", lambda monitor: None)
+    run = BoardOracle(target, {}).rerun(data, {"listens": True}, target.end_tick() + beyond)
+    (listener,) = (one for one in run.checks.monitors if one.check.name == "listens")
+    assert listener.received == received(target)
+    assert listener.sent[: len(sent(target))] == sent(target)
+    fault, memory, other = target.processor.fault(), target.subject.memory, listener.subject.memory
+    assert run.world.faults == ([] if fault is None else [fault])
+    assert (other.iram, other.xram) == (memory.iram, memory.xram)
 
 
 TARGETS = {
-    (kind, firmware): BareTarget(image(firmware), kind, Counted())
+    (kind, firmware): BoardTarget(image(firmware), kind, Counted())
     for kind in ("bytes", "frames", "session")
     for firmware in (POLLS, SLEEPS)
 }
 
 
 def test_bodies_become_frames_with_the_number_that_is_next():
-    target = BareTarget(image(SLEEPS), "frames", Counted())
+    target = BoardTarget(image(SLEEPS), "frames", Counted())
     target.run(b"\x00A\x01BC\x00D")
-    assert target.exchange().received_bytes == b"\x00A\x01BC\x02D"
+    assert text(received(target)) == b"\x00A\x01BC\x02D"
     target.run(b"\x00A")
-    assert target.exchange().received_bytes == b"\x00A"
+    assert text(received(target)) == b"\x00A"
     assert target.executions == 2
 
 
 def test_a_body_may_have_more_than_32_bytes():
-    target = BareTarget(image(SLEEPS), "frames", Counted())
+    target = BoardTarget(image(SLEEPS), "frames", Counted())
     target.run(b"\xff" + b"A" * 256)
-    assert len(target.exchange().received_bytes) == 257
+    assert len(received(target)) == 257
 
 
 def test_bad_stop_bits_pauses_and_damage_of_a_session_reach_the_receiver():
-    target = BareTarget(image(SLEEPS), "session")
+    target = BoardTarget(image(SLEEPS), "session")
     raw = b"\x09\x02abc"
     target.run(b"\x0a\x09" + raw)
-    late = target.exchange().received
+    late = received(target)
     target.run(raw)
-    soon = target.exchange().received
+    soon = received(target)
     assert [one.tick - other.tick for one, other in zip(late, soon, strict=True)] == pytest.approx(
         [24_000] * 3, abs=72
     )
     target.run(b"\x0e\x01" + b"\x07\x02abc")
-    assert [one.stop_good for one in target.exchange().received] == [True, False, True]
+    assert [one.stop_good for one in received(target)] == [True, False, True]
     target.run(b"\x0c\x01\x20" + b"\x07\x02abc")
-    assert target.exchange().received_bytes == b"aBc"
+    assert text(received(target)) == b"aBc"
 
 
 def test_without_a_protocol_bodies_are_sent_as_they_are_and_any_protocol_describes_them():
-    bare = BareTarget(image(SLEEPS), "frames")
+    bare = BoardTarget(image(SLEEPS), "frames")
     bare.run(frame_input(b"xyz", "frames"))
-    assert bare.exchange().received_bytes == b"xyz"
-    ours = BareTarget(image(SLEEPS), "session", Miro())
+    assert text(received(bare)) == b"xyz"
+    ours = BoardTarget(image(SLEEPS), "session", Miro())
     line = ours.describe(frame_input(bytes(13), "session"))
     assert line.endswith("# frame " + " ".join(["00"] * 13))
     assert ": 55 55 55 55 55 ff 2d d4 " in line
 
 
 def test_seeds_are_the_samples_one_by_one_and_together():
-    target = BareTarget(image(SLEEPS), "frames", Miro())
+    target = BoardTarget(image(SLEEPS), "frames", Miro())
     seeds = target.seeds()
     assert len(seeds) == len(Miro().samples()) + 1
     target.run(seeds[-1])
     assert target.program.frames == len(Miro().samples())
-    plain = BareTarget(image(SLEEPS), "bytes", Miro()).seeds()[0]
+    plain = BoardTarget(image(SLEEPS), "bytes", Miro()).seeds()[0]
     assert plain == Miro().encode(Miro().samples()[0])
 
 
 def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
-    def keeps_the_last(run):
-        last = run.received[-1].value if run.received else 0
-        return None if run.memory.xram[0x1234] == last < 0x80 else f"the last one is {last}"
+    def keeps_the_last(monitor):
+        last = monitor.received[-1].value if monitor.received else 0
+        kept = monitor.subject.memory.xram[0x1234]
+        return None if kept == last < 0x80 else f"the last one is {last}"
 
-    target = BareTarget(image(SLEEPS), "bytes", check=check(keeps_the_last))
+    target = BoardTarget(image(SLEEPS), "bytes", checks=[check_of("keeps_the_last", keeps_the_last)])
     assert target.run(b"abc") == 0
     assert target.run(b"ab\xff") == CHECK_CODE
     assert target.failure.what == "the last one is 255"
@@ -211,12 +214,12 @@ def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: BareTarget(image(DEAF)), "has not turned its serial receiver on 200 ms after power-on"),
-        (lambda: BareTarget(image(FAULTY)), "comes up with a fault: firmware executed outside"),
-        (lambda: BareTarget(image(POLLS), baud=3), "--baud: 3 is outside 50.."),
-        (lambda: BareTarget(image(POLLS), baud=10_000_000), "is outside 50..750000 at 24000000 Hz"),
-        (lambda: BareTarget(image(POLLS), crystal_hz=1), "--crystal: crystal 1 Hz is outside"),
-        (lambda: BareTarget(image(POLLS), "words"), "'words' is no class of inputs"),
+        (lambda: BoardTarget(image(DEAF)), "has not turned its serial receiver on 200 ms after power-on"),
+        (lambda: BoardTarget(image(FAULTY)), "comes up with a fault: firmware executed outside"),
+        (lambda: BoardTarget(image(POLLS), baud=3), "--baud: 3 is outside 50.."),
+        (lambda: BoardTarget(image(POLLS), baud=10_000_000), "is outside 50..750000 at 24000000 Hz"),
+        (lambda: BoardTarget(image(POLLS), crystal_hz=1), "--crystal: crystal 1 Hz is outside"),
+        (lambda: BoardTarget(image(POLLS), "words"), "'words' is no class of inputs"),
     ],
 )
 def test_what_cannot_be_fuzzed_is_refused_with_the_reason(make, said):
@@ -225,8 +228,8 @@ def test_what_cannot_be_fuzzed_is_refused_with_the_reason(make, said):
 
 
 def test_a_given_rate_is_taken_instead_of_the_receivers():
-    target = BareTarget(image(SERIAL + "SJMP $"), "bytes", crystal_hz=11_059_200, baud=9600)
-    assert target.line.bit_ticks == 1152
+    target = BoardTarget(image(SERIAL + "SJMP $"), "bytes", crystal_hz=11_059_200, baud=9600)
+    assert target.scenario.bit_ticks == 1152
 
 
 # Wire formats by name and parameters, ours and those of distributions
@@ -326,14 +329,14 @@ LJMP 4000h
 @pytest.mark.parametrize(("after_ms", "code"), [(None, 0), (1, 0), (200, 0), (300, NO_FAULT_CODE)])
 def test_a_run_goes_on_after_its_last_character_as_long_as_it_was_told(after_ms, code):
     after_ticks = None if after_ms is None else after_ms * 24_000
-    target = BareTarget(image(LATE), "bytes", after_ticks=after_ticks)
+    target = BoardTarget(image(LATE), "bytes", after_ticks=after_ticks)
     assert target.run(b"a") == code
     ms = (target.end_tick() - target.harness.end_tick) / 24_000
     assert code or ms == pytest.approx(10 if after_ms is None else after_ms, abs=0.1)
 
 
 def test_firmware_that_sleeps_is_watched_that_long_too():
-    target = BareTarget(image(SLEEPS), "bytes", after_ticks=24_000 * 70)
+    target = BoardTarget(image(SLEEPS), "bytes", after_ticks=24_000 * 70)
     assert target.run(b"a") == 0
     assert target.end_tick() - target.harness.end_tick >= 24_000 * 70
 
@@ -347,8 +350,11 @@ CHECK, FORMAT = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 def test_its_check_says_what_is_wrong():
     found = {}
     exec(CHECK, found)
-    levels = [found["level_is_kept"](SimpleNamespace(memory={"level": level})) for level in (100, 101)]
-    assert levels == [None, "the level is 101"]
+    for level, failures in ((100, []), (101, ["wanted at most 100, found 101"])):
+        place = {"network": 0, "slot": 0, "ticks_per_second": 24_000_000, "alone": True}
+        monitor = found["LevelIsKept"]().monitor(SimpleNamespace(memory={"level": level}, **place))
+        monitor.end(1000)
+        assert [one.what for one in monitor.failures] == failures
 
 
 def test_its_format_keeps_the_laws_of_the_interface():

@@ -5,13 +5,11 @@ import shlex
 import pytest
 
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.verify.bare.firmwares import FAULTY, POLLS, SLEEPS
+from tests.mirotwin.verify.firmwares import FAULTY, POLLS, SLEEPS
+from tests.mirotwin.verify.own_checks import source_of
 from tests.robot.mcs51.asm import assemble
 
-CHECK = """
-def never_q(run):
-    return "it heard a q" if b"q" in run.received_bytes else None
-"""
+CHECK = source_of("NeverQ", "never_q", "b'q' in self.received_bytes", "'it heard a q'")
 
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
@@ -28,7 +26,7 @@ def hexes(tmp_path):
 def check(tmp_path):
     path = tmp_path / "mycheck.py"
     path.write_text(CHECK)
-    return f"{path}:never_q"
+    return f"{path}:NeverQ"
 
 
 def corpus(tmp_path, *inputs):
@@ -77,32 +75,32 @@ def test_a_port_of_9_bits_is_reported_as_the_inputs_are_none_of_its_characters(m
 @pytest.mark.slow
 def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes, check, tmp_path):
     inputs = corpus(tmp_path, b"quiet")
-    for number, more in enumerate(((), ("--check-all",))):
+    for number, more in enumerate(((), ("--expect-all",))):
         out_folder = tmp_path / f"out{number}"
-        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--out", str(out_folder), *more)
+        options = ("--input", "bytes", "--corpus", inputs, "--expect", check, "--out", str(out_folder), *more)
         code, out, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 1
         assert "it heard a q" in err
         case = next((out_folder / "crashes").glob("never_q-*.stream"))
         again = next(line for line in out.splitlines() if line.startswith(f"    mirotwin replay {case}"))
-        assert again.endswith(f" --check {check}")
+        assert again.endswith(f" --expect {check}")
         _, out, err = mirotwin(*shlex.split(again)[1:])
         assert err.startswith("mirotwin: fails as recorded: never_q")
-        debug = f"mirotwin debug {case} --firmware {hexes['polls']} --check {check}"
+        debug = f"mirotwin debug {case} --firmware {hexes['polls']} --expect {check}"
         assert out.splitlines() == [debug]
-    code, out, _ = mirotwin("test", case, "--firmware", hexes["polls"], "--check", check)
+    code, out, _ = mirotwin("test", case, "--firmware", hexes["polls"], "--expect", check)
     assert (code, "FAILED" in out) == (1, True)
 
 
 def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines, hexes, check, tmp_path):
-    (tmp_path / "mycheck.py").write_text("def never_q(run):\n    return run.nothing\n")
+    (tmp_path / "mycheck.py").write_text(CHECK.replace("'it heard a q'", "self.nothing"))
     inputs = corpus(tmp_path, b"quiet")
-    for more in ((), ("--check-all",)):
-        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--force", *more)
+    for more in ((), ("--expect-all",)):
+        options = ("--input", "bytes", "--corpus", inputs, "--expect", check, "--force", *more)
         code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 2
-        said = "raised AttributeError: 'Exchange' object has no attribute 'nothing'"
-        assert f"{said} ({tmp_path}/mycheck.py:2 in never_q)" in err
+        said = "check 'never_q' cannot judge: AttributeError: 'OwnMonitor' object has no attribute 'nothing'"
+        assert f"{said} ({tmp_path}/mycheck.py:18 in OwnMonitor.end)" in err
 
 
 @pytest.mark.parametrize(
@@ -112,9 +110,9 @@ def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines,
         (("sleeps", "--protocol", "miro"), "--protocol needs --bare."),
         (("sleeps", "--crystal", "12000000"), "--crystal needs --bare."),
         (("sleeps", "--bare", "--slot", "1"), "--slot does not go with --bare."),
-        (("sleeps", "--bare", "--check-all"), "--check-all needs --check."),
+        (("sleeps", "--bare", "--expect-all"), "--expect-all needs --expect."),
         (("sleeps", "--bare", "--protocol", "mire"), "did you mean miro?"),
-        (("sleeps", "--bare", "--check", "nothing"), "there is no check 'nothing' for a bare processor"),
+        (("sleeps", "--bare", "--expect", "nothing"), "--expect nothing=true: there is no such check"),
         (("sleeps", "--bare", "--baud", "100000000"), "--baud: 100000000 is outside 50..750000"),
         (("faulty", "--bare"), "comes up with a fault"),
     ],
@@ -134,7 +132,9 @@ def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines
     for arguments, said in (
         (("replay", case), needs),
         (("replay", case, *firmware, "--seed", "1"), "--seed: is not for a case of a bare"),
-        (("fw", "trace", case, *firmware), "is for a bare processor and not for the robot"),
+        (("replay", case, *firmware, "--set", "duration_s=1"), "is not for a case of a bare"),
+        (("replay", case, *firmware, "--port", "/dev/null"), "--port: is not for a case of a bare"),
+        (("report", case, "--firmware", hexes["sleeps"]), "is for a board alone, which has no robot to show"),
     ):
         code, _, err = mirotwin(*arguments)
         assert (code, said in err) == (2, True), err

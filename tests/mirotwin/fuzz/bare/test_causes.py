@@ -5,14 +5,14 @@ import random
 import pytest
 
 from miro_robot.image.debug_info import Sources
-from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.board_target import BoardTarget
 from mirotwin.fuzz.cause import Cause
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.input_coverage import InputCoverage
-from mirotwin.fuzz.oracle import BareProcessorOracle
+from mirotwin.fuzz.oracle import BoardOracle
 from mirotwin.fuzz.triage import Triage
-from mirotwin.verify.bare.exchange import NamedCheck
-from tests.mirotwin.verify.bare.firmwares import SERIAL, image
+from tests.mirotwin.verify.firmwares import SERIAL, image
+from tests.mirotwin.verify.own_checks import check_of
 from tests.robot.mcs51.asm import assemble
 
 OVERFLOWS = f"""
@@ -51,10 +51,10 @@ RNG = random.Random(16)
 LONG = [bytes(RNG.randrange(0x30, 0x100) for _ in range(RNG.randrange(11, 24))) + b"." for _ in range(40)]
 
 
-def triage_of(text, tmp_path, check=None):
-    target = BareTarget(image(text), "bytes", check=check)
-    reached = InputCoverage(image(text), lambda: BareTarget(image(text), "bytes", check=check))
-    oracle = BareProcessorOracle(target, check)
+def triage_of(text, tmp_path, checks=()):
+    target = BoardTarget(image(text), "bytes", checks=checks)
+    reached = InputCoverage(image(text), lambda: BoardTarget(image(text), "bytes", checks=checks))
+    oracle = BoardOracle(target, {})
     return Triage(reached, oracle, CampaignFolder(tmp_path / "out"), Sources([]), minimise_s=1.0)
 
 
@@ -120,13 +120,13 @@ def test_a_fault_that_nothing_went_before_is_its_own_cause(tmp_path):
 
 @pytest.mark.parametrize("said", ["the level is {}", "the level is 0x{:x}", "{}.25 ms late"])
 def test_what_a_check_says_tells_crashes_apart_without_its_numbers(tmp_path, said):
-    def judge(run):
-        heard = run.received_bytes
+    def judge(monitor):
+        heard = monitor.received_bytes
         if b"q" in heard:
             return said.format(len(heard))
         return "no q, but an x" if b"x" in heard else None
 
-    triage = triage_of(OVERFLOWS, tmp_path, NamedCheck("judge", "test", judge, False))
+    triage = triage_of(OVERFLOWS, tmp_path, [check_of("judge", judge)])
     for data in (b"q.", b"aq.", b"aaq.", b"x.", b"ax."):
         assert triage.target.run(data)
         triage.take(data)

@@ -249,7 +249,7 @@ network = [{ host = "silent", robot = [{ reference.kind = "line" }] }]
 """
     world = World(parse(text, "pushed"), 0, own_image())
     checks = Checks(world)
-    (watched,) = checks.robots
+    (watched,) = checks.devices
     (monitor,) = [one for one in watched.monitors if one.check.name == "wheels_within_m_s"]
     record = world.step().robots[0]
     for tick, v_m_s, w_rad_s in ((0, 0.5, 0.0), (MS, 0.5, 2.0), (2 * MS, 0.5, 2.0), (3 * MS, -0.53, 0.0)):

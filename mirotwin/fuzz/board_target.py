@@ -1,4 +1,4 @@
-"""A target that is any 8051 firmware with a serial port, on a bare processor.
+"""A target that is any 8051 firmware with a serial port, on a processor with 64 KB of RAM and nothing else.
 
 Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
 for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
@@ -6,83 +6,46 @@ for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
 
 from __future__ import annotations
 
-import re
-import tomllib
-from collections.abc import Callable
-from typing import Any, TypeVar
-
-import msgspec
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import Any
 
 from miro_exact.bad_input import BadInput
-from miro_exact.plugins import PluginError, Registry
-from miro_exact.raised import at_place, defined_at, raised, raised_at
-from miro_exact.raised import described as described_error
+from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
+from miro_exact.raised import raised
 from miro_protocol.actions import ScriptItem
-from miro_protocol.protocol import Damage, Frame, Protocol
-from miro_protocol.toml_text import TomlError, struct_of
+from miro_protocol.protocol import Protocol
 from miro_protocol.transmission import Transmission
-from miro_robot.board_spec import CRYSTAL_HZ
+from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.world.events import Event
+from mirotwin.fuzz.processor import BOOT_MS, Processor, bit_ticks_of
+from mirotwin.fuzz.protocols import asked, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.target import Target, TargetFailure, described
+from mirotwin.fuzz.target import NEVER_SLEEPS, Target, TargetFailure, described
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.bare.exchange import (
-    NEVER_SLEEPS,
-    NO_FAULT,
-    Exchange,
-    NamedCheck,
-    check_named,
-)
-from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
+from mirotwin.verify.checks.interface import Check, Failure, Subject, checked_monitor
+from mirotwin.verify.checks.serial import Character, SerialMonitor
+from mirotwin.verify.expectations import checks_alone
 
-OPTION = "--protocol"
-PROTOCOLS: Registry[Protocol] = Registry(
-    "mirotwin.protocols",
-    word="protocol",
-    key="protocol",
-    base="miro_protocol.protocol:Protocol",
-    own={"miro": "miro_protocol.miro_wire:Miro"},
-)
-
-
-def protocol_named(text: str) -> Protocol:
-    """The protocol that `NAME` or `FILE.py:CLASS` means, with parameters behind it: `:KEY=VALUE,KEY=VALUE`, as in TOML.
-
-    A file is run: `text` must come from the command line. Raises BadInput.
-    """
-    found, name, parameters = _class_in_file(text) or _installed(text)
-    try:
-        given = tomllib.loads(f"given = {{{parameters}}}")["given"]
-    except tomllib.TOMLDecodeError:
-        form = "write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"
-        raise BadInput("", OPTION, f"{parameters!r} are no parameters", form) from None
-    try:
-        return struct_of(given, found)
-    except TomlError as error:
-        keys = ", ".join(field.name for field in msgspec.structs.fields(found)) or "no parameters"
-        raise BadInput("", OPTION, f"{text}: {error.place}: {error.what}", f"{name} has {keys}") from None
-    except (Exception, SystemExit) as error:  # from the protocol's own check of its parameters
-        what = f"{text}: cannot check its parameters: {raised(error)}"
-        raise BadInput("", OPTION, what, "repair the protocol") from error
-
-
+NO_FAULT = "no_fault"
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer triage."""
-_BITS = 10
+_SEEN = ("received", "transmitted")
+_BY_TICK = attrgetter("tick")
 
-T = TypeVar("T")
 
+class BoardTarget(Target):
+    """`image` on a processor alone, up and in silence. `scenario`: the board on its wire.
 
-class BareTarget(Target):
-    """`image` on a bare processor, up and in silence.
-
-    `protocol` makes frames of bodies; without it they are sent as they are. `check` judges each run, `baud` 0 takes the
+    `protocol` makes frames of bodies; without it they are sent as they are. `checks` judge each run, `baud` 0 takes the
     rate of the receiver, `after_ticks` is how long a run goes on after its last character. `run(data)` returns 0 or
-    what `failure` is: a fault, no sleep, what the check says. Raises BadInput where the firmware does not come up.
+    what `failure` is: a fault, no sleep, what a check says. Raises BadInput where the firmware does not come up.
     """
 
     def __init__(
@@ -90,7 +53,7 @@ class BareTarget(Target):
         image: Image,
         input: str = "session",
         protocol: Protocol | None = None,
-        check: NamedCheck | None = None,
+        checks: Sequence[Check] = (),
         crystal_hz: int = CRYSTAL_HZ,
         baud: int = 0,
         boot_ms: int = BOOT_MS,
@@ -99,50 +62,83 @@ class BareTarget(Target):
         if input not in INPUTS:
             raise BadInput("", "--input", f"{input!r} is no class of inputs", f"use {', '.join(INPUTS)}")
         self.protocol = protocol
-        self.check = check
-        self.processor = BareProcessor(image)
+        self.processor = Processor(image)
         try:
-            BareLine(crystal_hz)
+            board = BoardSpec(crystal_hz=crystal_hz, bound_stack=False)
         except ValueError as error:
             raise BadInput("", "--crystal", str(error)) from None
         self.processor.start_up(crystal_hz, boot_ms)
         bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
-        self.line = BareLine(crystal_hz, bit_ticks, self.processor.begin_tick)
+        begin_tick = CYCLE_TICKS * self.processor.cpu.cycles
+        self.scenario = BoardScenario(board=board, bit_ticks=bit_ticks, begin_tick=begin_tick)
+        self.subject = Subject(
+            self.processor, image, begin_tick, ticks_per_second=crystal_hz, begin_tick=begin_tick
+        )
+        self.checks = checks
+        for check in checks:
+            _refuse_unseen(check, self.subject)
         self.oracle = BareOracle(self.processor.bus, self.processor.cpu)
         after = -1 if after_ticks is None else after_ticks
         harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks, after_ticks=after)
         program = Program(
             INPUTS.index(input),
             repair=lambda body: self._repaired(body, self.program.frames),
-            character_ticks=_BITS * bit_ticks,
+            character_ticks=CHARACTER_BITS * bit_ticks,
         )
         super().__init__(image, harness, program)
         self.code = 0
-        self._wrong = ""
+        self._wrong: Failure | None = None
 
     def _repaired(self, body: bytes, number: int | None = None) -> bytes:
         """The characters of a frame. Raises BadInput where the wire format fails itself."""
         protocol = self.protocol
         if protocol is None:
             return body
-        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
+        return asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
         self.code = NO_FAULT_CODE if self.oracle.code else 0
         if ended == AWAKE and not self.code:
             self.code = self._awake()
-        if self.check is not None and not self.code:
-            self._judge(self.check)
+        if self.checks and not self.code:
+            self._wrong = self._judged()
+            self.code = CHECK_CODE if self._wrong else 0
         return self.code
 
-    def _judge(self, check: NamedCheck) -> None:
-        """What the check says. That it fails itself is a failure too: it is told when the crash is confirmed."""
-        try:
-            self._wrong = check.judge(self.exchange()) or ""
-        except BadInput as error:
-            self._wrong = str(error)
-        self.code = CHECK_CODE if self._wrong else 0
+    def _judged(self) -> Failure | None:
+        """What the checks say. That one raises is a failure too: the error comes when the crash is confirmed."""
+        tick = self.end_tick()
+        for check in self.checks:
+            try:
+                monitor: Any = check.monitor(self.subject)
+                self._feed(monitor)
+                monitor.end(tick)
+            except (Exception, SystemExit) as error:
+                return Failure(check.name, 0, 0, tick, "", raised(error))
+            if monitor.failures:
+                return monitor.failures[0]  # type: ignore[no-any-return]
+        return None
+
+    def _feed(self, monitor: Any) -> None:
+        """Tells a monitor what the serial port took and gave in the last run, and of the last reset."""
+        bus = self.processor.bus
+        if (
+            type(monitor).event is SerialMonitor.event
+        ):  # without events, which take longer to make than a short run
+            monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
+            monitor.sent = [Character(value, tick) for value, tick in bus.said]
+        elif monitor.EVENTS:
+            events = [
+                Event(tick=tick, what="received", slot=0, value=value, good_stop=bool(stop))
+                for value, stop, tick in bus.heard
+            ]
+            events += [Event(tick=tick, what="transmitted", slot=0, value=value) for value, tick in bus.said]
+            for event in sorted(events, key=_BY_TICK):
+                if event.what in monitor.EVENTS:
+                    monitor.event(event)
+        if bus.reset_tick >= 0:
+            monitor.restarted(bus.reset_tick)
 
     def _awake(self) -> int:
         """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
@@ -159,10 +155,6 @@ class BareTarget(Target):
                 return 0
         return NEVER_SLEEPS_CODE
 
-    def exchange(self) -> Exchange:
-        """What went in and out in the last run; its memory is good until the next one."""
-        return self.processor.exchange()
-
     def end_tick(self) -> int:
         return 12 * self.cpu.cycles
 
@@ -175,8 +167,8 @@ class BareTarget(Target):
             where = self.image.symbols.name_at(self.cpu.pc)
             what = f"awake long after the last character{f', in {where}' if where else ''}"
             return TargetFailure(NEVER_SLEEPS, self.end_tick(), 0, what)
-        if self.code == CHECK_CODE and self.check is not None:
-            return TargetFailure(self.check.name, self.end_tick(), 0, self._wrong)
+        if self.code == CHECK_CODE and self._wrong is not None:
+            return TargetFailure(self._wrong.check, self.end_tick(), 0, self._wrong.what)
         return None
 
     def describe(self, data: bytes) -> str:
@@ -186,7 +178,7 @@ class BareTarget(Target):
         protocol = self.protocol
         if protocol is None or not isinstance(one, Transmission):
             return described(one)
-        said = _asked(protocol.decode, lambda: [_shown(part) for part in protocol.decode(one.data)])
+        said = asked(protocol.decode, lambda: [shown(part) for part in protocol.decode(one.data)])
         return f"{described(one)}  # {'; '.join(said)}"
 
     def seeds(self) -> list[bytes]:
@@ -194,7 +186,7 @@ class BareTarget(Target):
         protocol = self.protocol
         samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
         if protocol is not None:
-            samples = _asked(
+            samples = asked(
                 protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples())
             )
         if self.input == "bytes":
@@ -204,39 +196,15 @@ class BareTarget(Target):
         return list(dict.fromkeys([*each, b"".join(each)]))
 
     def __repr__(self) -> str:
-        return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"
+        return f"BoardTarget({self.image.path}, input={self.input!r}, {self.scenario})"
 
 
-def _installed(text: str) -> tuple[type[Protocol], str, str]:
-    """The class, its name and the parameters of `NAME:PARAMETERS`."""
-    name, _, parameters = text.partition(":")
-    try:
-        return PROTOCOLS.find(name), name, parameters
-    except PluginError as error:
-        raise BadInput("", OPTION, error.what, error.remedy) from error
-
-
-def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:
-    """The same of `FILE.py:CLASS:PARAMETERS`; None for another text."""
-    match = re.match(r"(.+?\.py)(?::([^:]*))?(?::(.*))?$", text, re.DOTALL)
-    if match is None:
-        return None
-    path, name, parameters = match[1], match[2] or "", match[3] or ""
-    return PROTOCOLS.of_file(path, name, OPTION), name, parameters
-
-
-def _asked(method: Callable[..., object], call: Callable[[], T]) -> T:
-    """What a protocol's method gives. Raises BadInput where it fails itself."""
-    try:
-        return call()
-    except (Exception, SystemExit) as error:
-        name = method.__name__
-        what = at_place(f"`{name}` failed: {described_error(error)}", raised_at(error) or defined_at(method))
-        raise BadInput("", "--protocol", what, f"let `{name}` do what miro_protocol.protocol says") from error
-
-
-def _shown(part: Frame | Damage) -> str:
-    return f"damage ({part.reason})" if isinstance(part, Damage) else f"frame {part.body.hex(' ')}"
+def _refuse_unseen(check: Check, subject: Subject) -> None:
+    """Raises BadInput for a check that wants to see more than characters and memories."""
+    unseen = [what for what in checked_monitor(check, subject).EVENTS if what not in _SEEN]
+    if unseen:
+        what = f"{check.name} judges by {', '.join(unseen)}, which only a whole run shows"
+        raise BadInput("", "--expect-all", what, "leave it out: each input that is new is judged so")
 
 
 def frame_input(body: bytes, input: str) -> bytes:
@@ -245,13 +213,13 @@ def frame_input(body: bytes, input: str) -> bytes:
     return (b"\x07" if input == "session" else b"") + bytes([len(kept) - 1]) + kept
 
 
-def bare_target(spec: TargetSpec) -> BareTarget:
+def board_target(spec: TargetSpec) -> BoardTarget:
     """The target of a specification; `parameters` may hold `crystal_hz` and `boot_ms`. Raises BadInput."""
-    return BareTarget(
+    return BoardTarget(
         load_firmware(spec.image, SPACE_BYTES, named=False),
         spec.input,
         protocol_named(spec.protocol) if spec.protocol else None,
-        check_named(spec.check) if spec.check else None,
+        checks_alone(spec.expected),
         baud=spec.baud,
         after_ticks=spec.after_ticks,
         **spec.parameters,

@@ -1,0 +1,110 @@
+"""A board alone, as the header of a stream file says it: the empty board, its wire, and what is played to it.
+
+# mirotwin stream 2
+#: firmware_sha256 = ".."
+#: verdict = "no_fault: tick 368772 (33.346 ms): firmware executed outside the loaded image at 0x03c0, .."
+#: end_tick = 368772
+#:
+#: [bare]
+#: crystal_hz = 11059200
+#: bit_ticks = 576
+#: begin_tick = 9840
+#:
+#: [expect]
+#: no_fault = true
+11040 > c0 03 c0 ..
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CHARACTER_BITS
+from miro_protocol.actions import ScriptItem
+from miro_protocol.stream import StreamFile
+from miro_protocol.toml_text import TomlError, struct_of
+from miro_protocol.transmission import Transmission
+from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
+from miro_robot.image import Image
+from miro_sim.scenario.board import BoardScenario
+from mirotwin.runs.spec import RunSpec
+
+AHEAD_TICKS = 240
+"""The firmware counts as started up so long before the first character at the latest."""
+AFTER_MS = 50
+"""So long after the last character a stream that names no end ends: firmware may answer meanwhile, or do wrong."""
+
+
+class BoardHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table `[bare]`. `begin_tick`: the firmware has started up, and is judged from then on."""
+
+    crystal_hz: int = CRYSTAL_HZ
+    bit_ticks: int = 0
+    begin_tick: int = 0
+
+
+def board_of_stream(given: StreamFile) -> BoardScenario:
+    """The board and its wire. Raises BadInput."""
+    place = "header: bare"
+    try:
+        header = struct_of(given.header.bare or {}, BoardHeader)
+        board = BoardSpec(crystal_hz=header.crystal_hz, bound_stack=False)
+        scenario = BoardScenario(board=board, bit_ticks=header.bit_ticks, begin_tick=header.begin_tick)
+    except TomlError as error:
+        raise BadInput(given.source, f"{place}.{error.place}", error.what, error.remedy) from None
+    except ValueError as error:
+        raise BadInput(given.source, place, str(error)) from None
+    if not scenario.bit_ticks:
+        raise BadInput(given.source, place, "says no bit_ticks", "give the length of a bit")
+    return scenario
+
+
+def end_of_board(script: Sequence[ScriptItem], scenario: BoardScenario) -> int:
+    """Where a stream ends that does not say it."""
+    ends = [one.tick + _duration(one, scenario) for one in script]
+    return max(ends, default=scenario.begin_tick) + after_ticks(scenario)
+
+
+def after_ticks(scenario: BoardScenario) -> int:
+    return scenario.clock * AFTER_MS // 1000
+
+
+def check_board_script(script: Sequence[ScriptItem], path: str, scenario: BoardScenario) -> None:
+    """Raises BadInput for characters that overlap, and for what is done to other devices."""
+    free_tick = 0
+    for one in script:
+        if one.network or getattr(one, "slot", 0):
+            raise BadInput(path, f"tick {one.tick}", "is not for the board, which is alone on network 0")
+        if not isinstance(one, Transmission):
+            continue
+        if one.tick < free_tick:
+            what = f"the characters at tick {one.tick} begin before those before them end"
+            raise BadInput(path, "", what, f"leave {free_tick - one.tick} ticks between them")
+        free_tick = one.tick + _duration(one, scenario)
+
+
+def board_spec(
+    image: Image,
+    scenario: BoardScenario,
+    script: Sequence[ScriptItem],
+    expect: Mapping[str, Any],
+    until_tick: int,
+    origin: str = "",
+) -> RunSpec:
+    """The board of `scenario` from power-on to `until_tick`. `expect`: checks by name, as in `[expect]`."""
+    begins = [max(0, one.tick - AHEAD_TICKS) for one in script]
+    scenario = msgspec.structs.replace(
+        scenario,
+        begin_tick=min([scenario.begin_tick, *begins]),
+        duration_ticks=until_tick,
+        expect=dict(expect),
+    )
+    return RunSpec(scenario=scenario, image=image, script=script, until_tick=until_tick, origin=origin)
+
+
+def _duration(one: ScriptItem, scenario: BoardScenario) -> int:
+    return CHARACTER_BITS * scenario.bit_ticks * len(one.data) if isinstance(one, Transmission) else 0
