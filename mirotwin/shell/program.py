@@ -41,7 +41,8 @@ def traceback_text(error: BaseException) -> str:
 
 def show_traceback(error: BaseException) -> None:
     """Writes it to stderr, if it is wanted."""
-    sys.stderr.write(traceback_text(error))
+    if text := traceback_text(error):  # not nothing: stderr may be full
+        sys.stderr.write(text)
 
 
 class Terminated(BaseException):

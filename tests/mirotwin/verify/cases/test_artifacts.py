@@ -7,7 +7,7 @@ from miro_robot.image import load_hex
 from miro_robot.image.debug_info import DebugInfo
 from miro_robot.image.variables import variables_of
 from mirotwin.shell.outputs import OutputError
-from mirotwin.verify.cases.artifacts import FIRMWARE, clear, leave, leave_image, nothing_left
+from mirotwin.verify.cases.artifacts import FIRMWARE, clear, leave, leave_image, nothing_left, stream_files
 
 
 def copied(folder, listing):
@@ -47,7 +47,7 @@ def test_where_the_image_cannot_be_left_its_case_is_not_either(tmp_path):
     (folder / FIRMWARE).mkdir(parents=True)
     image = copied(tmp_path / "own", "mine.rst")
     with pytest.raises(OutputError) as caught:
-        leave(folder, "report", "case", None, image, {"scenario.toml": "a scenario"})
+        leave(folder, "report", {"scenario.toml": b"a scenario", **stream_files("case", "", image)})
     assert [path.name for path in folder.iterdir()] == [FIRMWARE]
     assert nothing_left(folder, caught.value) == (
         f"nothing could be left in {folder}: {folder / FIRMWARE}: is a folder where a file is to be written;"
