@@ -30,8 +30,9 @@ class PortRig:
         self.recording = BytesIO()
         self.opened = ExitStack()
         scenario = self.spec.robot_scenario
+        source = twin_source(scenario, 0, self.spec.image)  # it may fail: not while the port is open
         self.machine = self.opened.enter_context(port_for_test(desk, scenario, name, self.notes.append))
-        self.machine.record(self.recording, twin_source(scenario, 0, self.spec.image))
+        self.machine.record(self.recording, source)
         self.links = [Link(self.machine)]
 
     @property
