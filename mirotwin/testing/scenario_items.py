@@ -12,7 +12,8 @@ import pytest
 from mirotwin.runs.result import Result
 from mirotwin.runs.test_file import stem_of
 from mirotwin.testing.session_options import desk_of, number_option, path_option
-from mirotwin.testing.test_command import TestOptions, run_scenario
+from mirotwin.testing.test_files import run_file
+from mirotwin.testing.test_options import TestOptions
 
 
 class ScenarioFailed(Exception):
@@ -46,7 +47,7 @@ class ScenarioItem(pytest.Item):
             desk=desk_of(self.config),
         )
         try:
-            result = run_scenario(options, file)
+            result = run_file(options, file)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
         self._note(result)

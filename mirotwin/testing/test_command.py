@@ -1,9 +1,4 @@
-"""`mirotwin test`: scenario files and cases as tests, for people and machines without pytest.
-
-A case passes where the check that failed passes, as it should on firmware that was mended. Where it had no occasion to
-judge, the case is not judged: firmware that does nothing at all has mended nothing. A stream that expects nothing is
-judged by the checks that are always on.
-"""
+"""`mirotwin test`: scenario files and cases as tests, for people and machines without pytest."""
 
 from __future__ import annotations
 
@@ -11,100 +6,22 @@ import shlex
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import Annotated
-
-from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
-from mirotwin.desk.guard import DeskOptions
-from mirotwin.runs.job import load_stream
-from mirotwin.runs.result import Line, Result
-from mirotwin.runs.test_file import KINDS, cannot_be_run, collect, run_test, stem_of
-from mirotwin.shell.command import Argument, Option, Options, command_of
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.runs.result import Result
+from mirotwin.runs.test_file import KINDS, collect, stem_of
+from mirotwin.shell.command import command_of
 from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.outputs import check_file, whole_file
 from mirotwin.shell.program import show_line, show_traceback, tell_notes
 from mirotwin.shell.verdicts import VERDICTS, exit_code
+from mirotwin.testing.test_files import run_file
+from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
-from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.interface import in_ms
-from mirotwin.verify.expectations import Expected, as_settings, in_files
-
-
-def run_case(path: str, options: TestOptions) -> Result:
-    """Runs one on --firmware; a case that cannot be run is a result, too."""
-    expected: Sequence[str] = ()
-    try:
-        job = load_stream(path, options.firmware)
-        own_files = in_files(options.expected)
-        expected = [own_files[name] for name in job.spec.scenario.expect if name in own_files]
-        result = _as_test(path, job.judge_case())
-    except BadInput as error:
-        result = cannot_be_run(path, error)
-    return replace(result, again=replay_line(path, options.firmware, tuple(expected)))
-
-
-def _as_test(path: str, result: Result) -> Result:
-    """What a case comes to as a test: where its check passes, it passes, whichever firmware it is of."""
-    if result.verdict in ("passed", "differs"):
-        notes: list[Line] = [("passed", text) for text in result.texts[1:]]
-        return replace(result, path=path, verdict="passed", said=notes)
-    said: list[Line] = [("failed", f"expectation failed: {one}") for one in result.failures]
-    return replace(result, path=path, said=said or result.said)
-
-
-class TestOptions(Options, frozen=True, kw_only=True):
-    COMMAND = "test"
-    __test__ = False  # for pytest: no test, whatever its name
-    paths: Annotated[tuple[str, ...], Argument("DIR|FILE..", NAME, several=True)]
-    word: Annotated[str, Option("-k", metavar="TEXT", help="Only files with TEXT in their path.")] = ""
-    seed: Seed = 0
-    settings: Annotated[
-        tuple[str, ...], SET.saying("A key to set in each scenario, as for `run`; may be repeated.")
-    ] = ()
-    expected: Expected = ()
-    firmware: Firmware = None
-    engine: Engine = None
-    junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
-    artifacts: Annotated[
-        Path | None,
-        ARTIFACTS.saying(
-            "Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`."
-        ),
-    ] = None
-    pages: Annotated[
-        bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
-    ] = False
-    desk: DeskOptions = DeskOptions()
-    quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
-
-    def line_for(self, file: str, saves: bool = False) -> str:
-        """The command that gives the verdict on this scenario again; one that saves worlds needs a folder for them."""
-        again = TestOptions(
-            paths=(file,),
-            seed=self.seed,
-            settings=self.settings,
-            expected=self.expected,
-            firmware=self.firmware,
-            artifacts=self.artifacts if saves else None,
-            desk=self.desk,
-        )
-        return again.command_line()
-
-
-def run_scenario(options: TestOptions, file: str) -> Result:
-    """Runs a scenario file as a test: in the twin, or at a port."""
-    image, again = load_firmware(options.firmware), partial(options.line_for, file)
-    settings = (*options.settings, *as_settings(options.expected))
-    result = run_test(file, image, options.seed, settings, options.artifacts, again, options.desk)
-    if result.error is not None:
-        show_traceback(result.error)
-    return replace(result, again=result.again or again())
+from mirotwin.verify.expectations import as_settings, in_files
 
 
 @command_of(TestOptions)
@@ -155,7 +72,9 @@ def test(options: TestOptions) -> int:
     as_settings(options.expected)  # cases may name the checks of files, which are known from now on
     for file in chosen:
         began_s = time.perf_counter()
-        result = run_case(file, options) if file.endswith(CASE_SUFFIX) else run_scenario(options, file)
+        result = run_file(options, file)
+        if result.error is not None:
+            show_traceback(result.error)
         told.append(_test_case(result, time.perf_counter() - began_s))
         results.append(result)
         tell_notes(note for note in result.left_out if note not in left_out)

@@ -13,7 +13,7 @@ from click.shell_completion import ShellComplete
 from mirotwin.commands import main
 from mirotwin.run.run_options import RunOptions
 from mirotwin.shell.command import DeclaredOption, RecordCommand
-from mirotwin.testing.test_command import TestOptions
+from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.artifacts import report_line
 from mirotwin.verify.cases.replay_line import replay_line
 from tests import children

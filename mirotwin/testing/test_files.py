@@ -1,0 +1,58 @@
+"""Scenario files and cases as tests: each to its result.
+
+A case passes where the check that failed passes, as it should on firmware that was mended. Where it had no occasion to
+judge, the case is not judged: firmware that does nothing at all has mended nothing. A stream that expects nothing is
+judged by the checks that are always on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput
+from mirotwin.runs.job import load_stream
+from mirotwin.runs.result import Line, Result
+from mirotwin.runs.test_file import cannot_be_run, run_test
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.testing.test_options import TestOptions
+from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
+from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.expectations import as_settings, in_files
+
+
+def run_file(options: TestOptions, file: str) -> Result:
+    """Runs a case, or a scenario in the twin or at a port."""
+    return _run_case(options, file) if file.endswith(CASE_SUFFIX) else _run_scenario(options, file)
+
+
+def _run_scenario(options: TestOptions, file: str) -> Result:
+    """Runs a scenario file as a test: in the twin, or at a port."""
+    image, again = load_firmware(options.firmware), partial(options.line_for, file)
+    settings = (*options.settings, *as_settings(options.expected))
+    result = run_test(file, image, options.seed, settings, options.artifacts, again, options.desk)
+    return replace(result, again=result.again or again())
+
+
+def _run_case(options: TestOptions, path: str) -> Result:
+    """Runs one on --firmware; a case that cannot be run is a result, too."""
+    expected: Sequence[str] = ()
+    try:
+        job = load_stream(path, options.firmware)
+        own_files = in_files(options.expected)
+        expected = [own_files[name] for name in job.spec.scenario.expect if name in own_files]
+        result = _as_test(path, job.judge_case())
+    except BadInput as error:
+        result = cannot_be_run(path, error)
+    return replace(result, again=replay_line(path, options.firmware, tuple(expected)))
+
+
+def _as_test(path: str, result: Result) -> Result:
+    """What a case comes to as a test: where its check passes, it passes, whichever firmware it is of."""
+    if result.verdict in ("passed", "differs"):
+        notes: list[Line] = [("passed", text) for text in result.texts[1:]]
+        return replace(result, path=path, verdict="passed", said=notes)
+    said: list[Line] = [("failed", f"expectation failed: {one}") for one in result.failures]
+    return replace(result, path=path, said=said or result.said)

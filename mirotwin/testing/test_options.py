@@ -1,0 +1,50 @@
+"""What `mirotwin test` is told, and the command that gives the verdict on one file again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mirotwin.desk.guard import DeskOptions
+from mirotwin.shell.command import Argument, Option, Options
+from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
+from mirotwin.verify.expectations import Expected
+
+
+class TestOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "test"
+    __test__ = False  # for pytest: no test, whatever its name
+    paths: Annotated[tuple[str, ...], Argument("DIR|FILE..", NAME, several=True)]
+    word: Annotated[str, Option("-k", metavar="TEXT", help="Only files with TEXT in their path.")] = ""
+    seed: Seed = 0
+    settings: Annotated[
+        tuple[str, ...], SET.saying("A key to set in each scenario, as for `run`; may be repeated.")
+    ] = ()
+    expected: Expected = ()
+    firmware: Firmware = None
+    engine: Engine = None
+    junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
+    artifacts: Annotated[
+        Path | None,
+        ARTIFACTS.saying(
+            "Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`."
+        ),
+    ] = None
+    pages: Annotated[
+        bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
+    ] = False
+    desk: DeskOptions = DeskOptions()
+    quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
+
+    def line_for(self, file: str, saves: bool = False) -> str:
+        """The command that gives the verdict on this scenario again; one that saves worlds needs a folder for them."""
+        again = TestOptions(
+            paths=(file,),
+            seed=self.seed,
+            settings=self.settings,
+            expected=self.expected,
+            firmware=self.firmware,
+            artifacts=self.artifacts if saves else None,
+            desk=self.desk,
+        )
+        return again.command_line()
