@@ -20,10 +20,10 @@ from mirotwin.campaign.workers import Workers
 
 SPREAD = 4096
 """Runs between the first one without an outcome and the last one handed over: so many rows wait for their turn."""
-TRIES = 2
-"""So often a job that was under way when a process ended is tried by itself: a suspect."""
-FRUITLESS = 20
-"""So many executors in a row that end before any run does."""
+ISOLATED_RETRIES = 2
+"""Retries, alone in the executor, of a job that was under way when a worker died: a suspect."""
+MAX_DEAD_EXECUTORS = 20
+"""Give up after this many executors in a row die without finishing a run."""
 
 
 def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[RunOutcome]:
@@ -41,7 +41,7 @@ class Drive:
         self.workers = workers
         self._pending: dict[Future[RunOutcome], int] = {}
         self._suspects: dict[int, int] = {}  # run -> so often it was under way when a process ended
-        self._fruitless = 0
+        self._dead_executors = 0
 
     def outcomes(self, runs: Iterable[int]) -> Generator[RunOutcome]:
         """Each as soon as it is there. Whoever stops asking, or is interrupted, leaves no job behind."""
@@ -73,9 +73,11 @@ class Drive:
     def _choose(self) -> int | None:
         """The next run to hand over, None where all have their hands full. A suspect goes alone."""
         if self._suspects:
+            # a worker's death does not say which of its pool's jobs did it: with one alone there is no doubt
             return None if self._pending else min(self._suspects)
         if self._next is None or len(self._pending) >= self.workers.ahead:
             return None
+        # the reader puts outcomes in order: while one run is slow, those after it fill its memory
         if self._pending and self._next - min(self._pending.values()) >= SPREAD:
             return None
         found, self._next = self._next, next(self._runs, None)
@@ -93,17 +95,17 @@ class Drive:
             except CancelledError:
                 raise self._gone() from None
             self._suspects.pop(run, None)
-            self._fruitless = 0
+            self._dead_executors = 0
             yield outcome
         if lost:
             yield from self._broken(lost)
 
     def _broken(self, lost: list[int]) -> list[RunOutcome]:
         """A new executor for the jobs of the one that is broken. Outcomes of those that have had all their tries."""
-        lost += self._pending.values()
+        lost += self._pending.values()  # a pool that is broken gives no more outcomes, whether done or not
         self._pending.clear()
         self._restart()
-        if len(lost) == 1 and self._suspects.get(lost[0], 0) >= TRIES:
+        if len(lost) == 1 and self._suspects.get(lost[0], 0) >= ISOLATED_RETRIES:
             self._suspects.pop(lost[0])
             return [RunOutcome(lost[0], error="ended the process that ran it (killed, or out of memory)")]
         for run in lost:
@@ -111,9 +113,9 @@ class Drive:
         return []
 
     def _restart(self) -> None:
-        self.workers.check_ended()
-        self._fruitless += 1
-        if not self.workers.restarts or self._fruitless > FRUITLESS:
+        self.workers.check_ended()  # first: a script that cannot be imported would end each new pool, too
+        self._dead_executors += 1
+        if not self.workers.restarts or self._dead_executors > MAX_DEAD_EXECUTORS:
             raise self._gone()
         self._close()
         self._executor = self.workers.start()

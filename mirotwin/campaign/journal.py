@@ -47,12 +47,13 @@ class Journal:
         self.done = bytearray(head.runs)
         self._synced_s = perf_counter()
         check_regular(path)
+        # unbuffered and appending: each line is one write, so a process that is killed leaves at most one cut line
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
             if locked_elsewhere(self._stream.fileno()):
                 remedy = "wait, or choose another file with --out"
                 raise BadInput(path, "", "another process is writing to it", remedy)
-            if discard:
+            if discard:  # once it is locked: not from under another process
                 self._stream.truncate(0)
             self._take_up()
         except BaseException:
@@ -107,7 +108,7 @@ class Journal:
             whole = end
             if not self.done[outcome.run]:
                 self._count(outcome.run)
-        self._stream.truncate(whole)
+        self._stream.truncate(whole)  # else the next line would go on where the cut one ends
 
 
 def read_head(path: Path) -> tuple[Head | None, int]:
@@ -155,7 +156,7 @@ def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:
     for outcome in outcomes:
         if outcome.run >= turn:
             early.setdefault(outcome.run, outcome)
-        while turn in early:
+        while turn in early:  # one outcome may be all that a row of early ones has waited for
             yield early.pop(turn)
             turn += 1
     for run in sorted(early):

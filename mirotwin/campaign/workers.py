@@ -57,6 +57,7 @@ def refuse_in_import() -> None:
     Raises BadInput in a process that somebody else started. `multiprocessing` marks such an import the same way.
     """
     if getattr(current_process(), "_inheriting", False):
+        # an exception would be one traceback for each process; the exit code is read by `check_ended`
         if current_process().name == NAME:
             os._exit(UNGUARDED)
         raise BadInput("", "campaign.run", *GUARD)

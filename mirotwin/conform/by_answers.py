@@ -138,9 +138,11 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     sent = _whole(script.said)
     port.greet((script.n,), sent)
+    # from here on: what greeting took says nothing of the trial
     cursor, begun = Cursor(port.log), len(port.late_ticks)
     seen = Observed(script.n, slot)
 
+    # the quickest answer took the firmware's own time; what is over is the way there and back
     shortest = min(port.delays)
     way = max(0, shortest - (last.end_tick - last.tick) - ANSWERED_TICKS)
 

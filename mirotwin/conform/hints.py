@@ -51,6 +51,7 @@ def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
     if at_limit or any(order.what != "drive" for order in told) or found == wanted:
         return ""
     for what, pair in _mistakes(frame, slot):
+        # firmware may cut off before or after its mistake
         for one, other in (pair, (saturated(pair[0]), saturated(pair[1]))):
             if (one << 8, other << 8) == found:
                 return what
@@ -69,6 +70,7 @@ def _is_slower(found: int, wanted: int, shift: int) -> bool:
 
 
 def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
+    # the likelier one first: several may explain the same two velocities
     left, right = frame.words[slot]
     yield "the signs of both are turned over", (-left, -right)
     yield "the left one goes the wrong way", (-left, right)

@@ -80,6 +80,7 @@ class Observed:
 
     def forget(self, data: bytes) -> None:
         """Takes back what was heard last of these characters: another robot said them."""
+        # the last ones: the robot that is tried may have said the same before
         start = bytes(event.value for event in self.heard).rfind(data)
         del self.heard[start : start + len(data)]
 

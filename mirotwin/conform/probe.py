@@ -64,6 +64,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
 
     rule = Rule("P24", "", ways, (topology,))
     (listener,) = listen(trial_of(rule), image, seed)
+    # the earliest link of the chain first: a mistake in one makes all after it look wrong
     return (
         _serial_port(listener.observed.events, said[0][1])
         or _begins_again(listener)

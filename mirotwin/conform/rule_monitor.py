@@ -67,7 +67,7 @@ class ObservingMonitor(Monitor[C_co]):
 
 
 class RuleMonitor(ObservingMonitor[ConformsTo]):
-    """`foreign`: the host of this network says something else than in the trial; `to_come`: what it has to say yet."""
+    """`off_script`: the host of this network left the trial's script; `remaining`: what it still sends."""
 
     EVENTS = ("command", "heard", "answer", "sent")
 
@@ -75,15 +75,15 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
         super().__init__(check, subject)
         self.rule = check.the_rule()
         self.trial = trial_of(self.rule)
-        self.foreign = subject.network >= len(self.trial.expected)
-        self.to_come = self.trial.transmissions_of(subject.network)[::-1]
+        self.off_script = subject.network >= len(self.trial.expected)
+        self.remaining = self.trial.transmissions_of(subject.network)[::-1]  # so that the next one is popped
 
     def event(self, event: Event) -> None:
         super().event(event)
         if event.what == "sent":
-            said = self.to_come.pop() if self.to_come else None
+            said = self.remaining.pop() if self.remaining else None
             if said is None or (said.tick, said.data) != (event.tick, event.data):
-                self.foreign = True
+                self.off_script = True
 
     def fault(self, fault: FirmwareFault) -> None:
         if fault.kind in self.rule.faults:
@@ -91,7 +91,7 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
 
     def end(self, tick: int) -> None:
         super().end(tick)
-        if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
+        if self.off_script or (self.remaining and self.remaining[-1].tick < tick):
             self.failures.clear()
             self.failed = 0
             return

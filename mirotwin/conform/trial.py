@@ -27,7 +27,7 @@ from mirotwin.runs.spec import RunSpec
 from mirotwin.verify.checks.interface import Check, Subject
 
 MOST_FAULTS = 1000
-LOOK_TICKS = 24_000
+LOOK_TICKS = 24_000  # a millisecond
 """In the first control period faults are counted so often: a fault in each instruction makes 2000 a millisecond."""
 _BLIND = {
     "kind": "gaussian",
@@ -36,6 +36,7 @@ _BLIND = {
     "pixel_cm": 0.0,
     "delay_frames": 0,
 }
+# far apart: robots of a trial turn on the spot, or drive some centimetres, and never touch
 _PLACES = [(x_cm, y_cm) for y_cm in (15.0, 55.0, 35.0) for x_cm in (10.0, 40.0, 70.0, 100.0)]
 
 

@@ -52,7 +52,7 @@ def _begin(chosen: str) -> None:
         if callable(signal.getsignal(number)):  # a copy has the program's, which raises an exception
             signal.signal(number, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    engine.select(chosen)
+    engine.select(chosen)  # before a job imports a hot module, which settles it
 
 
 def _end_with_parent() -> None:

@@ -189,7 +189,7 @@ def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
 
 @pytest.mark.slow
 def test_workers_that_end_at_once_end_the_campaign_in_a_line(monkeypatch, tmp_path):
-    monkeypatch.setattr("mirotwin.campaign.drive.FRUITLESS", 2)
+    monkeypatch.setattr("mirotwin.campaign.drive.MAX_DEAD_EXECUTORS", 2)
 
     class Broken(Processes):
         def start(self):
