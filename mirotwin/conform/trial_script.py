@@ -216,7 +216,7 @@ class TrialScript:
         """
         seq = (self.seq + how.get("step", 1)) % SEQ_MODULUS
         self.seq = seq if how.get("fresh", True) else self.seq
-        form = replace(self.form, layout=how.get("layout", self.form.layout))
+        form = replace(self.form, layout=how["layout"]) if "layout" in how else self.form
         sealed = how.get("sealed", seal)(form, bytes([kind * SEQ_MODULUS + seq]) + payload)
         body = bytearray(sealed[len(form.lead) :])
         for place, bits in how.get("wrong", {}).items():
