@@ -12,9 +12,10 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from mirotwin.camera.view import View
-from mirotwin.shell.outputs import FULL, OutputError, entries, not_empty, part_name, reason_of
+from mirotwin.shell.outputs import entries, not_empty, part_name, refused
 
 OPTION = "--frames"
+_REMEDY = f"choose another folder with {OPTION}"
 _OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
 
 
@@ -48,25 +49,19 @@ class FrameFolder:
 
     def _open(self) -> None:
         """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
-        try:
+        with refused(self.path, _REMEDY):
             self.path.mkdir(parents=True, exist_ok=True)
             for name in entries(self.path, OPTION):
                 if _OURS.fullmatch(name):
                     (self.path / name).unlink()
-        except OSError as error:
-            remedy = f"choose another folder with {OPTION}"
-            raise OutputError(self.path, reason_of(error), remedy) from None
 
     def _add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
         """Writes a file; `undisturbed` puts off what an exception out of the blue would leave half-written."""
         part = self.path / part_name(name)
         with undisturbed:
             try:
-                part.write_bytes(data)
-                os.replace(part, self.path / name)
-            except OSError as error:
-                room = "make room, or " if error.errno in FULL else ""
-                remedy = f"{room}choose another folder with {OPTION}"
-                raise OutputError(self.path, reason_of(error), remedy) from None
+                with refused(self.path, _REMEDY):
+                    part.write_bytes(data)
+                    os.replace(part, self.path / name)
             finally:
                 part.unlink(missing_ok=True)

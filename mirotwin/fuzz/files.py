@@ -29,7 +29,7 @@ from mirotwin.shell.outputs import (
     entries,
     locked_folder,
     not_empty,
-    reason_of,
+    refused,
     some,
     told_when_full,
 )
@@ -97,14 +97,10 @@ class CampaignFolder:
         A full disk leaves crashes only, or no folder.
         """
         with ExitStack() as held:
-            try:
+            with refused(self.path, f"choose another folder with {OPTION}"):
                 self.path.mkdir(parents=True, exist_ok=True)
                 held.enter_context(locked_folder(self.path))
                 self._empty()
-            except OSError as error:
-                raise OutputError(
-                    self.path, reason_of(error), f"choose another folder with {OPTION}"
-                ) from None
             try:
                 with told_when_full(self.path, OPTION):
                     yield

@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -69,9 +69,10 @@ class OutputFolder:
         self._force = force
         self._ours = ours
         self._made = False
-        self._lock: int | None = None
+        self._held = ExitStack()
         if path.is_dir():
-            _release(_lock(path))
+            with locked_folder(path):
+                pass
         _check(path, force, names, ours)
 
     def part(self, name: str) -> Path:
@@ -79,29 +80,27 @@ class OutputFolder:
         return self.path / part_name(name)
 
     def __enter__(self) -> OutputFolder:
-        try:
-            with _refused(self.path, "choose another folder with --out"):
-                self._made = not self.path.is_dir()
-                self.path.mkdir(parents=True, exist_ok=True)
-                self._lock = _lock(self.path)
-                _check(self.path, self._force, self.names, self._ours)  # another run may have filled it since
-                self._remove_parts()
-        except OutputError:
-            _release(self._lock)
-            raise
+        with ExitStack() as held, refused(self.path, "choose another folder with --out"):
+            self._made = not self.path.is_dir()
+            self.path.mkdir(parents=True, exist_ok=True)
+            held.enter_context(locked_folder(self.path))
+            _check(self.path, self._force, self.names, self._ours)  # another run may have filled it since
+            self._remove_parts()
+            self._held = held.pop_all()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
-            if kind is None:
-                with _refused(self.path, "choose another folder with --out"):
-                    self._publish()
-            elif isinstance(error, OSError) and error.errno in FULL:
-                raise OutputError(self.path, reason_of(error), _make_room("folder", "--out")) from None
-        finally:
-            self._leave()
+        with self._held:
+            try:
+                with refused(self.path, "choose another folder with --out"):
+                    if kind is None:
+                        self._publish()
+                    elif isinstance(error, OSError) and error.errno in FULL:
+                        raise error
+            finally:
+                self._leave()
 
     def _publish(self) -> None:
         for name in self.names:
@@ -115,7 +114,6 @@ class OutputFolder:
             self._remove_parts(self.keep)
             if self._made and not os.listdir(self.path):
                 self.path.rmdir()
-        _release(self._lock)
 
     def _remove_parts(self, keep: Sequence[str] = ()) -> None:
         for name in self.names:
@@ -139,31 +137,20 @@ def locked_elsewhere(descriptor: int) -> bool:
     return False
 
 
-def _lock(path: Path) -> int | None:
-    """Locks a folder; None where folders cannot be opened. Raises OutputError if another process has it."""
-    if os.name == "nt":
-        return None
-    folder = os.open(path, os.O_RDONLY)
-    if locked_elsewhere(folder):
-        os.close(folder)
-        remedy = "wait until it has finished, or choose another folder with --out"
-        raise OutputError(path, "another process is writing into the folder", remedy)
-    return folder
-
-
-def _release(lock: int | None) -> None:
-    if lock is not None:
-        os.close(lock)
-
-
 @contextmanager
 def locked_folder(path: Path) -> Iterator[None]:
     """Holds a folder that is there. Raises OutputError if another process has it."""
-    lock = _lock(path)
+    if os.name == "nt":  # where folders cannot be opened
+        yield
+        return
+    folder = os.open(path, os.O_RDONLY)
     try:
+        if locked_elsewhere(folder):
+            remedy = "wait until it has finished, or choose another folder with --out"
+            raise OutputError(path, "another process is writing into the folder", remedy)
         yield
     finally:
-        _release(lock)
+        os.close(folder)
 
 
 def entries(path: Path, option: str) -> list[str]:
@@ -214,7 +201,7 @@ def _ways_out(names: Sequence[str]) -> str:
 
 def make_folder(path: Path, option: str) -> None:
     """Makes a folder and those above it, if they are not there. Raises OutputError."""
-    with _refused(path, f"choose another folder with {option}"):
+    with refused(path, f"choose another folder with {option}"):
         path.mkdir(parents=True, exist_ok=True)
 
 
@@ -258,7 +245,7 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     check_file(path, option)
     target = path.resolve()
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
-    with _refused(path, f"choose another file with {option}"):
+    with refused(path, f"choose another file with {option}"):
         staging = _staging(target)
     try:
         with told_when_full(path, option, "file"):
@@ -303,9 +290,8 @@ def write_files(folder: Path, files: Mapping[str, bytes], remedy: str) -> None:
                 path.rmdir()
         if not isinstance(error, OSError):
             raise
-        place = Path(error.filename) if isinstance(error, FileExistsError) else folder
-        room = "make room, or " if error.errno in FULL else ""
-        raise OutputError(place, reason_of(error), f"{room}{remedy}") from None
+        with refused(Path(error.filename) if isinstance(error, FileExistsError) else folder, remedy):
+            raise
 
 
 def _staging(target: Path) -> Path:
@@ -317,30 +303,23 @@ def _staging(target: Path) -> Path:
     return Path(name)
 
 
-@contextmanager
-def told_when_full(path: Path | None, option: str, kind: str = "folder") -> Iterator[None]:
+def told_when_full(path: Path | None, option: str, kind: str = "folder") -> AbstractContextManager[None]:
     """A full disk becomes an OutputError that names the folder, or file. It occurs on write, where the OSError names
     none. `path`: None where nothing is written.
     """
-    try:
-        yield
-    except OSError as error:
-        if path is None or error.errno not in FULL:
-            raise
-        raise OutputError(path, reason_of(error), _make_room(kind, option)) from None
+    return nullcontext() if path is None else refused(path, f"choose another {kind} with {option}", FULL)
 
 
 @contextmanager
-def _refused(path: Path, remedy: str) -> Iterator[None]:
-    """What the system does not allow becomes an OutputError of the path."""
+def refused(path: Path, remedy: str, only: Collection[int] = ()) -> Iterator[None]:
+    """What the system does not allow, or of that `only` these values of errno, becomes an OutputError of the path."""
     try:
         yield
     except OSError as error:
-        raise OutputError(path, reason_of(error), remedy) from None
-
-
-def _make_room(kind: str, option: str) -> str:
-    return f"make room, or choose another {kind} with {option}"
+        if only and error.errno not in only:
+            raise
+        room = "make room, or " if error.errno in FULL else ""
+        raise OutputError(path, reason_of(error), f"{room}{remedy}") from None
 
 
 def _umask() -> int:
