@@ -36,19 +36,22 @@ class PluginError(BadInput):
 class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
     """Plug-ins of one kind.
 
-    `group` is the name of the entry points, `word` what a message calls a plug-in, `key` the scenario key that names
-    it, `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
+    `word` is what a message calls a plug-in, and with an s the group of the entry points; `key` the scenario key that
+    names it, `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
     `module:class`. `default` is the plug-in of a table that does not say its name, if there is one. `in_files`: those
     that the command line brought, by name.
     """
 
-    group: str
     word: str
     key: str
     base: str
     own: Mapping[str, str]
     default: str | None = None
     in_files: dict[str, type[Plugin]] = {}
+
+    @property
+    def group(self) -> str:
+        return f"{installed.PREFIX}{self.word}s"
 
     def names(self) -> list[str]:
         """All names that can be used: our own in the order of the table, then the others sorted."""

@@ -40,7 +40,6 @@ class AnyReference(Parameters):
 
 DEFAULT_LAW = "yang_kim"
 LAWS: Registry[Controller] = Registry(
-    "mirotwin.laws",
     word="law",
     key="law",
     base="miro_host.laws.interface:LawParameters",
@@ -55,7 +54,6 @@ LAWS: Registry[Controller] = Registry(
 )
 DEFAULT_ESTIMATOR = "none"
 ESTIMATORS: Registry[AnyEstimator] = Registry(
-    "mirotwin.estimators",
     word="estimator",
     key="kind",
     base="miro_host.estimators.interface:EstimatorParameters",
@@ -68,7 +66,6 @@ ESTIMATORS: Registry[AnyEstimator] = Registry(
     default=DEFAULT_ESTIMATOR,
 )
 REFERENCES: Registry[AnyReference] = Registry(
-    "mirotwin.references",
     word="reference",
     key="kind",
     base="miro_host.references.interface:ReferenceParameters",

@@ -18,7 +18,6 @@ from miro_protocol.toml_text import TomlError, struct_of
 T = TypeVar("T")
 OPTION = "--protocol"
 PROTOCOLS: Registry[Protocol] = Registry(
-    "mirotwin.protocols",
     word="protocol",
     key="protocol",
     base="miro_protocol.protocol:Protocol",

@@ -31,7 +31,6 @@ ALONE_ALWAYS_ON = "no_fault"
 """Of a board alone."""
 
 CHECKS: Registry[object] = Registry(
-    "mirotwin.checks",
     word="check",
     key="check",
     base="mirotwin.verify.checks.interface:Check",
