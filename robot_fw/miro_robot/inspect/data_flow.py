@@ -7,7 +7,7 @@ Places are direct addresses: R0 to R7 of the function's bank, A, B, DPL, DPH. A 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import reduce
 
 import msgspec
@@ -79,15 +79,8 @@ class Callees:
 
     def writes(self, entry: int, bank: int) -> frozenset[int]:
         """Of the function at `entry`; all registers where its code does not tell."""
-        found, seen, waiting = set[int](), set[int](), [entry]
-        while waiting:
-            entry = waiting.pop()
-            if entry not in seen:
-                seen.add(entry)
-                own, called = self._own(entry, bank)
-                found |= own
-                waiting += called
-        return frozenset(found)
+        entries = _reached([entry], lambda called: self._own(called, bank)[1])
+        return frozenset[int]().union(*(self._own(called, bank)[0] for called in entries))
 
     def _own(self, entry: int, bank: int) -> tuple[set[int], list[int]]:
         """What it writes itself, and whom it calls."""
@@ -137,23 +130,13 @@ class Flow:
 
     def leads_to(self, addresses: Iterable[int]) -> set[int]:
         """The instructions from which one of these can be reached, these too."""
-        found, waiting = set[int](), [address for address in addresses if address in self.before]
-        while waiting:
-            address = waiting.pop()
-            if address not in found:
-                found.add(address)
-                waiting += self.before[address]
-        return found
+        known = (address for address in addresses if address in self.before)
+        return _reached(known, self.before.__getitem__)
 
     def reached_without(self, entry: int, addresses: Iterable[int]) -> set[int]:
         """The instructions that can be reached from the entry before one of these has been executed."""
-        stops, found, waiting = set(addresses), set[int](), [entry]
-        while waiting:
-            address = waiting.pop()
-            if address not in found:
-                found.add(address)
-                waiting += [] if address in stops else self.after[address]
-        return found
+        stops = set(addresses)
+        return _reached([entry], lambda address: () if address in stops else self.after[address])
 
     def _forward(self, entry: int) -> dict[int, Held]:
         start = {place: frozenset({(ENTRY, place)}) for place in self.places}
@@ -207,6 +190,17 @@ class Flow:
                 live[address] = found
                 waiting += self.before[address]
         return live
+
+
+def _reached(first: Iterable[int], after: Callable[[int], Iterable[int]]) -> set[int]:
+    """All places that one comes to from the first ones, these too."""
+    found, waiting = set[int](), [*first]
+    while waiting:
+        place = waiting.pop()
+        if place not in found:
+            found.add(place)
+            waiting += after(place)
+    return found
 
 
 def _either(one: frozenset[Origin], other: frozenset[Origin]) -> frozenset[Origin]:
