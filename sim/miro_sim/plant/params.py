@@ -143,17 +143,6 @@ class DriveParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
                 f" a time constant of {motor_s:.3g} s; at least {MIN_MOTOR_S:g} s (real motors: 0.001 to 0.1 s)"
             )
 
-    def is_rough(self) -> bool:
-        """Whether anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""
-        return (
-            self.tyre.grip is not None
-            or self.ball.friction > 0.0
-            or self.chassis.stiction_ratio > 1.0
-            or self.chassis.gear_backlash_rad > 0.0
-            or self.chassis.gear_load_friction > 0.0
-            or self.disturbance.is_on()
-        )
-
     def radius_m(self, side: int) -> float:
         """Wheel radius of side 0 (left) or 1 (right)."""
         body = self.chassis

@@ -129,6 +129,14 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
         raise PluginError(what, f"mend the {word} or its parameters") from error
 
 
+def pilot_and_drive(
+    robot: sc.RobotSpec, scenario: sc.Scenario, network: int, wheels: Stream, noise: Stream
+) -> tuple[Pilot, DifferentialDrive]:
+    """Who steers a robot, and what it drives with. Raises PluginError."""
+    reference, start = reference_and_start(robot, scenario.duration_s)
+    return pilot_for(robot, reference, scenario, network), drive_for(robot, start, wheels, noise)
+
+
 def drive_for(robot: sc.RobotSpec, start: Posture, wheels: Stream, noise: Stream) -> DifferentialDrive:
     """The drive with this seed's wheels, which are drawn from `wheels`; `noise` is the disturbance's."""
     spread, left, right = robot.wheel_radius_mismatch, wheels.uniform(0), wheels.uniform(1)

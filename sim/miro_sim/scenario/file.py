@@ -33,13 +33,19 @@ class ScenarioText(msgspec.Struct, frozen=True):
     """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it.
 
     The text of one that names another (`base`) is that of the whole. `notes`: what the settings left out, a line each.
+    `source`: the text as it was read; `tables`: what became of it, None where that is the same.
     """
 
     origin: str
-    text: str
+    source: str
     scenario: Scenario
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    tables: dict[str, Any] | None = None
+
+    @property
+    def text(self) -> str:
+        return self.source if self.tables is None else written(self.tables, self.origin, self.settings)
 
 
 def builtin_names() -> list[str]:
@@ -75,9 +81,8 @@ def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = N
     raw = _tables(text, origin)
     whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
     scenario, notes = _checked(whole, origin, settings, also, own)
-    if settings or whole is not raw:
-        text = written(whole, origin, settings)
-    return ScenarioText(origin, text, scenario, tuple(settings), notes)
+    same = whole is raw and not settings
+    return ScenarioText(origin, text, scenario, tuple(settings), notes, None if same else whole)
 
 
 def source_text(source: str) -> str:

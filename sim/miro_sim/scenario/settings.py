@@ -91,16 +91,17 @@ def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION)
 
 
 def _make(raw: Table, text: str, origin: str, option: str) -> Setting:
-    with ScenarioError.at(origin, _option(text, option)):
-        try:
-            keys, value = _read(text)
-            if keys == ["variant"]:
-                impose(raw, value)
-                return Setting(text, "variant", option=option)
-            made = _Path(text).put(raw, keys, value, "")
-            return msgspec.structs.replace(made, option=option)
-        except RecursionError:
-            raise Refused("nested too deeply") from None
+    try:
+        keys, value = _read(text)
+        if keys == ["variant"]:
+            impose(raw, value)
+            return Setting(text, "variant", option=option)
+        made = _Path(text).put(raw, keys, value, "")
+        return msgspec.structs.replace(made, option=option)
+    except Refused as error:
+        raise ScenarioError(origin, _option(text, option), error.what, error.remedy) from None
+    except RecursionError:
+        raise ScenarioError(origin, _option(text, option), "nested too deeply") from None
 
 
 def _read(text: str) -> tuple[list[str], Any]:

@@ -23,7 +23,7 @@ from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import drive_for, pilot_for, reference_and_start
+from miro_sim.scenario.build import pilot_and_drive
 from miro_sim.world.device import Device
 
 
@@ -32,7 +32,7 @@ class Robot(Device):
 
     STATE = {"pilot": Pilot}
     NOT_STATE = (
-        "spec", "reference",
+        "spec",
         "drive",  # the board saves it
         "grid_tick", "noted",  # where it was in the piece that runs
     )  # fmt: skip
@@ -42,13 +42,12 @@ class Robot(Device):
     ) -> None:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
+        wheels, noise = Stream(seed, f"{name}/wheels"), Stream(seed, f"{name}/disturbance")
+        self.pilot: Pilot
         try:
-            self.reference, start = reference_and_start(spec, scenario.duration_s)
-            self.pilot: Pilot = pilot_for(spec, self.reference, scenario, network)
+            self.pilot, self.drive = pilot_and_drive(spec, scenario, network, wheels, noise)
         except PluginError as error:
             raise _named(error, name, 0) from error
-        noise = Stream(seed, f"{name}/disturbance")
-        self.drive = drive_for(spec, start, Stream(seed, f"{name}/wheels"), noise)
         strap = spec.slot if spec.strap is None else spec.strap
         board = Board(load_wiring(), self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault)
         board.load(image)
