@@ -15,6 +15,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from miro_host.registries import LAWS
+from miro_sim.plant.drive import is_rough
 from miro_sim.scenario.camera_keys import GaussianCamera, PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse, written
 from miro_sim.scenario.keys import HostSpec
@@ -464,7 +465,7 @@ def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(
     assert (network.radio.bit_error_rate, network.radio.eb_n0_db, network.radio.bursts) == (0.0, None, None)
     assert (network.radio.lost_frames, network.radio.squelch) == (0.0, True)
     assert (network.control_noise.v_m_s, robot.wheel_radius_mismatch) == (0.0, 0.0)
-    assert not robot.drive.is_rough()
+    assert not is_rough(robot.drive)
     assert robot.drive.chassis.left_radius_factor == 1.0
     plain = load(name).scenario.networks[0].robot[0]
     assert (robot.reference, robot.controller, robot.start_error_x_cm) == (

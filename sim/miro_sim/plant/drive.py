@@ -343,7 +343,7 @@ class Quadrature:
         return f"Quadrature(position={self.position!r} A={self.a()} B={self.b()})"
 
 
-def _is_rough(params: DriveParams) -> bool:
+def is_rough(params: DriveParams) -> bool:
     """Whether anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""
     chassis = params.chassis
     rubs = chassis.stiction_ratio > 1.0 or chassis.gear_load_friction > 0.0 or params.ball.friction > 0.0
@@ -392,7 +392,7 @@ class DifferentialDrive(Plant):
         counts = 4 * params.encoder.lines if params.encoder.index_pulse else 0
         self.left_encoder = Quadrature(params.counts_per_radian(), counts)
         self.right_encoder = Quadrature(params.counts_per_radian(), counts)
-        self.rough = RoughBody(params, x_m, y_m, theta_rad, noise) if _is_rough(params) else None
+        self.rough = RoughBody(params, x_m, y_m, theta_rad, noise) if is_rough(params) else None
         self.body = Body(params, x_m, y_m, theta_rad) if self.rough is None else self.rough
 
     def attach(self, left: Lm629, right: Lm629) -> None:
