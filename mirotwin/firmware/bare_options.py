@@ -20,6 +20,7 @@ from miro_sim.world.terminal import Terminal
 from miro_sim.world.wire import Wire
 from miro_sim.world.world import World
 from mirotwin.firmware.code_place import address_of, check_code_at, place_of
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole
@@ -205,7 +206,7 @@ def make_world(
         terminal=terminal,
     )
     try:
-        world = World(scenario, 0, image)
+        world = RunSpec(scenario=scenario, image=image).world()
     except ValueError as error:
         raise BadInput(
             "", "", f"--{error}" if str(error).startswith("baud") else f"--pins: {error}"

@@ -1,4 +1,7 @@
-"""What is to be run. The one place that builds a world."""
+"""What is to be run. The one place that builds a world.
+
+Checks, steps and scenario files are loaded by who has them: `fw run` starts without.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +12,17 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
-from miro_robot.image import Image
 from miro_sim.scenario.board import BoardScenario
-from miro_sim.scenario.file import ScenarioText, load
-from miro_sim.scenario.keys import Scenario
-from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.monitors import Expected
-from mirotwin.verify.steps.keys import Step
 
 if TYPE_CHECKING:
+    from miro_protocol.actions import ScriptItem
+    from miro_robot.image import Image
+    from miro_sim.scenario.file import ScenarioText
+    from miro_sim.scenario.keys import Scenario
     from miro_sim.world.world import World
+    from mirotwin.verify.checks.monitors import Expected
+    from mirotwin.verify.steps.keys import Step
 
 
 class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
@@ -54,6 +56,8 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
         """What is expected of each robot. Raises ScenarioError."""
         if self.expected is not None:
             return self.expected
+        from mirotwin.verify.checks.expect import expectations_of
+
         return expectations_of(self.scenario, self.origin or self.scenario.name)
 
     @property
@@ -93,4 +97,6 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
 @lru_cache(64)
 def silent_scenario(settings: tuple[str, ...]) -> Scenario:
     """The scenario of a test that names none, with these settings: read once for all that want the same."""
+    from miro_sim.scenario.file import load
+
     return load("silent", settings).scenario
