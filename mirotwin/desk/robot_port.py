@@ -195,7 +195,7 @@ class RobotPort:
         """Since the opening."""
         if self._virtual:
             return int(self._serial.virtual_tick)
-        return (time.monotonic_ns() - self._began_ns) * 24 // 1000
+        return (time.monotonic_ns() - self._began_ns) * self.clock // 1_000_000_000
 
     @property
     def tick(self) -> int:

@@ -15,7 +15,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.actions import RadioState
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.table import Flags
+from miro_protocol.table import TICKS_PER_MS, Flags
 from miro_sim.world.conditions import Answer, Condition, Heard, answer_of
 from miro_sim.world.events import Cursor, Event
 from miro_sim.world.machine import Machine
@@ -155,7 +155,7 @@ class Link(FrameSender):
                     return self._open.pop(place)
             return None
 
-        what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"
+        what = f"no answer{' with ' + filters if fields else ''} within {within / TICKS_PER_MS:g} ms"
         return self._until(taken, _answer_with(self.network, fields), within, what)
 
     @shown_where_it_was_called
@@ -171,7 +171,7 @@ class Link(FrameSender):
             del self._characters[:end]
             return tick
 
-        what = f"{pattern.hex(' ')} not heard within {within / 24_000:g} ms"
+        what = f"{pattern.hex(' ')} not heard within {within / TICKS_PER_MS:g} ms"
         return self._until(taken, Heard(network=self.network), within, what, judged=False)
 
     def _until(
@@ -195,7 +195,7 @@ class Link(FrameSender):
         """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
         begun_tick = self.machine.tick
         end_tick = begun_tick + for_ticks
-        what = f"silence for {for_ticks / 24_000:g} ms"
+        what = f"silence for {for_ticks / TICKS_PER_MS:g} ms"
         silence = Heard(network=self.network)
         event = None
         while event is None or event.tick <= begun_tick:

@@ -8,6 +8,7 @@ import msgspec
 
 from miro_exact.clock import ms
 from miro_host.wheels import Wheels
+from miro_protocol.table import TICKS_PER_MS
 from miro_robot.faults import FirmwareFault
 from miro_robot.inspect.values import read_value, write_value
 from miro_robot.lm629.buffers import FORWARD, STOP_ABRUPTLY, STOP_SMOOTHLY, VELOCITY_MODE
@@ -118,7 +119,7 @@ class RobotUnderTest:
         try:
             return self._waits.until([condition], within)
         except WaitExpired as expired:
-            limit = "" if within is None else f" within {within / 24_000:g} ms"
+            limit = "" if within is None else f" within {within / TICKS_PER_MS:g} ms"
             raise WaitFailed.of(expired, self.world, f"{what}{limit}") from None
 
     # Its switches

@@ -13,6 +13,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, amount
 from miro_protocol.decoder import Decoder, Received, Scanner, TelemetryDecoder
 from miro_protocol.frames import ContentError, TeamFrame, describe
+from miro_protocol.table import TICKS_PER_MS
 from miro_sim.world.events import Event
 from miro_sim.world.machine import Machine
 from miro_sim.world.waits import WaitExpired
@@ -152,7 +153,7 @@ def _line(run: Sequence[Event]) -> str:
     elif len(run) > 1:
         values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
         said, when = f"{first.what} {values}", "from tick"
-    return f"{first.tick / 24_000:10.3f} ms {where}: {said} ({when} {first.tick})"
+    return f"{first.tick / TICKS_PER_MS:10.3f} ms {where}: {said} ({when} {first.tick})"
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:

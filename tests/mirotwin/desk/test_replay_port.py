@@ -20,6 +20,7 @@ from tests.mirotwin.verify.checks.rig import planted
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.sdcc import needs_sdcc
+from tests.vectors.paths import CASES
 
 TO_ROBOT = ("--port", ROBOT, "--allow-motion", "-q")
 ALIKE = "the robot answers as its twin does"
@@ -130,7 +131,7 @@ def test_answers_are_compared_at_ports_only(mirotwin, finished):
 def test_a_case_of_a_bare_processor_is_refused(mirotwin, tmp_path):
     case = tmp_path / "bare.stream"
     case.write_text("# mirotwin stream 2\n#: [bare]\n#: bit_ticks = 1152\n1000 > 61\n")
-    err = mirotwin.refuses("replay", case, "--port", ROBOT)
+    err = mirotwin.refuses("replay", case, "--port", ROBOT, "--firmware", CASES / "jumps-out.ihx")
     assert err == f"{case}: --port: is not for a case of a bare processor; leave it out"
 
 
