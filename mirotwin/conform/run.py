@@ -144,9 +144,8 @@ def try_all(
         return tried(rule)
 
     outcomes = in_order(rules, outcome_of)
-    yield from islice(
-        outcomes, 1
-    )  # before the process is copied: the first trial loads what every trial needs
+    # before the process is copied: the first trial loads what every trial needs
+    yield from islice(outcomes, 1)
     with spare_process() if ahead and len(rules) >= FEWEST else nullcontext() as pool:
         if pool is not None:
             theirs |= {rule.id: pool.submit(tried, rule) for rule in presupposed_first(rules)[1::2]}

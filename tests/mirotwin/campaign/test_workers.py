@@ -3,6 +3,8 @@
 import gc
 import multiprocessing
 import os
+import pickle
+import shutil
 import signal
 import sys
 import threading
@@ -70,6 +72,23 @@ def test_a_recording_is_that_of_the_run(tmp_path):
     (job,) = jobs(range(2, 3))
     outcome = run_single(replace(job, recording=str(path)))
     assert read(path).digest == outcome.digest == run_single(job).digest
+
+
+def test_a_job_carries_its_scenario_and_its_image_with_the_symbols(tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "mine.toml").write_text('scenario = "fig7"\nduration_s = 0.2\n')
+    for suffix in (".ihx", ".map", ".cdb"):
+        shutil.copy(image_path().with_suffix(suffix), folder / f"mine{suffix}")
+    (folder / "campaign.toml").write_text(
+        'scenario = "mine.toml"\n[grid]\nfirmware = ["", "mine.ihx"]\n[expect]\nmain_loop_alive = true\n'
+    )
+    plan = campaign.load(folder / "campaign.toml")
+    shutil.rmtree(folder)
+    own, other = (work(pickle.loads(pickle.dumps(plan.work(run)))) for run in range(2))
+    assert own.verdict == "passed"
+    assert own.checks["main_loop_alive"] == "passed"  # which needs a symbol
+    assert (other.digest, other.checks, other.figures) == (own.digest, own.checks, own.figures)
 
 
 def test_whoever_stops_asking_leaves_no_job_behind(monkeypatch):
