@@ -27,9 +27,9 @@ from miro_exact import engine
 from miro_exact.clock import NEVER_TICK
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
+from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image, load_hex
 from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
-from miro_robot.mcs51.xram import XramBus
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from tests.robot.ucsim import s51
@@ -67,14 +67,14 @@ def address(image: Image, name: str) -> int:
 
 
 def ours(image: Image) -> Run:
-    faults: list[int] = []
-    cpu = Cpu(XramBus(lambda *_: None, lambda kind, *_: faults.append(kind), lambda *_: None))
+    bus = RecordingBus()
+    cpu = Cpu(bus)
     cpu.load(image.code, image.used)
     wall, processor = time.perf_counter(), time.process_time()
     reason = cpu.run_until_any((address(image, "_finish"),), NEVER_TICK)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
-    if reason != BREAKPOINT or faults:
-        sys.exit(f"{image.path.name}: ended with reason {reason} and faults {faults}")
+    if reason != BREAKPOINT or bus.fault_kind:
+        sys.exit(f"{image.path.name}: ended with reason {reason} and fault {bus.fault_kind}")
     first = address(image, "_checksum")
     checksum = bytes([cpu.peek_iram(first + place) for place in range(4)])
     return Run(wall, processor, checksum, cpu.instructions)

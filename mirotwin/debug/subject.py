@@ -27,7 +27,6 @@ from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.times import Time
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.expectations import EXPECT, as_settings
 
 
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
@@ -36,10 +35,6 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     resume: Annotated[str | None, RESUME.saying("Scenario: begin with a saved world of it.")] = None
-    expected: Annotated[
-        tuple[str, ...],
-        EXPECT.saying("Case: a check that judges it, such as FILE.py:CLASS, where that is in a file."),
-    ] = ()
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
 
@@ -75,8 +70,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     if os.path.isdir(subject):
         subject = file_in(subject, (*RECORDINGS, *CASES))
         options = msgspec.structs.replace(options, subject=subject)
-    settings = (*options.settings, *as_settings(options.expected))
-    run, verdict = open_run(msgspec.structs.replace(options, settings=settings)), None
+    run, verdict = open_run(options), None
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)

@@ -35,6 +35,7 @@ from mirotwin.shell.options import (
 from mirotwin.shell.program import complain, report_lines, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
+from mirotwin.verify.expectations import EXPECT, as_settings
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
@@ -50,6 +51,10 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
     settings: Annotated[
         tuple[str, ...],
         SET.saying("Scenario, recording, stream: a key to set in its scenario, as for `run`."),
+    ] = ()
+    expected: Annotated[
+        tuple[str, ...],
+        EXPECT.saying("Case: a check that judges it, such as FILE.py:CLASS, where that is in a file."),
     ] = ()
     network: Annotated[int | None, NETWORK.saying("Network of the robot. Default 0.")] = None
     slot: Annotated[int | None, SLOT.saying("Slot of the robot. Default: the lowest slot used.")] = None
@@ -135,7 +140,16 @@ def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
 
 
 def _bare_run(options: SubjectOptions) -> InspectedRun:
-    _refuse(options, "an image on the bare processor", "seed", "firmware", "settings", "network", "slot")
+    _refuse(
+        options,
+        "an image on the bare processor",
+        "seed",
+        "firmware",
+        "settings",
+        "expected",
+        "network",
+        "slot",
+    )
     image = load_bare_image(options.subject, options.bare)
     world = make_world(image, options.bare, target_of(options.subject, image, options.bare))
     cycles = options.bare.max_cycles
@@ -149,6 +163,7 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
     end_tick, job = None, None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
+        _refuse(options, "a scenario, of which nothing is judged here", "expected")
         text = load(subject, options.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, subject)
@@ -157,7 +172,8 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
             world = RunSpec.of(text, image, options.seed or 0).world()
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
-        job = load_job(subject, options.firmware, options.settings)
+        settings = (*options.settings, *as_settings(options.expected))
+        job = load_job(subject, options.firmware, settings)
         complain(*job.notes)
         end_tick = job.end_tick
         with plain_parameters(subject):

@@ -22,13 +22,10 @@ class RecordingBus(XramBus):
     value, tick of TI.
     """
 
-    NOT_STATE = (
-        *("code_of", "faulted", "sent", "listening", "cpu", "heard", "said"),
-        *("fault_kind", "fault_pc", "fault_tick", "reset_tick"),
-    )
+    NOT_STATE = ("cpu", "heard", "said", "fault_kind", "fault_pc", "fault_tick", "reset_tick")
 
     def __init__(self) -> None:
-        XramBus.__init__(self, _nothing, _nothing, _nothing)
+        XramBus.__init__(self)
         self.cpu: Cpu | None = None
         self.fault_pc = 0
         self.fault_tick = 0
@@ -89,7 +86,3 @@ class BareOracle(LiveOracle):
         if self.cpu.powered_down or now - self.slept_tick > _LONGEST:
             return False
         return self.cpu.peripherals.uart.ti_tick() < STOPPED_TICK
-
-
-def _nothing(*_: int) -> None:
-    """Nobody is told: everything is kept."""

@@ -32,7 +32,7 @@ def differences(code, checkpoints, stride=STRIDE):
     commands = ["fill iram 0 255 0", f"fill xram 0 {FAR_BYTES - 1} 0"]
     commands += [step, *s51.OBSERVE[1:], dump] * checkpoints
     reader = s51.Reader(s51.run(code, commands))
-    bus = XramBus(*(lambda *_: None,) * 3)
+    bus = XramBus()
     cpu = Cpu(bus)
     cpu.load(code)
     for number in range(checkpoints):

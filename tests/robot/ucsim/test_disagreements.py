@@ -67,7 +67,7 @@ def test_each_says_where_it_is_kept_out_of_the_comparison():
 
 @pytest.mark.parametrize(("name", "text", "place", "sheet", "_"), CASES, ids=[case[0] for case in CASES])
 def test_ours_does_what_the_data_sheet_says(name, text, place, sheet, _):
-    cpu = Cpu(XramBus(*(lambda *_: None,) * 3))
+    cpu = Cpu(XramBus())
     cpu.load(assemble(text).ljust(0x10000, b"\x00"))
     for _ in range(steps_of(text)):
         cpu.step()

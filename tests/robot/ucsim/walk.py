@@ -55,7 +55,7 @@ class Walker:
     def __init__(self, seed, scattered=False):
         self.random = Random(seed)
         self.scattered = scattered
-        self.bus = XramBus(_ignore, _ignore, _ignore)
+        self.bus = XramBus()
         self.cpu = Cpu(self.bus)
         self.known = bytearray(0x10000)  # bytes of code that exist
         self.visits = bytearray(0x10000)
@@ -159,7 +159,3 @@ class Walker:
         if not self.known[address]:
             self.known[address] = 1
             self.cpu.write_code(address, value)
-
-
-def _ignore(*_):
-    """Faults and characters are no business of a walk."""

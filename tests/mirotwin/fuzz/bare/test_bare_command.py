@@ -138,3 +138,22 @@ def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines
     ):
         code, _, err = mirotwin(*arguments)
         assert (code, said in err) == (2, True), err
+
+
+def test_a_case_of_a_bare_processor_is_looked_into_as_a_robots(mirotwin, engines, hexes, tmp_path):
+    inputs = corpus(tmp_path, b"!")
+    campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
+    case = next((tmp_path / "out" / "crashes").glob("no_fault-*.stream"))
+    code, out, err = mirotwin("fw", "trace", case, "--firmware", hexes["sleeps"])
+    assert (code, "LJMP 4000h" in out.replace("  ", " ")) == (3, True)
+    assert err.startswith(
+        "mirotwin: firmware fault: firmware executed outside the loaded image at 0x4000, tick "
+    )
+    case.write_text(case.read_text().replace("no_fault = true", "no_fault = true\n#: never_q = true"))
+    err = mirotwin.refuses("fw", "trace", case, "--firmware", hexes["sleeps"])
+    assert "expect.never_q: there is no such check; " in err
+    (tmp_path / "mycheck.py").write_text(CHECK)
+    more = ("--expect", f"{tmp_path}/mycheck.py:NeverQ")
+    assert mirotwin("fw", "trace", case, "--firmware", hexes["sleeps"], *more)[:2] == (code, out)
+    err = mirotwin.refuses("fw", "trace", "fig6", "--expect", "no_fault")
+    assert "fig6: is a scenario, of which nothing is judged here, --expect does not apply to it" in err
