@@ -16,7 +16,7 @@ from functools import partial
 from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_robot.board import Board
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.event_log import EventLog
@@ -194,7 +194,7 @@ class Timeline:
 
     def _run_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> None:
         while self._now < tick and not self.run.over:
-            end_tick = (self._now // CONTROL_PERIOD_TICKS + 1) * CONTROL_PERIOD_TICKS
+            end_tick = self.run.world.period_end
             self.run.to(min(tick, end_tick))
             if self._now == end_tick:
                 self._save()
@@ -318,9 +318,7 @@ class Timeline:
         """Goes on to the first tick at which `condition` is true; None at the end or where it was interrupted."""
         while not self.run.over and not self.interrupted():
             with suppress(WaitExpired):
-                event = self.run.world.run_until(
-                    condition, CONTROL_PERIOD_TICKS - self._now % CONTROL_PERIOD_TICKS
-                )
+                event = self.run.world.run_until(condition, self.run.world.period_end - self._now)
                 self._settle()
                 return event
             self._save()

@@ -20,7 +20,8 @@ from typing import Annotated
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_sim.scenario.board import PERIOD_TICKS
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
     STDIN,
@@ -43,7 +44,7 @@ LEAVE = b"\x1d"  # Ctrl-]
 SLICE_S = 0.01  # of machine time between two looks at the keyboard
 LATEST_S = 0.1  # a machine that is later than this is not sped up to catch up
 READ_BYTES = 1024
-LOOK_TICKS = 12 * CONTROL_PERIOD_TICKS  # between two looks at how far a run is
+LOOK_TICKS = 4 * PERIOD_TICKS  # between two looks at how far a run is
 
 
 def check_terminal(options: BareOptions) -> None:

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.file import load
@@ -183,7 +182,8 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
         spec = RunSpec.of(text, image, seed)
     end_tick = min(end_tick, options.compare.rule.to_tick or end_tick)
-    end_tick = -(-end_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS  # what is compared are whole ones
+    period_ticks = spec.scenario.period_ticks
+    end_tick = -(-end_tick // period_ticks) * period_ticks  # what is compared are whole ones
     spec = replace(spec, until_tick=end_tick, cut=True)
     runs = []
     for name, path in zip(NAMES, (options.a, options.b), strict=True):

@@ -9,7 +9,6 @@ import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.board import BoardScenario
@@ -48,7 +47,7 @@ class ComparedRun(msgspec.Struct, frozen=True):
         """
         try:
             world = way.world()
-            world.run_to(period * CONTROL_PERIOD_TICKS)
+            world.run_to(period * world.period_ticks)
         except BadInput:
             raise
         except ValueError:  # what no host can have sent, and no caller can have done
@@ -152,8 +151,8 @@ def _repeated(
     else:
         whose = f"{unrepeated.pop()} does" if len(unrepeated) == 1 else "they do"
         return replace(found, notes=(_OTHER_DIGESTS.format(whose),))
-    end_tick = (max(first, found.period) + 1) * CONTROL_PERIOD_TICKS
-    state = first_difference(world, other_world, end_tick, CONTROL_PERIOD_TICKS)
+    end_tick = (max(first, found.period) + 1) * world.period_ticks
+    state = first_difference(world, other_world, end_tick, world.period_ticks)
     if state is None:
         return replace(found, notes=(_NOT_RECORDED.format(found.period),))
     instruction = None

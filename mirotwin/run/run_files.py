@@ -22,7 +22,6 @@ import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
@@ -82,7 +81,7 @@ class Stops:
         self._check(world)
 
     def _check(self, world: World) -> None:
-        end_tick = world.periods * CONTROL_PERIOD_TICKS
+        end_tick = world.periods * world.period_ticks
         to_tick = end_tick if self.to_tick is None else self.to_tick
         asked = [("--save-at", tick, to_tick) for tick in self.save_ticks]
         if self.to_tick is not None:
@@ -95,7 +94,7 @@ class Stops:
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""
         waiting = list(self.save_ticks)
-        end_tick = self.to_tick or world.periods * CONTROL_PERIOD_TICKS
+        end_tick = self.to_tick or world.periods * world.period_ticks
         while not world.finished and world.tick < end_tick:
             world.run_to(min([end_tick, world.period_end, *waiting[:1]]))
             if waiting and world.tick == waiting[0]:

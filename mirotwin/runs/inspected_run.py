@@ -42,7 +42,7 @@ class InspectedRun:
         self.board = self.device.board if isinstance(self.device.board, Board) else None
         self.tick_hz = world.clock
         without_end = end_tick is None and world.periods == MOST_PERIODS
-        self.end_tick = None if without_end else end_tick or world.periods * CONTROL_PERIOD_TICKS
+        self.end_tick = None if without_end else end_tick or world.periods * world.period_ticks
 
     @property
     def over(self) -> bool:

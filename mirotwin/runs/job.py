@@ -211,7 +211,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         scenario = self.spec.scenario
         if not self.recorded:
             return self.case.end_tick or scenario.end_tick
-        return min(self.recorded[-1].index + 1, scenario.periods) * CONTROL_PERIOD_TICKS
+        return min(self.recorded[-1].index + 1, scenario.periods) * scenario.period_ticks
 
     @property
     def alone(self) -> bool:

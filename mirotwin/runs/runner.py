@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
+from miro_exact.clock import LM629_SAMPLE_TICKS
 from miro_sim.periods import Period
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def observed(
 
 def _run_samples(world: World, recorder: Recorder) -> None:
     """Up to the last LM629 sample of the period under way, recording each (they are 8192 ticks apart)."""
-    end_tick = (world.index + 1) * CONTROL_PERIOD_TICKS
+    end_tick = world.period_end
     first = -(-(world.tick + 1) // LM629_SAMPLE_TICKS) * LM629_SAMPLE_TICKS
     for tick in range(first, end_tick, LM629_SAMPLE_TICKS):
         world.run_to(tick)

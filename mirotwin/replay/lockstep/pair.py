@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.difference import moment
 from mirotwin.replay.lockstep.fields import FieldDifference, Record, differing
 
@@ -111,7 +111,7 @@ def first_difference(
         raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")
     pair = WorldPair(one, other)
     if not pair.differ():
-        end_tick = CONTROL_PERIOD_TICKS * min(one.periods, other.periods)
+        end_tick = one.period_ticks * min(one.periods, other.periods)
         found_tick = end_tick if until_tick is None else until_tick
         for step_ticks in (look_ticks, *(step for step in STEPS_TICKS if step < look_ticks)):
             narrowed_tick = pair.narrow(step_ticks, found_tick)
@@ -122,4 +122,4 @@ def first_difference(
     fields = pair.fields()
     if not fields:
         return None
-    return StateDifference(pair.tick, max(0, pair.tick - 1) // CONTROL_PERIOD_TICKS, fields, one.clock)
+    return StateDifference(pair.tick, max(0, pair.tick - 1) // one.period_ticks, fields, one.clock)

@@ -21,7 +21,6 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
 from miro_protocol.events import Damaged, Received
@@ -168,7 +167,7 @@ class Checks:
     @property
     def ended_early(self) -> bool:
         """Whether who runs the world ended it: what was still to come counts neither for nor against it."""
-        return self.cut and self.world.tick < self.world.periods * CONTROL_PERIOD_TICKS
+        return self.cut and self.world.tick < self.world.periods * self.world.period_ticks
 
     @property
     def sleep(self) -> Sleep | None:

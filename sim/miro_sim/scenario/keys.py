@@ -176,6 +176,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             )
 
     @property
+    def period_ticks(self) -> int:
+        """A control period."""
+        return CONTROL_PERIOD_TICKS
+
+    @property
     def periods(self) -> int:
         """Control periods of a run, which ends by itself with the one in which its duration does."""
         return max(1, -(-ticks(self.duration_s) // CONTROL_PERIOD_TICKS))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
+from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import TICK, Rows
 from miro_protocol.actions import Action, RadioState, Reset, ScriptItem
 from miro_protocol.decoder import Symbol
@@ -170,8 +170,8 @@ class Medium:
         for device, one in zip(self.devices, devices, strict=True):
             device.put_back(one)
 
-    def check_times(self, begun_tick: int, tick: int) -> None:
-        """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
+    def check_times(self, earliest_tick: int, tick: int) -> None:
+        """Raises ValueError unless the restored parts are at `tick`, or behind it, not before `earliest_tick`.
 
         A part that is far behind would need hours to catch up.
         """
@@ -185,7 +185,7 @@ class Medium:
             raise ValueError(f"characters wait, but the transmitter is busy until tick {free_tick}")
         for device in self.devices:
             cpu = device.board.cpu
-            if not begun_tick - CONTROL_PERIOD_TICKS <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
+            if not earliest_tick <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
                 raise ValueError(f"a CPU is at cycle {cpu.cycles}, at tick {tick}")
 
     def check_rxd(self, settled_tick: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import permutations
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_exact.clock import ticks
 from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_host.pilot import WheelCommand
@@ -193,15 +193,15 @@ class Network(Medium):
     def vision_counts(self) -> dict[str, int]:
         return self.sight.counts()
 
-    def check_times(self, begun_tick: int, tick: int) -> None:
+    def check_times(self, earliest_tick: int, tick: int) -> None:
         settled_tick = self.downlink.settled_tick
         if settled_tick != tick + SETTLE_TICKS and settled_tick + tick != 0:
             raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
-        if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
+        if not earliest_tick <= self.uplink.now <= tick:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
         if self.downlink.busy_tick > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
-        Medium.check_times(self, begun_tick, tick)
+        Medium.check_times(self, earliest_tick, tick)
         if any(answer is not None and answer.tick > tick for answer in self.telemetry.last):
             raise ValueError(f"a robot's last answer came after tick {tick}")
         self.check_rxd(settled_tick)

@@ -155,8 +155,8 @@ class Wire(Medium):
     def link_counts(self) -> tuple[int, int]:
         return self.transmissions, 0
 
-    def check_times(self, begun_tick: int, tick: int) -> None:
-        Medium.check_times(self, begun_tick, tick)
+    def check_times(self, earliest_tick: int, tick: int) -> None:
+        Medium.check_times(self, earliest_tick, tick)
         rxd = self.board.cpu.rxd
         settled_tick = rxd.settled_tick
         if self.terminal is None and settled_tick != tick + SETTLE_TICKS and tick:

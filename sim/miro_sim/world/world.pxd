@@ -1,12 +1,10 @@
 cimport cython
 from miro_sim.world.medium cimport Medium
 
-cdef long long CONTROL_PERIOD_TICKS
-
-
 cdef class World:
     cdef readonly object scenario, seed, image, periods, clock
     cdef readonly list lines
+    cdef readonly long long period_ticks
     cdef public long long tick, index
     cdef public object in_period, stopped, chain, last, bodies, waits, _state, _own, _opened
     cdef public list observers

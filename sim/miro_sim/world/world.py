@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
+from miro_exact.clock import NEVER_TICK
 from miro_exact.domain import MAX_SEED
 from miro_exact.engine import check_arithmetic
 from miro_exact.state import TICK, Flat, Octets
@@ -56,8 +56,8 @@ class Mark(NamedTuple):
 class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
-    `lines` have the devices on them: radio networks with robots, or a wire with a board. A control period of a board
-    has as many ticks as that of the robots; `clock`: ticks per second.
+    `lines` have the devices on them: radio networks with robots, or a wire with a board. `period_ticks`: of a control
+    period; `clock`: ticks per second.
 
     `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network,
     and actions (`do`). Raises ValueError for those that do, that are of no host, or of a network or robot that the
@@ -74,8 +74,8 @@ class World:
         "lines": [Medium],
     }
     NOT_STATE = (
-        "scenario", "seed", "image", "periods", "clock", "last", "bodies", "waits", "observers", "_state",
-        "_own", "_opened",
+        "scenario", "seed", "image", "periods", "clock", "period_ticks", "last", "bodies", "waits", "observers",
+        "_state", "_own", "_opened",
     )  # fmt: skip
 
     def __init__(
@@ -93,6 +93,7 @@ class World:
         self.image = image
         self.periods = scenario.periods
         self.clock = scenario.clock
+        self.period_ticks = scenario.period_ticks
         _check_senders(script or (), 1 if isinstance(scenario, BoardScenario) else len(scenario.networks))
         self.bodies: Bodies | None = None
         if isinstance(scenario, BoardScenario):
@@ -159,7 +160,7 @@ class World:
 
     def step(self) -> Period:
         """Runs to the end of the control period that is under way and returns what it left behind."""
-        self.run_to((self.index + 1) * CONTROL_PERIOD_TICKS)
+        self.run_to((self.index + 1) * self.period_ticks)
         assert self.last is not None
         return self.last
 
@@ -174,7 +175,7 @@ class World:
         while self.tick < tick and not self.stopped:
             self.begin_period()
             self.run_piece(self.rendezvous(tick))
-            if self.stopped or self.tick == (self.index + 1) * CONTROL_PERIOD_TICKS:
+            if self.stopped or self.tick == (self.index + 1) * self.period_ticks:
                 self.end_period()
 
     def run_for(self, ticks: int) -> None:
@@ -281,7 +282,7 @@ class World:
     @property
     def period_end(self) -> int:
         """Tick at which the control period ends that is under way, or begins now."""
-        return (self.index + 1) * CONTROL_PERIOD_TICKS
+        return (self.index + 1) * self.period_ticks
 
     def begin_period(self) -> None:
         """The camera frame, unless the period has begun already."""
@@ -292,7 +293,7 @@ class World:
 
     def rendezvous(self, tick: int) -> int:
         """Where everything meets next, going to `tick`."""
-        next_tick = min(tick, (self.index + 1) * CONTROL_PERIOD_TICKS)
+        next_tick = min(tick, (self.index + 1) * self.period_ticks)
         for line in self.lines:
             if line.actions.waiting:
                 action_tick = line.actions.next_after(self.tick)
@@ -336,7 +337,7 @@ class World:
         actions: list[Action] = []
         for line in self.lines:
             actions += line.actions.take()
-        begun = index * CONTROL_PERIOD_TICKS
+        begun = index * self.period_ticks
         self.last = Period(index, begun, tuple(robots), tuple(wire), self.chain.hex(), tuple(actions))
         for observer in self.observers:
             observer(self.last)
@@ -407,15 +408,15 @@ class World:
 
     def after_load(self) -> None:
         """Raises ValueError unless all parties stand where the world does."""
-        begun = self.index * CONTROL_PERIOD_TICKS
-        first = begun - CONTROL_PERIOD_TICKS if self.stopped else begun
-        last = begun + CONTROL_PERIOD_TICKS - 1 if self.in_period or self.stopped else begun
+        begun = self.index * self.period_ticks
+        first = begun - self.period_ticks if self.stopped else begun
+        last = begun + self.period_ticks - 1 if self.in_period or self.stopped else begun
         if not first <= self.tick <= last:
             raise ValueError(f"the world is at tick {self.tick}, but period {self.index} begins at {begun}")
         if len(self.chain) != (hashlib.sha256().digest_size if self.index else 0):
             raise ValueError(f"the digest has {len(self.chain)} bytes after {self.index} periods")
         for line in self.lines:
-            line.check_times(begun, self.tick)
+            line.check_times(begun - self.period_ticks, self.tick)
 
     def identity(self) -> Identity:
         """What a saved world must belong to so that this one can load it."""

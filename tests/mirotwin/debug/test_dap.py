@@ -145,11 +145,13 @@ SLOW = """
 LCALL slow
 SJMP $
 slow:
+MOV R5,#4
 MOV R6,#0
 MOV R7,#0
 again:
 DJNZ R7,again
 DJNZ R6,again
+DJNZ R5,again
 RET
 """
 
@@ -168,7 +170,7 @@ class ClientDuringARun:
         self.events[message.get("event")] = message["body"]
 
 
-@pytest.mark.parametrize(("place", "stops_at"), [(0x1000, 3), (13, 13)])  # elsewhere; before RET
+@pytest.mark.parametrize(("place", "stops_at"), [(0x1000, 3), (17, 17)])  # elsewhere; before RET
 def test_a_step_goes_on_past_a_change_of_breakpoints_and_stops_at_new_ones(place, stops_at):
     places = {"breakpoints": [{"instructionReference": hex(place)}]}
     wire = ClientDuringARun({"seq": 2, "command": "setInstructionBreakpoints", "arguments": places})

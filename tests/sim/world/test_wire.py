@@ -4,11 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board_spec import BoardSpec
-from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board import PERIOD_TICKS, BoardScenario
 from miro_sim.scenario.terminal import InputPiece, TerminalSpec
 from miro_sim.world.conditions import (
     Command,
@@ -148,7 +147,7 @@ def test_the_end_of_a_program_is_an_event_behind_its_last_character():
     (_, (last_tick, _)) = heard(world)
     assert last_tick < event.tick <= last_tick + 24
     assert [chr(value) for _, value in heard(world)] == ["H", "i"]
-    world.run_for(CONTROL_PERIOD_TICKS)
+    world.run_for(PERIOD_TICKS)
     assert not world.stopped
 
 
@@ -230,7 +229,7 @@ def test_however_it_is_cut_saved_and_waited_on_the_bits_are_the_same(data, cuts,
         cut.load(saved)
         with pytest.raises(WaitExpired):
             cut.run_until(Transmitted(byte=0x100 - 1 if 255 not in data else 0), within=1_000)
-    end_tick = 2 * CONTROL_PERIOD_TICKS
+    end_tick = 2 * PERIOD_TICKS
     whole.run_to(end_tick)
     cut.run_to(max(end_tick, cut.tick))
     if cut.tick == whole.tick:
@@ -254,9 +253,9 @@ def test_a_digest_holds_the_ram_that_was_written_since_the_last_one():
 
 def test_input_that_waits_is_saved_and_no_part_of_the_digest():
     worlds = [board_world(ECHO, terminal=TerminalSpec(live=True)) for _ in range(2)]
-    worlds[0].run_to(CONTROL_PERIOD_TICKS - 24)
+    worlds[0].run_to(PERIOD_TICKS - 24)
     worlds[0].lines[0].terminal.input.add(b"x")
     for world in worlds:
-        world.run_to(CONTROL_PERIOD_TICKS)
+        world.run_to(PERIOD_TICKS)
     assert worlds[0].digest == worlds[1].digest
     assert bits(worlds[0]) != bits(worlds[1])
