@@ -71,9 +71,7 @@ class BoardTarget(Target):
         bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
         begin_tick = CYCLE_TICKS * self.processor.cpu.cycles
         self.scenario = BoardScenario(board=board, bit_ticks=bit_ticks, begin_tick=begin_tick)
-        self.subject = Subject(
-            self.processor, image, begin_tick, ticks_per_second=crystal_hz, begin_tick=begin_tick
-        )
+        self.subject = Subject(self.processor, image, begin_tick, clock=crystal_hz, begin_tick=begin_tick)
         self.checks = checks
         for check in checks:
             _refuse_unseen(check, self.subject)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from miro_exact.bad_input import amount
-from miro_exact.clock import NEVER_TICK
+from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_sim.world.device import Device
 from miro_sim.world.robot import Robot
 from mirotwin.shell.verdicts import VERDICTS, Verdict
@@ -25,8 +25,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     """`said`: a line for each part that failed, or could not be judged; `failures`: of checks, in the order of time.
 
     `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
-    the run ended. `left`: the folder with its case; `left_out`: what settings left out of the scenario, a line each.
-    `again`: the command that gives the verdict again; `error`: why there was no run.
+    the run ended; `clock`: ticks per second. `left`: the folder with its case; `left_out`: what settings left out,
+    a line each. `again`: the command that gives the verdict again; `error`: why there was no run.
     """
 
     path: str = ""
@@ -38,6 +38,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     steps: int = 0
     unseen: int = 0
     tick: int = 0
+    clock: int = TICKS_PER_SECOND
     seed: int = 0
     digest: str = ""
     firmware_sha256: str = ""

@@ -184,6 +184,7 @@ class Run:
             done=0 if player is None else player.done,
             steps=0 if player is None else player.count,
             tick=world.tick if self.tick < 0 else self.tick,
+            clock=world.clock,
             seed=self.spec.seed,
             digest=world.digest,
             firmware_sha256=world.image.sha256 or "",

@@ -108,7 +108,7 @@ def _show(result: Result, quiet: bool) -> None:
         return
     steps = f"{result.done} of {amount(result.steps, 'step')}, " if result.steps else ""
     digest = f", digest {result.digest[:12]}" if result.digest else ""  # of a robot at a port there is none
-    how = f" ({steps}{in_ms(result.tick)}{digest})" if steps or digest else ""
+    how = f" ({steps}{in_ms(result.tick, result.clock)}{digest})" if steps or digest else ""
     show_line(f"{VERDICTS[result.verdict].line}  {result.path}{how}")
     for line in (*result.lines, *result.notes):
         show_line(f"    {line}")

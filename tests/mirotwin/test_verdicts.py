@@ -171,6 +171,15 @@ def test_a_stream_for_a_bare_processor_has_one_verdict(mirotwin, tmp_path, progr
     assert mirotwin("replay", path, "--firmware", file, "-q")[0] == VERDICTS[verdict].code
 
 
+def test_the_end_of_a_case_is_told_in_the_time_of_its_crystal(mirotwin, tmp_path):
+    file = hex_file(tmp_path / "a.ihx", bytes(image(SLEEPS).code[:256]))
+    path = tmp_path / "a.stream"
+    head = BARE.format(head="#: end_tick = 5529600\n", name="no_fault", begin=100_000)
+    path.write_text(head.replace("#: bit_ticks", "#: crystal_hz = 11059200\n#: bit_ticks") + "3000000 > 61\n")
+    out = mirotwin.succeeds("test", path, "--firmware", file)
+    assert f"{path} (500.000 ms, digest " in out
+
+
 def test_a_run_that_was_ended_before_a_check_is_not_held_against_it(mirotwin, tmp_path):
     file, folder = tmp_path / "a.scenario.toml", tmp_path / "run"
     file.write_text(

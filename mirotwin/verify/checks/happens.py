@@ -60,7 +60,7 @@ class ConditionMonitor(Monitor[ConditionCheck]):
         slot = check.condition.at_slot(subject.first_slot)
         place = (check.condition.network, subject.first_slot if slot == PC else slot)
         self.done = place != (subject.network, subject.slot)
-        hertz = subject.ticks_per_second
+        hertz = subject.clock
         duration = in_ms(check.until_tick - max(check.after_tick, 0), hertz)
         within = f"{check.condition} within {duration}"
         self.wanted = within if check.KIND == "liveness" else f"no {check.condition} for {duration}"

@@ -90,7 +90,7 @@ class JudgedDevice(Protocol):
 
 class Subject(msgspec.Struct, frozen=True):
     """The device that is judged: a robot, or a board alone, which runs `image`. `end_tick`: when the run is over by
-    itself. `ticks_per_second`: of its clock. `begin_tick`: what happens before is not judged.
+    itself. `clock`: ticks per second. `begin_tick`: what happens before is not judged.
 
     Of a robot: `robots`: slots of its network; `first_slot`: of the robots that are present there; `radio`: from the PC
     to them. `cut`: the run may be ended before: what was still to come does not fail then. Of a board alone: `sleep`.
@@ -103,7 +103,7 @@ class Subject(msgspec.Struct, frozen=True):
     first_slot: int = 0
     radio: Downlink | None = None
     cut: bool = False
-    ticks_per_second: int = TICKS_PER_SECOND
+    clock: int = TICKS_PER_SECOND
     begin_tick: int = 0
     sleep: Sleep | None = None
 
@@ -194,7 +194,7 @@ class Monitor(Generic[C_co]):
         self.failed += 1
         if len(self.failures) < KEPT:
             subject = self.subject
-            alone_hz = subject.ticks_per_second if subject.alone else 0
+            alone_hz = subject.clock if subject.alone else 0
             place = (subject.network, subject.slot)
             self.failures.append(Failure(self.check.name, *place, tick, wanted, found, fault, alone_hz))
 
@@ -228,14 +228,14 @@ def ms_ticks(time_ms: float) -> int:
     return ticks(time_ms / 1000.0)
 
 
-def in_ms(duration_ticks: int, ticks_per_second: int = TICKS_PER_SECOND) -> str:
+def in_ms(duration_ticks: int, clock: int = TICKS_PER_SECOND) -> str:
     """A duration for people."""
-    return f"{duration_ticks * 1000 / ticks_per_second:.3f} ms"
+    return f"{duration_ticks * 1000 / clock:.3f} ms"
 
 
-def at(tick: int, ticks_per_second: int = TICKS_PER_SECOND) -> str:
+def at(tick: int, clock: int = TICKS_PER_SECOND) -> str:
     """A tick for people."""
-    return f"tick {tick} ({in_ms(tick, ticks_per_second)})"
+    return f"tick {tick} ({in_ms(tick, clock)})"
 
 
 class FirstFailure(msgspec.Struct, frozen=True):

@@ -321,9 +321,7 @@ def _subject(world: World, line: Medium, device: Device, cut: bool) -> Subject:
     begin_tick = world.scenario.begin_tick
     sleep = Sleep(device.board.cpu, begin_tick, end_tick)
     hertz = world.clock
-    return Subject(
-        device, world.image, end_tick, cut=cut, ticks_per_second=hertz, begin_tick=begin_tick, sleep=sleep
-    )
+    return Subject(device, world.image, end_tick, cut=cut, clock=hertz, begin_tick=begin_tick, sleep=sleep)
 
 
 NO_OCCASION = "the run had no occasion for it"

@@ -351,7 +351,7 @@ def test_its_check_says_what_is_wrong():
     found = {}
     exec(CHECK, found)
     for level, failures in ((100, []), (101, ["wanted at most 100, found 101"])):
-        place = {"network": 0, "slot": 0, "ticks_per_second": 24_000_000, "alone": True}
+        place = {"network": 0, "slot": 0, "clock": 24_000_000, "alone": True}
         monitor = found["LevelIsKept"]().monitor(SimpleNamespace(memory={"level": level}, **place))
         monitor.end(1000)
         assert [one.what for one in monitor.failures] == failures
