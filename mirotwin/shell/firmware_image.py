@@ -5,7 +5,6 @@ It is up when its serial receiver is on (REN in SCON), which is all that a robot
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,17 +20,13 @@ from miro_robot.image.symbol_files import STACK
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu
 
-_Stamp = tuple[tuple[int, int] | None, ...]
-"""Time and size of the image and of the symbol files beside it, None for one that is not there."""
-
-
 def load_firmware(
     path: str | Path | None = None,
     limit: int = FLASH_BYTES,
     named: bool = True,
     stack_from: int | None = None,
 ) -> Image:
-    """The firmware image at `path`, or the robot's own; a process reads a file once, until it changes.
+    """The firmware image at `path`, or the robot's own. What is parsed once (`image`) is not parsed again.
 
     `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
     `stack_from`: first address of its stack, which only an image without a linker's map may be given.
@@ -39,8 +34,7 @@ def load_firmware(
     """
     file = Path(path) if path else image_path()
     check_regular(file)
-    beside = file.with_suffix(".map"), file.with_suffix(".cdb")
-    image = _loaded(file, limit, tuple(map(_stamp, (file, *beside))))
+    image = load_hex(file, limit)
     if named:
         _ = image.symbols.names
     if stack_from is None:
@@ -50,19 +44,6 @@ def load_firmware(
         what = f"the .map beside the image begins its stack at {known.address:#04x}"
         raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
     return msgspec.structs.replace(image, symbols=image.symbols.with_stack(stack_from))
-
-
-@lru_cache(maxsize=32)
-def _loaded(file: Path, limit: int, stamp: _Stamp) -> Image:
-    return load_hex(file, limit)
-
-
-def _stamp(file: Path) -> tuple[int, int] | None:
-    try:
-        status = file.stat()
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_size
 
 
 BOOT_PERIODS = 8
