@@ -10,6 +10,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 TICKS_PER_SECOND = 24_000_000
+NS_PER_SECOND = 1_000_000_000
 
 CYCLE_TICKS = 12
 """8051 machine cycle: 12 oscillator periods."""
@@ -76,6 +77,6 @@ def seconds(tick: int) -> float:
     return tick / TICKS_PER_SECOND
 
 
-def nanoseconds(tick: int) -> int:
+def nanoseconds(tick: int, crystal_hz: int = TICKS_PER_SECOND) -> int:
     """Ticks to whole nanoseconds, rounded down (one tick is 125/3 ns); the time stamp of recordings."""
-    return tick * 125 // 3
+    return tick * NS_PER_SECOND // crystal_hz

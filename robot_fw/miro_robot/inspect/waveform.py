@@ -13,6 +13,7 @@ from typing import IO, Any, NamedTuple
 from vcd.gtkw import GTKWSave
 from vcd.writer import VCDWriter
 
+from miro_exact.clock import NS_PER_SECOND, TICKS_PER_SECOND, nanoseconds
 from miro_robot.board import Board
 from miro_robot.inspect.tap import PLACES, UNKNOWN, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
@@ -84,8 +85,6 @@ SIGNALS = (
     *(Signal(f"p{port}_", "ports", 8, f"port{port}", f"pins of P{port}") for port in range(4)),
 )
 
-TICK_HZ = 24_000_000  # of every board, and of the bare CPU by default
-NS_PER_SECOND = 1_000_000_000
 SETTLING_TICKS = 4096
 """After it begins to look on in mid-run, so long a level may still be on its way: encoder edges are reported up to a
 step of the plant (2048 ticks) late, and the CPU may be four cycles ahead."""
@@ -106,7 +105,7 @@ class Waveform:
         board: Board | None = None,
         first_tick: int = 0,
         end_tick: int | None = None,
-        tick_hz: int = TICK_HZ,
+        tick_hz: int = TICKS_PER_SECOND,
     ) -> None:
         if end_tick is not None and end_tick <= first_tick:
             raise ValueError(f"ticks {first_tick} to {end_tick}: the window is empty")
@@ -231,13 +230,8 @@ class Waveform:
         return port_pins(self._levels, place - _LATCH) if more else self._levels[place]
 
 
-def nanoseconds(tick: int, tick_hz: int = TICK_HZ) -> int:
-    """A time stamp."""
-    return tick * NS_PER_SECOND // tick_hz
-
-
 def _ticks_in_words(tick_hz: int) -> str:
-    if tick_hz == TICK_HZ:
+    if tick_hz == TICKS_PER_SECOND:
         return "ticks of 24 MHz as ns = tick * 125 // 3"
     return f"ticks of {tick_hz} Hz as ns = tick * {NS_PER_SECOND} // {tick_hz}"
 

@@ -64,7 +64,7 @@ def _named(value: Any) -> Iterator[tuple[str, str]]:
             if name == "expect":
                 yield from (("check", key) for key in field)
             elif name == "step":
-                yield from (("check", key) for step in field for key in _table(step.get("check")))
+                yield from (("check", key) for step in field for key in table_of(step.get("check")))
             else:
                 yield from _named(field)
     elif isinstance(value, list | tuple):
@@ -74,7 +74,8 @@ def _named(value: Any) -> Iterator[tuple[str, str]]:
         yield from _named(tuple(value.values()))
 
 
-def _table(value: Any) -> dict[str, Any]:
+def table_of(value: Any) -> dict[str, Any]:
+    """The value, if it is a table; what has another shape is left to whoever checks the scenario."""
     return value if isinstance(value, dict) else {}
 
 

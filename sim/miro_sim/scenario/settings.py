@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.bad_input import encodable
 from miro_host.registries import LAWS
 from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import Refused, ScenarioError
@@ -109,7 +110,9 @@ def _read(text: str) -> tuple[list[str], Any]:
     keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not equals or not all(keys):
         raise Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
-    if not _is_utf8(text):
+    if (
+        encodable(text) != text
+    ):  # bytes that no encoding makes text of: Python hands them on as lone surrogates
         raise Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
     path = ".".join(keys)
     try:
@@ -117,15 +120,6 @@ def _read(text: str) -> tuple[list[str], Any]:
     except TomlError as error:
         place = "" if error.place in ("", path) else f"{error.place}: "
         raise Refused(f"{place}{error.what}", error.remedy) from None
-
-
-def _is_utf8(text: str) -> bool:
-    """False for bytes of a command line that no encoding makes text of: Python hands them on as lone surrogates."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 class _Path:

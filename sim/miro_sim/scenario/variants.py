@@ -8,6 +8,7 @@ it. In a file (`variant = "ideal"`) it is a default: keys that the file gives wi
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from miro_sim.scenario.plugins import table_of
 from miro_sim.scenario.profiles import named, overridden
 
 Table = dict[str, Any]
@@ -33,17 +34,17 @@ def impose(raw: Table, name: object) -> None:
         raw["camera"] = dict(variant["camera"])
     else:
         _take_out(raw.get("camera"), DISTURBING_CAMERA)
-        raw["camera"] = {"kind": "pixels", **_table(raw.get("camera"))}
+        raw["camera"] = {"kind": "pixels", **table_of(raw.get("camera"))}
     raw["host"] = dict(variant.get("host", {}))
     for network in _tables(raw, "network"):
-        radio = _table(network.get("radio"))
+        radio = table_of(network.get("radio"))
         kept = {key: radio[key] for key in STAYS_IN_RADIO if key in radio}
         network["radio"] = {**kept, **variant.get("radio", {})}
         network.pop("control_noise", None)
         for robot in _tables(network, "robot"):
             _take_out(robot, ("wheel_radius_mismatch",))
             _take_out(robot.get("drive"), DISTURBING_DRIVE)
-            _take_out(_table(robot.get("drive")).get("chassis"), DISTURBING_CHASSIS)
+            _take_out(table_of(robot.get("drive")).get("chassis"), DISTURBING_CHASSIS)
             robot.update(variant.get("robot", {}))
 
 
@@ -80,10 +81,6 @@ def _camera(given: Any, default: Table) -> Any:
 
 def _filled(given: Any, default: Table) -> Any:
     return {**default, **given} if isinstance(given, dict) else given
-
-
-def _table(value: object) -> Table:
-    return value if isinstance(value, dict) else {}
 
 
 def _take_out(table: object, keys: tuple[str, ...]) -> None:

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.clock import nanoseconds
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot import inspect
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform, nanoseconds
+from miro_robot.inspect.waveform import SETTLING_TICKS, SIGNALS, Waveform
 from miro_robot.lm629.chip import PWM_TICKS
 from miro_robot.wiring import Latch, load_wiring
 from tests.naive.waveform import Sampler, Treadmill
