@@ -20,6 +20,7 @@ from miro_robot.image.symbol_files import STACK
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu
 
+
 def load_firmware(
     path: str | Path | None = None,
     limit: int = FLASH_BYTES,
