@@ -11,11 +11,16 @@ from miro_protocol.decoder import TelemetryDecoder as TelemetryDecoder
 from miro_protocol.frames import ServiceFrame as ServiceFrame
 from miro_protocol.frames import TeamFrame as TeamFrame
 from miro_protocol.transmission import Transmission as Transmission
+from miro_robot.board_spec import BoardSpec as BoardSpec
 from miro_robot.firmware import image_path as image_path
 from miro_robot.image import Image as Image
 from miro_robot.image import load_hex as load_hex
 from miro_sim.scenario import file as _scenarios
+from miro_sim.scenario.board import BoardScenario as BoardScenario
 from miro_sim.scenario.keys import Scenario as Scenario
+from miro_sim.scenario.terminal import InputPiece as InputPiece
+from miro_sim.scenario.terminal import PinEvent as PinEvent
+from miro_sim.scenario.terminal import TerminalSpec as TerminalSpec
 from miro_sim.world import conditions as conditions
 from miro_sim.world.events import Event as Event
 from miro_sim.world.waits import WaitExpired as WaitExpired

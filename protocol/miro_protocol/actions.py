@@ -36,7 +36,7 @@ class RadioState(msgspec.Struct, frozen=True):
 
 
 class PinLevel(msgspec.Struct, frozen=True):
-    """`TICK * P1.0 0|1`: the level that is put on a port pin of the bare machine."""
+    """`TICK * P1.0 0|1`: the level that is put on a port pin of a board alone."""
 
     tick: int
     pin: str

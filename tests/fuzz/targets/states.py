@@ -1,4 +1,4 @@
-"""Saved states whose fields are others and whose checksum is right: worlds, a board, a bare machine.
+"""Saved states whose fields are others and whose checksum is right: worlds, a robot's board, a board alone.
 
 An input names fields by number, each with the bytes that stand there instead. A field of fixed size keeps it unless
 the input says otherwise. The state must be refused with a ValueError and without a change, or run on.
@@ -196,5 +196,5 @@ TARGETS = {
     "world-shared": _target("the same with radio `shared`", lambda: _world("shared")),
     "sealed": Target("the form around a saved world", _sealed, most_bytes=64),
     "board-state": _target("a board's state with other values", _board),
-    "bare-state": _target("a bare machine's state with other values", _bare),
+    "bare-state": _target("a board alone, its state with other values", _bare),
 }

@@ -1,4 +1,4 @@
-"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps, serial input, levels of pins from a file."""
+"""The board alone of `fw run`: RAM, terminal, ends of a run, dumps, serial input, levels of pins from a file."""
 
 from itertools import pairwise
 

@@ -1,5 +1,7 @@
 """A board alone on a wire of the world: input, waits, its end, and its state."""
 
+import sys
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,10 +21,12 @@ from miro_sim.world.conditions import (
     Received,
     Sent,
     Transmitted,
+    WheelSpeeds,
     When,
 )
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
+from tests import children
 from tests.robot.mcs51.asm import image_of
 
 BIT_TICKS = 2496
@@ -259,3 +263,31 @@ def test_input_that_waits_is_saved_and_no_part_of_the_digest():
         world.run_to(PERIOD_TICKS)
     assert worlds[0].digest == worlds[1].digest
     assert bits(worlds[0]) != bits(worlds[1])
+
+
+SOURCE = """
+from miro_exact import engine
+engine.select({engine!r})
+from tests.sim.world.test_wire import ECHO, board_world, typed
+world = board_world(ECHO, terminal=typed(b"ab", wait=True))
+world.run_to(300_000)
+print(world.save().hex())
+world.run_to(2_500_000)
+print(world.digest)
+"""
+
+
+def test_both_engines_give_the_same_bits():
+    compiled, python = (
+        children.run(
+            [sys.executable, "-c", SOURCE.format(engine=engine)], capture_output=True, text=True
+        ).stdout
+        for engine in ("compiled", "python")
+    )
+    assert compiled
+    assert compiled == python
+
+
+def test_speeds_of_wheels_are_refused_where_there_are_none():
+    with pytest.raises(ValueError, match="is a wire with a board, and no robot"):
+        wait(board_world(ECHO), WheelSpeeds(left_m_s=0.1))
