@@ -18,6 +18,8 @@ from miro_robot.probe import Probe
 _TICKS = 12  # per machine cycle
 
 _RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP = 0, 1, 2, 3, 7, 11
+OUTSIDE = 7
+"""Places of what the outside puts on P0 to P3, from here on."""
 _IN_SERVICE, _ROUTINE, _DATA, _SIDE = 12, 14, 20, 21
 _CS, _BUSY, _HI, _PWM, _SIGN, _MAGNITUDE, _A, _B, _PER_SIDE = 0, 5, 6, 7, 8, 9, 10, 11, 12
 _CHIP_PINS = 5  # /CS, /RD, /WR, PS, /RST, as the board has them

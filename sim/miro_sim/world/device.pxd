@@ -9,7 +9,7 @@ cdef class Device:
     cdef readonly object network, slot, log, image
     cdef readonly list counter_addresses
     cdef public tuple marks
-    cdef public list asked
+    cdef public list asked, pin_moves
 
     cpdef int run(self, long long tick) except -1
     cpdef long long sample_tick(self) except -1

@@ -17,11 +17,21 @@ COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 class Device:
     """`network` and `slot` name it in records: the line, and its place there.
 
-    `marks`, `asked`: addresses and predicates of a wait.
+    `marks`, `asked`: addresses and predicates of a wait. `pin_moves`: what the outside will put on port pins, where
+    that is known: tick, port, levels.
     """
 
     STATE: dict[str, Any] = {"board": ProcessorBoard}
-    NOT_STATE: tuple[str, ...] = ("network", "slot", "log", "marks", "asked", "image", "counter_addresses")
+    NOT_STATE: tuple[str, ...] = (
+        "network",
+        "slot",
+        "log",
+        "marks",
+        "asked",
+        "image",
+        "counter_addresses",
+        "pin_moves",
+    )
 
     def __init__(self, board: ProcessorBoard, network: int, slot: int, image: Image) -> None:
         self.board = board
@@ -31,6 +41,7 @@ class Device:
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Any], object], str]] = []
         self.image = image
+        self.pin_moves: list[tuple[int, int, int]] = []
         self.counter_addresses: list[int | None] | None = None
 
     def run(self, tick: int) -> int:

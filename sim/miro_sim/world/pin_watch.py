@@ -7,10 +7,10 @@ from itertools import groupby
 from operator import itemgetter
 
 from miro_robot.board import Board
-from miro_robot.inspect.tap import PLACES, CpuTap, port_pins
+from miro_robot.inspect.tap import OUTSIDE, PLACES, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
-from miro_robot.processor_board import ProcessorBoard
 from miro_sim.world.conditions import PORT_PINS
+from miro_sim.world.device import Device
 from miro_sim.world.events import Event
 from miro_sim.world.watch import EDGES, Entry
 
@@ -21,13 +21,18 @@ _BY_TICK = itemgetter(0)
 class PinWatch:
     """Edges of some `pins` of a robot with exact ticks, from now until `close`. It costs the CPU its fast loop."""
 
-    def __init__(self, robot_id: tuple[int, int], board: ProcessorBoard, pins: set[str]) -> None:
+    def __init__(self, robot_id: tuple[int, int], device: Device, pins: set[str]) -> None:
+        board = device.board
         self.robot_id = robot_id
         self.board = board
+        self.moves = device.pin_moves
         self.pins = sorted(pins)
         self.tap = CpuTap(board if isinstance(board, Board) else None, lambda: None)
         attach(board.cpu, self.tap)
         self._levels = list(self.tap.start)
+        self._moved = bisect_right(self.moves, self.tap.begin_tick, key=_BY_TICK)
+        for _, port, levels in self.moves[: self._moved]:
+            self._levels[OUTSIDE + port] = levels
         self._shown = {pin: self._level(pin) for pin in self.pins}
 
     def close(self) -> None:
@@ -39,6 +44,9 @@ class PinWatch:
         found: list[Entry] = []
         network, slot = self.robot_id
         events = self.tap.events
+        moved = bisect_right(self.moves, known_tick, key=_BY_TICK)
+        events += [(tick, OUTSIDE + port, levels) for tick, port, levels in self.moves[self._moved : moved]]
+        self._moved = max(self._moved, moved)
         events.sort(key=_BY_TICK)
         done = bisect_right(events, known_tick, key=_BY_TICK)
         for tick, changes in groupby(events[:done], key=_BY_TICK):

@@ -250,6 +250,17 @@ class PinInput:
             raise ValueError(f"{self.done} of {len(self.events)} events were handed over")
 
 
+def moves(events: tuple[PinEvent, ...]) -> list[tuple[int, int, int]]:
+    """Tick, port and all its levels, at each change of a pin that is not RXD."""
+    levels, found = [0xFF] * 4, []
+    for tick, port, bit, level in events:
+        now = levels[port] & (0xFF ^ 1 << bit) | level << bit
+        if (port, bit) != RXD and now != levels[port]:
+            levels[port] = now
+            found.append((tick, port, now))
+    return found
+
+
 class Terminal:
     """Serial input and levels for the pins of `board`, as `spec` says. `next_feed`: cycle of the next look at both.
 

@@ -74,9 +74,7 @@ class Watch:
             PinWatch,  # with it the robot's board, which another one does not need
         )
 
-        self.pins = [
-            PinWatch(robot_id, self.world.device(*robot_id).board, pins[robot_id]) for robot_id in pins
-        ]
+        self.pins = [PinWatch(robot_id, self.world.device(*robot_id), pins[robot_id]) for robot_id in pins]
 
     def edges(self, beyond: bool = False) -> list[Entry]:
         """The edges up to where the world is that were not taken yet.

@@ -17,7 +17,7 @@ from miro_sim.world.device import Device
 from miro_sim.world.events import HostLog
 from miro_sim.world.medium import Medium, sent_to
 from miro_sim.world.outbox import Outbox
-from miro_sim.world.terminal import Terminal
+from miro_sim.world.terminal import Terminal, moves
 
 _STOP = CHARACTER_BITS - 1
 
@@ -66,7 +66,10 @@ class Wire(Medium):
         self.output: Callable[[bytes], object] | None = None
         outbox = Outbox(0, index, CHARACTER_BITS * scenario.bit_ticks)
         log = HostLog(index, lambda tick: tick, 0)
-        Medium.__init__(self, index, host, [BoardAlone(board, index, image)], outbox, log)
+        alone = BoardAlone(board, index, image)
+        if scenario.terminal is not None:
+            alone.pin_moves = moves(scenario.terminal.pins)
+        Medium.__init__(self, index, host, [alone], outbox, log)
         if sending and not self.bit_ticks:
             raise ValueError(f"net{index}: how long a bit of the script is must be given (bit_ticks)")
         if self.terminal is not None and script:

@@ -10,7 +10,7 @@ from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board_spec import BoardSpec
 from miro_sim.scenario.board import PERIOD_TICKS, BoardScenario
-from miro_sim.scenario.terminal import InputPiece, TerminalSpec
+from miro_sim.scenario.terminal import InputPiece, PinEvent, TerminalSpec
 from miro_sim.world.conditions import (
     Command,
     Edge,
@@ -143,6 +143,14 @@ def test_conditions_of_a_board_are_those_of_a_robot():
     assert true.tick == 72_000
     with pytest.raises(WaitExpired):
         wait(world, [Heard(), Command(), Sent()], within=1_000_000)
+
+
+def test_a_pin_that_the_outside_moves_has_edges_at_their_ticks():
+    pins = (PinEvent(50_001, 3, 2, 0), PinEvent(90_005, 3, 2, 1), PinEvent(90_005, 1, 0, 0))
+    world = board_world("wait:\nSJMP wait", terminal=TerminalSpec(pins=pins))
+    fall = wait(world, Edge(pin="P3.2"))
+    rise = wait(world, [Edge(pin="P1.0", level=1), Edge(pin="P3.2", level=1)])
+    assert [(edge.tick, edge.value) for edge in (fall, rise)] == [(50_001, 0), (90_005, 1)]
 
 
 def test_the_end_of_a_program_is_an_event_behind_its_last_character():
