@@ -70,20 +70,14 @@ def moved(one: AnnotatedImage, other: AnnotatedImage) -> Moved:
 
 
 def _pieces(annotated: AnnotatedImage) -> dict[str, tuple[int, int]]:
-    """Name -> where the code begins and ends, in the order of addresses."""
-    symbols = annotated.image.symbols
-    if symbols.problem is not None:
-        return {}
-    found: dict[int, str] = {}
-    for name, symbol in sorted(symbols.names.items()):
-        if symbol.space == "code" and any(
-            first <= symbol.address < end for first, end in annotated.image.used
-        ):
-            found.setdefault(symbol.address, name)
-    pieces = {}
-    for start, following in pairwise([*sorted(found), 1 << 16]):
-        end = next(end for first, end in annotated.image.used if first <= start < end)
-        pieces[found[start]] = (start, min(end, following))
+    """Name -> where the code begins and ends, in the order of addresses; none without symbols."""
+    image, pieces = annotated.image, dict[str, tuple[int, int]]()
+    if image.symbols.problem is not None or not image.symbols.names:
+        return pieces
+    for (start, name), (following, _) in pairwise([*annotated.names.functions, (1 << 16, "")]):
+        for first, end in image.used:
+            if first <= start < end:
+                pieces.setdefault(name, (start, min(end, following)))
     return pieces
 
 
