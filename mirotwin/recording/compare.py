@@ -17,7 +17,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_sim.periods import Axis, Period, RobotPeriod
@@ -37,10 +37,10 @@ _VELOCITY_UNIT = 65536.0
 
 
 class CompareRule(msgspec.Struct, frozen=True):
-    """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) are told.
+    """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) count.
 
     `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
-    PCs did, `digests`: also the digests of the states (both of bits only).
+    PCs did, `digests`: also the digests of the states (both of bits only). `clock`: ticks a second.
     """
 
     kind: Kind = "bits"
@@ -51,6 +51,7 @@ class CompareRule(msgspec.Struct, frozen=True):
     to_tick: int | None = None
     host: bool = False
     digests: bool = False
+    clock: int = TICKS_PER_SECOND
 
     def compared(self, periods: Sequence[Period]) -> int:
         """How many of the control periods have a part in the window."""

@@ -19,7 +19,7 @@ from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
-from mirotwin.replay.options import CompareOptions, refuse_given
+from mirotwin.replay.options import CompareOptions, check_reaches, extent, refuse_given, rule_as_json
 from mirotwin.replay.sources import source_differences
 from mirotwin.replay.text import difference_lines, difference_tables, source_tables
 from mirotwin.runs.job import DEFAULT_SCENARIO, load_job, recorded_spec, recording_notes
@@ -101,13 +101,13 @@ def diff(options: DiffOptions) -> int:
     sources = checked_sources(options.sources)
     one, other = _run_images(options) if _are_images(options) else _read_recordings(options)
     one, other = _with_same_robots(one, other)
-    for run in (one, other):
-        compare.check_reaches(run.ways[0].origin, run.periods)
     (spec, *_), (other_spec, *_) = one.ways, other.ways
+    rule, notes = _rule(compare.rule(spec.scenario.clock), one, other)
+    for run in (one, other):
+        check_reaches(rule, run.ways[0].origin, run.periods)
     known = load_images(options.lines_from, spec.image, other_spec.image)
     annotate = partial(annotated_of, images=known, sources=sources)
     alike = (spec.scenario, spec.seed) == (other_spec.scenario, other_spec.seed)
-    rule, notes = _rule(compare.rule, one, other)
     found = compare_runs(one, other, rule, (annotate, annotate), NAMES, alike)
     found = replace(found, notes=(*one.notes, *other.notes, *notes, *found.notes))
     origins = [*source_differences(one, other)]
@@ -120,7 +120,7 @@ def diff(options: DiffOptions) -> int:
             document |= {"on": options.on, "seed": spec.seed}
         document["sources"] = [each.as_json() for each in origins]
         document["periods"] = {"a": len(one.periods), "b": len(other.periods)}
-        document |= compare.rule_as_json() | found.as_json(options.everything) | {"exit_code": code}
+        document |= rule_as_json(rule) | found.as_json(options.everything) | {"exit_code": code}
         print_json(document)
     return code
 
@@ -181,7 +181,7 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         refuse_steps(text.scenario, text.origin)
         image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
         spec = RunSpec.of(text, image, seed)
-    end_tick = min(end_tick, options.compare.rule.to_tick or end_tick)
+    end_tick = min(end_tick, options.compare.rule(spec.scenario.clock).to_tick or end_tick)
     period_ticks = spec.scenario.period_ticks
     end_tick = -(-end_tick // period_ticks) * period_ticks  # what is compared are whole ones
     spec = replace(spec, until_tick=end_tick, cut=True)
@@ -246,8 +246,8 @@ def _report(
     if found.differences or cut:
         return exit_code("differs")
     if not options.compare.as_json:
-        extent = options.compare.extent(shorter)
+        whole = extent(found.rule, shorter)
         whence = "" if alike else "; they were not made from the same"
-        recorded = f"the recordings hold the same in {extent}{whence}"
-        show(recorded if one.recorded else f"on {options.on}, the images do the same in {extent}")
+        recorded = f"the recordings hold the same in {whole}{whence}"
+        show(recorded if one.recorded else f"on {options.on}, the images do the same in {whole}")
     return DONE

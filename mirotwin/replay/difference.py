@@ -12,7 +12,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.board import BoardScenario
-from mirotwin.recording.compare import CompareRule, differences
+from mirotwin.recording.compare import EXACT, CompareRule, differences
 from mirotwin.recording.difference import DIGEST, WORDS, Difference, first_per_channel
 from mirotwin.replay.lockstep.annotated_image import AnnotatedImage
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference, first_instruction
@@ -60,7 +60,7 @@ class ComparedRun(msgspec.Struct, frozen=True):
 class RunDifference(msgspec.Struct, frozen=True):
     """Where two runs, called `names`, differ. `differences`: of what they did, in the order of time. `state` and
     `instruction` were found by repeating both; `notes`: what could not be done, and why.
-    `alone`: they are of a board without a robot.
+    `alone`: they are of a board without a robot. `rule`: what counts.
     """
 
     names: tuple[str, str] = WORDS
@@ -69,6 +69,7 @@ class RunDifference(msgspec.Struct, frozen=True):
     instruction: FirmwareDifference | None = None
     notes: Sequence[str] = ()
     alone: bool = False
+    rule: CompareRule = EXACT
 
     @property
     def period(self) -> int:
@@ -121,7 +122,7 @@ def compare_runs(
     `annotate`: finds the debug files of their images. `only_firmware`: apart from that they were made alike, so that
     its first changed instruction is looked for.
     """
-    found = RunDifference(names, differences(one.periods, other.periods, rule))
+    found = RunDifference(names, differences(one.periods, other.periods, rule), rule=rule)
     if not found.differences:
         return found
     if one.ways:

@@ -93,31 +93,21 @@ class CompareOptions(Options, frozen=True, kw_only=True):
                     raise BadInput("", option, what, f"give {whose} with it")
         window(self.from_time, self.to_time)
 
-    @property
-    def rule(self) -> CompareRule:
-        """The comparison that the options describe."""
+    def rule(self, clock: int = TICKS_PER_SECOND) -> CompareRule:
+        """The comparison that the options describe, of worlds with so many ticks a second."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
-        from_tick, to_tick = window(self.from_time, self.to_time)
-        usual = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
+        from_tick, to_tick = window(self.from_time, self.to_time, clock)
+        usual_ticks = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
+        within_s = Fraction(usual_ticks, TICKS_PER_SECOND) if ms is None else Fraction(ms) / 1000
         return CompareRule(
             kind=self.kind,
-            within_ticks=usual if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
+            clock=clock,
+            within_ticks=int(within_s * clock),
             within_counts=WITHIN_COUNTS if counts is None else counts,
             within_counts_per_sample=WITHIN_COUNTS_PER_SAMPLE if per_sample is None else per_sample,
             from_tick=from_tick,
             to_tick=to_tick,
         )
-
-    def check_reaches(self, file: str, recorded: Sequence[Period]) -> None:
-        """Raises BadInput for a window that begins where the recording has ended, or ends where it begins."""
-        rule, first, last = self.rule, recorded[0], recorded[-1]
-        end_tick = last.tick + CONTROL_PERIOD_TICKS
-        if rule.from_tick >= end_tick:
-            what = f"the recording ends at tick {end_tick}"
-            raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
-        if rule.to_tick is not None and rule.to_tick <= first.tick:
-            what = f"the run begins at tick {first.tick}"
-            raise BadInput(file, f"--to {rule.to_tick}t", what, "look later")
 
     def of_answers(self, file: str) -> CompareRule:
         """The comparison of robots at a port. Raises BadInput for one that cannot be made there."""
@@ -126,25 +116,38 @@ class CompareOptions(Options, frozen=True, kw_only=True):
         for option in (*window, *kind):
             remedy = "leave it out" if option in window else "use --compare answers"
             raise BadInput(file, option, "is not for what was recorded at a port", remedy)
-        return self.rule if self.kind == "answers" else ANSWERS
+        return self.rule() if self.kind == "answers" else ANSWERS
 
-    def extent(self, periods: Sequence[Period]) -> str:
-        """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
-        rule = self.rule
-        whole = f"all {amount(rule.compared(periods), 'control period')}"
-        if rule.kind in _APPLIES["within_ms"]:
-            return f"{whole} ({rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms)"
-        if rule.kind == "wheels":
-            per_sample = f"{rule.within_counts_per_sample:g} counts per sample"
-            return f"{whole} (wheels, within {rule.within_counts} counts and {per_sample})"
-        return whole
 
-    def rule_as_json(self) -> dict[str, Any]:
-        rule = self.rule
-        tolerances = {
-            "within_ms": rule.within_ticks / _TICKS_PER_MS,
-            "within_counts": rule.within_counts,
-            "within_counts_per_sample": rule.within_counts_per_sample,
-        }
-        own = {name: value for name, value in tolerances.items() if rule.kind in _APPLIES[name]}
-        return {"compare": rule.kind, **own, "from_tick": rule.from_tick, "to_tick": rule.to_tick}
+def check_reaches(rule: CompareRule, file: str, recorded: Sequence[Period]) -> None:
+    """Raises BadInput for a window that begins where the recording has ended, or ends where it begins."""
+    first, last = recorded[0], recorded[-1]
+    end_tick = last.tick + CONTROL_PERIOD_TICKS
+    if rule.from_tick >= end_tick:
+        what = f"the recording ends at tick {end_tick}"
+        raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
+    if rule.to_tick is not None and rule.to_tick <= first.tick:
+        what = f"the run begins at tick {first.tick}"
+        raise BadInput(file, f"--to {rule.to_tick}t", what, "look later")
+
+
+def extent(rule: CompareRule, periods: Sequence[Period]) -> str:
+    """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
+    whole = f"all {amount(rule.compared(periods), 'control period')}"
+    if rule.kind in _APPLIES["within_ms"]:
+        return f"{whole} ({rule.kind}, within {1000 * rule.within_ticks / rule.clock:g} ms)"
+    if rule.kind == "wheels":
+        per_sample = f"{rule.within_counts_per_sample:g} counts per sample"
+        return f"{whole} (wheels, within {rule.within_counts} counts and {per_sample})"
+    return whole
+
+
+def rule_as_json(rule: CompareRule) -> dict[str, Any]:
+    """With its own tolerances only."""
+    tolerances = {
+        "within_ms": 1000 * rule.within_ticks / rule.clock,
+        "within_counts": rule.within_counts,
+        "within_counts_per_sample": rule.within_counts_per_sample,
+    }
+    own = {name: value for name, value in tolerances.items() if rule.kind in _APPLIES[name]}
+    return {"compare": rule.kind, **own, "from_tick": rule.from_tick, "to_tick": rule.to_tick}

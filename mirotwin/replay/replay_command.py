@@ -16,7 +16,7 @@ from miro_robot.image import Image
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
-from mirotwin.replay.options import CompareOptions, refuse_given
+from mirotwin.replay.options import CompareOptions, check_reaches, extent, refuse_given, rule_as_json
 from mirotwin.replay.text import SHOWN, difference_lines, difference_tables, frame_tables, response_table
 from mirotwin.runs.job import Job, load_job
 from mirotwin.runs.result import Result, expectations_text
@@ -163,15 +163,16 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
 
 def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOptions) -> int:
     """Replays it; a stream has nothing to be compared with."""
-    compare, to_tick = options.compare, options.compare.rule.to_tick
+    compare, rule = options.compare, options.compare.rule()
+    to_tick = rule.to_tick
     if job.recorded:
-        compare.check_reaches(job.spec.origin, job.recorded)
+        check_reaches(rule, job.spec.origin, job.recorded)
     recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
     again = _rerun(job, to_tick, not options.shows)
     found = compare_runs(
         ComparedRun(recorded, [job.as_recorded] if job.image and job.as_recorded else []),
         ComparedRun(again.periods, [job.spec]),
-        replace(compare.rule, digests=job.state == again.world.state.tables()),
+        replace(rule, digests=job.state == again.world.state.tables()),
         (
             partial(annotated_of, images=images, sources=()),
             partial(annotated_of, images=(), sources=options.sources),
@@ -193,14 +194,14 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     elif ended and not found.differences:
         complain(f"the replay ended after {len(again.periods)} of {len(recorded)} recorded control periods")
     elif recorded and not found.differences and not compare.as_json:
-        show(f"the robots' response equals the recorded one in {compare.extent(again.periods)}")
+        show(f"the robots' response equals the recorded one in {extent(rule, again.periods)}")
     differs = (found.differences or ended) and not options.expects
     code = exit_code(result.verdict, *(["differs"] if differs else []))
     if compare.as_json:
         firmware = {"recorded": job.image and job.image.sha256, "replayed": job.spec.image.sha256}
         periods = {"recorded": len(job.recorded), "replayed": len(again.periods)}
         head = {"file": job.spec.origin, "seed": job.spec.seed, "firmware": firmware, "periods": periods}
-        print_json({**head, **compare.rule_as_json(), **found.as_json(options.everything), "exit_code": code})
+        print_json({**head, **rule_as_json(rule), **found.as_json(options.everything), "exit_code": code})
     return code
 
 
