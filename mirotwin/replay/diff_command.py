@@ -12,7 +12,9 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_robot.image import FLASH_BYTES, SPACE_BYTES
 from miro_sim.periods import Period, RobotId
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.file import load
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.reader import parse
@@ -175,6 +177,9 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         job = load_job(on, options.a, options.settings, options.seed)
         complain(*job.notes)
         spec, end_tick = job.spec, job.end_tick
+        if job.alone and options.compare.kind not in ("bits", "bytes"):
+            what = f"is for robots, and {on} is for a board alone"
+            raise BadInput("", f"--compare {options.compare.kind}", what, "compare bits or bytes")
     else:
         text = load(on, options.settings)
         tell_notes(text.notes)
@@ -187,12 +192,13 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
     spec = replace(spec, until_tick=end_tick, cut=True)
     runs = []
     for name, path in zip(NAMES, (options.a, options.b), strict=True):
-        again = replace(spec, image=load_firmware(path))
+        limit = SPACE_BYTES if isinstance(spec.scenario, BoardScenario) else FLASH_BYTES
+        again = replace(spec, image=load_firmware(path, limit))
         with plain_parameters(on):
             run = Run(again)
         with ProgressBar(f"running {name}", end_tick, not options.shows) as bar, replaying(on, run.world):
             run.play(bar.to)
-        faults = [f"{name}: {text}" for _, text in fault_lines(run.world.robots)]
+        faults = [f"{name}: {text}" for _, text in fault_lines(run.world.devices)]
         runs.append(ComparedRun(run.periods, [again], notes=faults))
     return runs[0], runs[1]
 

@@ -1,5 +1,6 @@
 """Boards without a robot are compared as robots are: what they send, their states, the instruction."""
 
+import json
 from functools import partial
 
 import pytest
@@ -12,7 +13,8 @@ from mirotwin.replay.difference import ComparedRun, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.text import difference_lines
 from mirotwin.runs.spec import RunSpec
-from tests.robot.mcs51.asm import image_of
+from tests.mirotwin.conftest import hex_file
+from tests.robot.mcs51.asm import assemble, image_of
 
 CRYSTAL_HZ = 11_059_200
 BIT_TICKS = CRYSTAL_HZ // 9600
@@ -65,3 +67,43 @@ def test_another_answer_is_named_with_its_time_by_the_crystal_and_the_instructio
     assert "the first changed instruction that is executed: A tick " in lines[2]
     place = found.instruction.changed.one
     assert f"({place.tick / CRYSTAL_HZ:.6f} s)" in lines[2]
+
+
+@pytest.fixture
+def images(tmp_path):
+    return [hex_file(tmp_path / f"{name}.ihx", assemble(ECHO.format(name))) for name in (0, 1)]
+
+
+@pytest.fixture
+def stream(tmp_path):
+    path = tmp_path / "hello.stream"
+    header = f"#: [bare]\n#: crystal_hz = {CRYSTAL_HZ}\n#: bit_ticks = {BIT_TICKS}\n"
+    path.write_text(f"# mirotwin stream 2\n{header}50000 > 68 65 6c 6c 6f\n")
+    return path
+
+
+def test_diff_takes_two_images_of_any_board_with_a_stream_for_it(mirotwin, images, stream):
+    code, out, err = mirotwin("diff", *images, "--on", stream)
+    assert code == 4
+    assert "the images differ in control period 0, tick " in err
+    assert "/net0/wire: A 68 65 6c 6c 6f at tick " in err
+    assert "the first changed instruction that is executed: A tick " in err
+    assert "firmware code, the first of 1 byte" in out
+    assert "on" in mirotwin.succeeds("diff", images[0], images[0], "--on", stream, "-q")
+
+
+def test_a_fault_of_one_of_two_boards_is_named(mirotwin, images, stream, tmp_path):
+    faulty = hex_file(tmp_path / "faulty.ihx", assemble("SJMP far\nfar:\nDB 0A5h"))
+    err = mirotwin.ends(4, "diff", images[0], faulty, "--on", stream, "-q")
+    assert "B: firmware fault: firmware executed the undefined opcode A5" in err
+
+
+@pytest.mark.parametrize("kind", ["commands", "wheels"])
+def test_what_only_robots_have_is_not_compared_of_boards(mirotwin, images, stream, kind):
+    err = mirotwin.refuses("diff", *images, "--on", stream, "--compare", kind)
+    assert f"--compare {kind}: is for robots, and {stream} is for a board alone; compare bits or bytes" in err
+
+
+def test_times_on_the_command_line_are_those_of_the_boards_crystal(mirotwin, images, stream):
+    document = json.loads(mirotwin("diff", *images, "--on", stream, "--json", "--to", "100ms")[1])
+    assert document["to_tick"] == CRYSTAL_HZ // 10
