@@ -40,7 +40,8 @@ class CompareRule(msgspec.Struct, frozen=True):
     """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) count.
 
     `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
-    PCs did, `digests`: also the digests of the states (both of bits only). `clock`: ticks a second.
+    PCs did, `digests`: also the digests of the states (both of bits only). `clock`: ticks a second;
+    `period_ticks`: of one control period.
     """
 
     kind: Kind = "bits"
@@ -52,13 +53,13 @@ class CompareRule(msgspec.Struct, frozen=True):
     host: bool = False
     digests: bool = False
     clock: int = TICKS_PER_SECOND
+    period_ticks: int = CONTROL_PERIOD_TICKS
 
     def compared(self, periods: Sequence[Period]) -> int:
         """How many of the control periods have a part in the window."""
         to_tick = NEVER_TICK if self.to_tick is None else self.to_tick
         return sum(
-            self.from_tick < period.tick + CONTROL_PERIOD_TICKS and period.tick < to_tick
-            for period in periods
+            self.from_tick < period.tick + self.period_ticks and period.tick < to_tick for period in periods
         )
 
 
@@ -97,7 +98,7 @@ def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> I
     if rule.digests and rule.kind == "bits":
         for here, there in zip(one, other, strict=True):
             if here.digest != there.digest:
-                end_tick = here.tick + CONTROL_PERIOD_TICKS
+                end_tick = here.tick + rule.period_ticks
                 yield Difference(end_tick, here.index, -1, -1, DIGEST, here.digest, there.digest)
 
 
@@ -142,27 +143,29 @@ def _commands(one: Sequence[Period], other: Sequence[Period], rule: CompareRule)
         for side in ("left", "right"):
             here, there = (sequences.commands(run, index, side, exact) for run in (one, other))
             place = robot.network, robot.slot, f"lm629 {side} command"
-            yield from _unlike(here, there, within_ticks, known_tick, place)
+            yield from _unlike(here, there, within_ticks, known_tick, place, rule.period_ticks)
 
 
 def _air(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Characters are known once their stop bits were sampled."""
     within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
-    end_tick = one[-1].tick + CONTROL_PERIOD_TICKS
+    end_tick = one[-1].tick + rule.period_ticks
     robots = {robot.network for robot in one[0].robots}
     for network in sorted(robots or {0}):  # 0: the wire of a board alone
         if rule.kind == "bytes":
             known_tick = end_tick - within_ticks - HOST_CHARACTER_TICKS
             here, there = sequences.characters(one, network), sequences.characters(other, network)
-            yield from _unlike(here, there, within_ticks, known_tick, (network, -1, "wire"))
+            yield from _unlike(
+                here, there, within_ticks, known_tick, (network, -1, "wire"), rule.period_ticks
+            )
             continue
         for name, sent in (("wire", False), *([("wire sent", True)] if rule.host else [])):
             here = sequences.transmissions(one, network, sent)
             there = sequences.transmissions(other, network, sent)
-            yield from _unlike(here, there, 0, NEVER_TICK, (network, -1, name))
+            yield from _unlike(here, there, 0, NEVER_TICK, (network, -1, name), rule.period_ticks)
         if rule.host:
             done, there = sequences.actions(one, network), sequences.actions(other, network)
-            yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "actions"))
+            yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "actions"), rule.period_ticks)
 
 
 def _unlike(
@@ -171,12 +174,13 @@ def _unlike(
     within_ticks: int,
     known_tick: int,
     place: tuple[int, int, str],
+    period_ticks: int,
 ) -> Iterator[Difference]:
     for here, there in sequences.unlike(one, other, within_ticks):
         tick = min(each.tick for each in (here, there) if each is not None)
         if tick < known_tick or (here is not None and there is not None):
             texts = (None if here is None else str(here), None if there is None else str(there))
-            yield Difference(tick, tick // CONTROL_PERIOD_TICKS, *place, *texts)
+            yield Difference(tick, tick // period_ticks, *place, *texts)
 
 
 def _response(robot: RobotPeriod) -> NamedValues:

@@ -235,7 +235,8 @@ def _rule(rule: CompareRule, one: ComparedRun, other: ComparedRun) -> tuple[Comp
     digests = bits and recorded and one.state == other.state  # they are of states of one form
     why = "their states have another form, by scenario or version of this program"
     notes = [f"the digests are not compared: {why}"] if bits and recorded and not digests else []
-    return replace(rule, host=bits, digests=digests), notes
+    period_ticks = one.ways[0].scenario.period_ticks
+    return replace(rule, host=bits, digests=digests, period_ticks=period_ticks), notes
 
 
 def _report(

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import click
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_sim.periods import Period
 from mirotwin.desk.compare import ANSWERS
 from mirotwin.recording.compare import (
@@ -122,7 +122,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
 def check_reaches(rule: CompareRule, file: str, recorded: Sequence[Period]) -> None:
     """Raises BadInput for a window that begins where the recording has ended, or ends where it begins."""
     first, last = recorded[0], recorded[-1]
-    end_tick = last.tick + CONTROL_PERIOD_TICKS
+    end_tick = last.tick + rule.period_ticks
     if rule.from_tick >= end_tick:
         what = f"the recording ends at tick {end_tick}"
         raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")

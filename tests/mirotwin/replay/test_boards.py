@@ -107,3 +107,4 @@ def test_what_only_robots_have_is_not_compared_of_boards(mirotwin, images, strea
 def test_times_on_the_command_line_are_those_of_the_boards_crystal(mirotwin, images, stream):
     document = json.loads(mirotwin("diff", *images, "--on", stream, "--json", "--to", "100ms")[1])
     assert document["to_tick"] == CRYSTAL_HZ // 10
+    assert (document["period"], document["periods"]) == (0, {"a": 1, "b": 1})
