@@ -113,7 +113,7 @@ class BoardTarget(Target):
                 self._feed(monitor)
                 monitor.end(tick)
             except (Exception, SystemExit) as error:
-                return Failure(check.name, 0, 0, tick, "", raised(error))
+                return Failure(check.name, 0, 0, tick, "", raised(error), alone_hz=self.subject.clock)
             if monitor.failures:
                 return monitor.failures[0]  # type: ignore[no-any-return]
         return None
@@ -121,9 +121,8 @@ class BoardTarget(Target):
     def _feed(self, monitor: Any) -> None:
         """Tells a monitor what the serial port took and gave in the last run, and of the last reset."""
         bus = self.processor.bus
-        if (
-            type(monitor).event is SerialMonitor.event
-        ):  # without events, which take longer to make than a short run
+        # Without events where it can be: they take longer to make than a short run.
+        if type(monitor).event is SerialMonitor.event:
             monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
             monitor.sent = [Character(value, tick) for value, tick in bus.said]
         elif monitor.EVENTS:

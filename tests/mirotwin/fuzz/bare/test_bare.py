@@ -22,6 +22,7 @@ from mirotwin.fuzz.board_target import (
 )
 from mirotwin.fuzz.oracle import BoardOracle
 from mirotwin.fuzz.protocols import protocol_named
+from mirotwin.verify.checks.interface import Check, Monitor
 from mirotwin.verify.checks.serial import Character
 from tests.exact import distribution
 from tests.mirotwin.verify.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
@@ -209,6 +210,40 @@ def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
     assert target.run(b"ab\xff") == CHECK_CODE
     assert target.failure.what == "the last one is 255"
     assert target.failure.check == "keeps_the_last"
+
+
+def test_a_check_that_raises_fails_with_what_it_raised():
+    target = BoardTarget(image(SLEEPS), "bytes", checks=[check_of("raises", lambda monitor: monitor.nothing)])
+    assert target.run(b"a") == CHECK_CODE
+    assert target.failure.check == "raises"
+    assert target.failure.what.startswith("AttributeError: 'OwnMonitor' object has no attribute 'nothing' (")
+
+
+class Hears(Monitor):
+    EVENTS = ("transmitted",)
+
+    def event(self, event):
+        self.judged += 1
+        if event.value == 0x62:
+            self.fail(event.tick, "no b", "one")
+
+
+class NoB(Check, frozen=True, kw_only=True, tag="no_b"):
+    KIND = "safety"
+    SUBJECTS = ("board",)
+
+    def monitor(self, subject):
+        return Hears(self, subject)
+
+
+def test_a_check_of_events_judges_each_run_too_and_one_that_wants_more_is_refused(monkeypatch):
+    target = BoardTarget(image(SLEEPS), "bytes", checks=[NoB()])
+    assert target.run(b"ac") == 0
+    assert target.run(b"ab") == CHECK_CODE
+    assert target.failure.what == "wanted no b, found one"
+    monkeypatch.setattr(Hears, "EVENTS", ("transmitted", "fault"))
+    with pytest.raises(BadInput, match="no_b judges by fault, which only a whole run shows; leave it out"):
+        BoardTarget(image(SLEEPS), "bytes", checks=[NoB()])
 
 
 @pytest.mark.parametrize(
