@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -38,6 +38,8 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     terminal: TerminalSpec | None = None
     begin_tick: int = 0
     expect: dict[str, Any] = {}
+    period_ticks: ClassVar[int] = PERIOD_TICKS
+    """From one digest to the next."""
 
     def __post_init__(self) -> None:
         if self.bit_ticks and not FASTEST_BIT_TICKS <= self.bit_ticks <= self.board.crystal_hz:
@@ -54,11 +56,6 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     @property
     def clock(self) -> int:
         return self.board.crystal_hz
-
-    @property
-    def period_ticks(self) -> int:
-        """From one digest to the next."""
-        return PERIOD_TICKS
 
     @property
     def periods(self) -> int:

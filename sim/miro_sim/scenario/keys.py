@@ -167,6 +167,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     networks: Annotated[tuple[NetworkSpec, ...], Meta(min_length=1)] = msgspec.field(name="network")
     clock: ClassVar[int] = TICKS_PER_SECOND
     """Of the world."""
+    period_ticks: ClassVar[int] = CONTROL_PERIOD_TICKS
+    """A control period."""
 
     def __post_init__(self) -> None:
         if len(self.networks) > MAX_NETWORKS:
@@ -174,11 +176,6 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                 f"network: {len(self.networks)} networks, each of which takes as much time as a run;"
                 f" at most {MAX_NETWORKS}, make several scenarios of them"
             )
-
-    @property
-    def period_ticks(self) -> int:
-        """A control period."""
-        return CONTROL_PERIOD_TICKS
 
     @property
     def periods(self) -> int:

@@ -11,7 +11,6 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import encodable
 from miro_host.registries import LAWS
 from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import Refused, ScenarioError
@@ -110,13 +109,14 @@ def _read(text: str) -> tuple[list[str], Any]:
     keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not equals or not all(keys):
         raise Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
-    if (
-        encodable(text) != text
-    ):  # bytes that no encoding makes text of: Python hands them on as lone surrogates
-        raise Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
     path = ".".join(keys)
     try:
+        text.encode()
         return keys, value_of(value, path)
+    except (
+        UnicodeEncodeError
+    ):  # bytes that no encoding makes text of: Python hands them on as lone surrogates
+        raise Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file") from None
     except TomlError as error:
         place = "" if error.place in ("", path) else f"{error.place}: "
         raise Refused(f"{place}{error.what}", error.remedy) from None
