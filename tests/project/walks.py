@@ -88,7 +88,10 @@ def walk(code, module, function, record, first, made_too):
         def made(node):
             """Whether it is another thing, that was made with it."""
             calls = [one for one in ast.walk(node) if isinstance(one, ast.Call)]
-            named = [one.func.id for one in calls if isinstance(one.func, ast.Name)]
+            made_by = [
+                getattr(one.func, "value", one.func) for one in calls
+            ]  # `Run(..)`, or `RunSpec.of(..)`
+            named = [one.id for one in made_by if isinstance(one, ast.Name)]
             return any(name[:1].isupper() for name in named) or (calls and not made_too)
 
         for node in sorted(
