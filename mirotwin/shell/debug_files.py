@@ -42,14 +42,19 @@ def with_debug_files(image: Image) -> Image:
     return own if own.sha256 == image.sha256 else image
 
 
+def is_robots_own(image: Image) -> bool:
+    """Whether an image is the robot's own firmware, whose C files are installed."""
+    return source_folder() is not None and load_firmware(named=False).sha256 == image.sha256
+
+
 def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
     """Where C files are looked for: the folders of --sources, the image's own, and for the robot's firmware that one's.
 
     Raises BadInput for a folder that is not there.
     """
     folders, own = [*map(Path, checked_sources(given)), image.path.parent], source_folder()
-    if own is not None and load_firmware(named=False).sha256 == image.sha256:
-        folders.insert(0, own)  # another firmware's files may have the same names
+    if own is not None and is_robots_own(image):
+        folders.append(own)
     return Sources(folders)
 
 

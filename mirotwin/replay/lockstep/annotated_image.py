@@ -15,7 +15,7 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 from mirotwin.recording.difference import moment
 from mirotwin.replay.lockstep.fields import Record
-from mirotwin.shell.debug_files import debugged_image
+from mirotwin.shell.debug_files import debugged_image, is_robots_own
 
 
 class CodeLocation(Record, frozen=True):
@@ -73,6 +73,8 @@ class AnnotatedImage:
 
 def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
     """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
+    if is_robots_own(image):
+        sources = ()  # they are for the firmware beside it, whose files may have the same names
     return AnnotatedImage(*debugged_image(image, images, sources))
 
 
