@@ -17,7 +17,6 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_protocol.actions import ScriptItem
-from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
@@ -135,6 +134,8 @@ class Run:
 
     def _let_answer(self, sleep: Sleep, progress: Callable[[int], object]) -> None:
         """A board that has gone to sleep in time goes on until its answer is sent, which belongs to the run."""
+        from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS  # only boards alone need it loaded
+
         world, last_tick = self.world, self.world.tick + LONGEST_ANSWER_TICKS
         sleep.next_tick(world.tick)
         while sleep.answers and not world.stopped and world.tick < last_tick:

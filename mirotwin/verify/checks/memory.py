@@ -5,9 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.image import Image
-from miro_robot.image.c_types import value_of
-from miro_robot.image.variables import find_variable
-from miro_robot.inspect.values import bytes_at
 from miro_robot.mcs51.cpu import Cpu
 
 
@@ -23,6 +20,10 @@ class Memory:
 
         Names as `file:name`, `name[2]`, `name.x`. Raises BadInput for one that the .cdb beside the image does not know.
         """
+        from miro_robot.image.c_types import value_of  # few checks read variables: no run need load this
+        from miro_robot.image.variables import find_variable
+        from miro_robot.inspect.values import bytes_at
+
         variable, variables = find_variable(self._image, name)
         return value_of(variable.type, bytes_at(self._cpu, self._image, variable), variables.fields(variable))
 

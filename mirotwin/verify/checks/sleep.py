@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
-from miro_robot.harness.harness import SETTLE_TICKS
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.uart import STOPPED_TICK
 
@@ -25,6 +24,8 @@ class Sleep:
     def next_tick(self, tick: int) -> int:
         """Looks if that is due, the run being at `tick`; where the run has to stop next."""
         if tick >= self.look_tick and self.sleeps is None:
+            from miro_robot.harness.harness import SETTLE_TICKS  # only boards alone need it loaded
+
             self.sleeps = bool(self.cpu.idle or self.cpu.idle_cycles)
             self.look_tick = max(self.look_tick, self.end_tick - SETTLE_TICKS)
         if tick >= self.look_tick:
