@@ -214,7 +214,7 @@ def test_input_that_is_still_to_come_wakes_a_sleeper():
     assert machine.run() == Ended.HALTED
     assert machine.cpu.peek_iram(0x30) == ord("z")
     woken = machine.cpu.cycles
-    assert machine.run(pause=woken + 100_000) == Ended.HALTED
+    assert machine.run(pause=woken + 300_000) == Ended.HALTED
     assert (machine.cpu.cycles, machine.cpu.idle) == (woken, 1)
 
 
