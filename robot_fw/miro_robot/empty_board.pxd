@@ -8,7 +8,7 @@ cdef int ENDED, FAULT, REACHED, ASLEEP, BREAKPOINT, REPLAN, STOPPED, _EA, _SOURC
 
 cdef class EmptyBoard(ProcessorBoard):
     cdef readonly object spec, image
-    cdef readonly list loops
+    cdef readonly tuple loops
     cdef public tuple stop_at, ends
     cdef public bint stop_at_end
     cdef public object sent, listening

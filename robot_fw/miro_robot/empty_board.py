@@ -19,7 +19,7 @@ from miro_robot.event_log import ENDED, FAULT, REACHED
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, REPLAN, STOPPED
-from miro_robot.mcs51.opcodes import jumps_to_itself
+from miro_robot.mcs51.opcodes import jumps_to_itself, jumps_to_themselves
 from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.processor_board import ProcessorBoard
 
@@ -87,12 +87,7 @@ class EmptyBoard(ProcessorBoard):
         self.ended = 0  # ... and that is over, too
         self.next_check = 0  # cycle at which to set `ends` again
         self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
-        self.loops = [  # jumps to themselves, among them some in the middle of instructions
-            address
-            for first, end in image.used
-            for address in range(first, end)
-            if jumps_to_itself(image.code.__getitem__, address)
-        ]
+        self.loops = jumps_to_themselves(image.code, image.used)
         self.ram = bytearray(image.code if self.shared else _BYTES)
         self.memory = self.ram
         self.written = bytearray(_BYTES)  # with code_in_xram: 1 where the program has put code

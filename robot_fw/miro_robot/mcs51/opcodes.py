@@ -8,6 +8,7 @@ instruction table and 2.1; AT89C52 data sheet, SFR map.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 SFRS = {
     "P0": 0x80, "SP": 0x81, "DPL": 0x82, "DPH": 0x83, "PCON": 0x87, "TCON": 0x88, "TMOD": 0x89,
@@ -237,6 +238,13 @@ def jumps_to_itself(code_at: Callable[[int], int], address: int) -> bool:
     if opcode == _SJMP:
         return first == 0xFE
     return not is_call(opcode) and _absolute(opcode, first, second, address) == address
+
+
+@lru_cache(16)  # a fuzzer confirms each input on a new board
+def jumps_to_themselves(code: bytes, used: tuple[tuple[int, int], ...]) -> tuple[int, ...]:
+    """In these ranges (first, end), among them some in the middle of instructions."""
+    ranges = (range(first, end) for first, end in used)
+    return tuple(at for addresses in ranges for at in addresses if jumps_to_itself(code.__getitem__, at))
 
 
 def _absolute(opcode: int, first: int, second: int, address: int) -> int | None:

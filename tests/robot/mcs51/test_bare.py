@@ -66,6 +66,13 @@ def test_code_in_xram_runs_what_it_writes():
     assert other.run(max_cycles=1000) == Ended.FAULT
 
 
+def test_where_a_program_may_end_is_searched_once_for_an_image():
+    first, other = (Alone(image_of(text)) for text in ("NOP\nSJMP $", "SJMP $\nNOP"))
+    assert (first.board.loops, other.board.loops) == ((1,), (0,))
+    again = Alone(image_of("NOP\nSJMP $"), code_in_xram=True)
+    assert again.board.loops is first.board.loops
+
+
 def test_a_run_stops_at_an_address_and_goes_on():
     machine = Alone(image_of("NOP\nNOP\nMOV A,#01h\nSJMP $"))
     assert machine.run(until=2, max_cycles=1000) == Ended.UNTIL
