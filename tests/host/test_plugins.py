@@ -8,7 +8,7 @@ import sys
 import msgspec
 import pytest
 
-from miro_exact.plugins import PluginError
+from miro_exact.plugins import PluginError, use_one_of
 from miro_exact.raised import raised, raised_at
 from miro_host.laws.yang_kim import Gains
 from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
@@ -20,7 +20,7 @@ from mirotwin.verify.checks.expect import CHECKS
 from tests import children
 from tests.exact.distribution import install
 
-OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback", "epsilon_tracking"]
+OWN = list(LAWS.own)
 GOOD = """
 from miro_host.laws.interface import Law, LawParameters, Velocities
 
@@ -111,7 +111,7 @@ def test_a_scenario_that_uses_the_ambiguous_law_by_default_says_where(site):
 
 def test_an_unknown_name_gets_the_nearest_and_the_list(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
-    choices = "use yang_kim, body_frame, kanayama, dynamic_feedback, epsilon_tracking or steady"
+    choices = use_one_of([*OWN, "steady"])
     assert reason("stedy") == f"'stedy' is not one of the choices; did you mean steady? {choices}"
     assert reason("pid") == f"'pid' is not one of the choices; {choices}"
 

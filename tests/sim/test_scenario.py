@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.plugins import use_one_of
 from miro_host.estimators.predict import NoEstimator, PredictParameters
 from miro_host.registries import LAWS
 from miro_robot.lm629.options import CHOICES
@@ -26,7 +27,7 @@ duration_s = 1
 reference.kind = "line"
 """
 CAMERAS = "pixels, geometric or gaussian"
-LAW_CHOICES = "yang_kim, body_frame, kanayama, dynamic_feedback or epsilon_tracking"
+LAW_CHOICES = use_one_of(LAWS.own)
 REFERENCES = "line, arc, sine or waypoints"
 NO_ARRAY = "expected an array of tables, got a table"
 
@@ -93,7 +94,7 @@ def test_what_is_left_out_is_the_realistic_loop():
         ('kind = "line" -> kid = "line"', f"reference.kind: this key is missing; use {REFERENCES}"),
         ('"line" -> "spiral"', f"reference.kind: 'spiral' is not one of the choices; use {REFERENCES}"),
         ('switching = "sing"', "switching: 'sing' is not one of the choices; use saturation or sign"),
-        ('law = "pid"', f"controller.law: 'pid' is not one of the choices; use {LAW_CHOICES}"),
+        ('law = "pid"', f"controller.law: 'pid' is not one of the choices; {LAW_CHOICES}"),
         ("kind = true", f"camera.kind: expected a string, got true or false (True); use {CAMERAS}"),
         ('kind = "pixel"', f"camera.kind: 'pixel' is not one of the choices; use {CAMERAS}"),
         ('kind = "pixels" -> noise = "none"', f"camera.kind: this key is missing; use {CAMERAS}"),

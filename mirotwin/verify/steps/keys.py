@@ -1,7 +1,8 @@
 """The steps that a scenario may have, each an action or a wait, and what a host may say in one: a frozen struct a kind.
 
 A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own. A new kind is a
-class here with `do`, in the table `PLAIN`, and a row on the page of the steps.
+class here with `do`, in the table `PLAIN`, and a row on the page of the steps. Its verb is no key that every step has.
+What a step leaves is an attribute of `Player`; `Run.result` and `play_at_port` put it into what is said of a run.
 """
 
 from __future__ import annotations
