@@ -7,8 +7,9 @@
     check.NAME                             verdict of that check
 
 To add a column, add a line to `COLUMNS`. It is made from a `Summary` and `Tracks`; what neither has yet is counted in
-`Tracks.add`, which sees every `Period`. Say what it means in docs/formats/parquet.md. A number that is added to a struct
-of `summary.json` (`_PARTS`) becomes one by itself. Statistics, pages and the table of docs/formats/parquet.md follow.
+`Tracks.add`, which sees every `Period`. Say what it means in docs/formats/parquet.md. A number that is added to a
+struct of `summary.json` (`_PARTS`) becomes one by itself. Statistics, pages and the table of that page
+follow.
 
 Wall times are in a file of their own (`results`), because all the rest is the same on every machine.
 """
