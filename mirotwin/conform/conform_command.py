@@ -260,6 +260,9 @@ def _test_case(outcome: Outcome, named: bool) -> TestCase:
 
 def _print_json(outcomes: Sequence[Outcome]) -> None:
     for outcome in outcomes:
+        first = msgspec.structs.asdict(outcome.failures[0]) if outcome.failures else None
+        if first:
+            del first["alone_hz"]  # a rule's trial always has robots
         line = {
             "rule": outcome.rule,
             "verdict": outcome.verdict,
@@ -267,7 +270,7 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
             "hint": outcome.hint or None,
             "why": outcome.why or None,
             "failures": len(outcome.failures),
-            "first": outcome.failures[0] if outcome.failures else None,
+            "first": first,
             "faults": outcome.fault_count,
         }
         click.echo(json_bytes(line))

@@ -99,7 +99,9 @@ def test_json_is_a_line_a_rule(mirotwin, tmp_path):
         ("P03", "failed", None, 0),
         ("P43", "not judged", "P03", 0),
     ]
-    assert lines[0]["first"]["wanted"] == "the wheels told as by team frame, seq 1 within 10 ms"
+    first = lines[0]["first"]
+    assert first["wanted"] == "the wheels told as by team frame, seq 1 within 10 ms"
+    assert list(first) == ["check", "network", "slot", "tick", "wanted", "found", "fault"]
 
 
 def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_path):
