@@ -317,8 +317,11 @@ class Timeline:
     def until(self, condition: Condition) -> Event | None:
         """Goes on to the first tick at which `condition` is true; None at the end or where it was interrupted."""
         while not self.run.over and not self.interrupted():
+            end_tick = self.run.world.period_end
+            if self.run.end_tick is not None:  # of an image it may lie within a period
+                end_tick = min(end_tick, self.run.end_tick)
             with suppress(WaitExpired):
-                event = self.run.world.run_until(condition, self.run.world.period_end - self._now)
+                event = self.run.world.run_until(condition, end_tick - self._now)
                 self._settle()
                 return event
             self._save()

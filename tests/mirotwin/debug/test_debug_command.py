@@ -233,6 +233,11 @@ def test_until_goes_on_to_an_event(console, name):
     assert "net0/robot0: command left STT" in out
 
 
+def test_until_ends_where_the_run_of_an_image_does(console, bare):
+    out = console(bare, "--max-cycles", 10, lines=["until heard"])
+    assert out.splitlines()[-1].startswith("0.0000055s  no such event before the end")
+
+
 def test_a_symbol_within_a_function_begins_no_other_one(console, tmp_path):
     for suffix, text in (".ihx", hex_text(ECHO)), (".cdb", ECHO_CDB), (".map", ECHO_MAP):
         (tmp_path / f"named{suffix}").write_text(text)
