@@ -86,7 +86,7 @@ def read(path: Path) -> Picture:
 
 
 def parse(data: bytes, origin: str, place: str = "") -> Picture:
-    """The same from the file's bytes; `origin` and `place` name them in errors."""
+    """The picture in the bytes of a PNG or PPM file; `origin` and `place` name them in errors."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a size that is refused below, of what is not looked at

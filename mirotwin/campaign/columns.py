@@ -36,7 +36,7 @@ OWN = ("run", "draw", "seed", *TEXTS)
 """Names that no factor can have."""
 CHECK = "check."
 SEEN = ("seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm")
-"""As `rms_*`, of measurements against the reference at their exposure: the error that the camera shows."""
+"""Root mean squares of the camera's measurements against the reference at their exposure."""
 _PARTS: tuple[tuple[str, tuple[str, ...], type], ...] = (
     ("", ("tracking",), Tracking),
     ("", ("theory",), Theory),

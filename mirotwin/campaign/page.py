@@ -82,7 +82,7 @@ def campaign_page(path: Path) -> bytes:
 
 
 def _by(rows: ResultRows) -> tuple[str, ...]:
-    """As many factors, from the first on, as make no more arms than a picture can have."""
+    """Factors, from the first on, whose combinations fit into the number of arms that a picture can have."""
     factors = rows.about.factors
     while factors and len(rows.groups(factors)) > MOST_ARMS:
         factors = factors[:-1]

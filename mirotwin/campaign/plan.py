@@ -224,7 +224,7 @@ def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
 
 
 def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
-    """The same note at the place of the campaign's file that made the setting."""
+    """`note`, with the place in the campaign's file that made the setting which it names."""
     for setting, place in places.items():
         head = f"{OPTION} {setting} "
         if note.startswith(head) and not place.startswith(OPTION):
@@ -233,7 +233,7 @@ def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
 
 
 def _placed(plan: Plan, places: dict[str, str], error: BadInput) -> BadInput:
-    """The same error at the place of the campaign file that made it; the whole line where no single place did."""
+    """`error`, at the place of the campaign's file that made it; with its whole line where no single place did."""
     found = f"{error.place}"
     for setting, place in places.items():
         if found in (" ".join(option_words(setting)), setting.partition("=")[0]):

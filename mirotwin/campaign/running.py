@@ -23,7 +23,7 @@ MANY_RUNS = 100_000
 
 
 class Tally(msgspec.Struct):
-    """So many of `runs` have an outcome, and so many are `new`: of this process."""
+    """How many of `runs` have an outcome (`done`), and how many of those come from this process (`new`)."""
 
     done: int = 0
     runs: int = 0

@@ -99,7 +99,7 @@ def _failure(run: Run, result: Result) -> str:
 
 
 def _verdicts(expectations: Iterable[Expectation]) -> dict[str, str]:
-    """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
+    """Verdicts of the run and of checks that steps began; a name that is there twice has its worst verdict."""
     found: dict[str, str] = {}
     for one in expectations:
         found[one.name] = judge([found.get(one.name, one.verdict), one.verdict])

@@ -46,7 +46,7 @@ class Versions(msgspec.Struct, frozen=True):
 
 @cache
 def versions() -> Versions:
-    """Those of this process, without plug-ins: looking takes 30 ms."""
+    """The versions of this process, without plug-ins, because looking for those takes 30 ms."""
     try:
         version = metadata.version("mirotwin")
     except metadata.PackageNotFoundError:
@@ -56,7 +56,7 @@ def versions() -> Versions:
 
 @lru_cache(maxsize=8)
 def versions_here(wanted: Versions) -> Versions:
-    """Those of this process, with the plug-ins of `wanted` as they were when it first looked."""
+    """The versions of this process, with the plug-ins of `wanted` as they were when it first looked."""
     names = [part.partition(": ")[0].partition(" ") for part in wanted.parts]
     found = (described_once(kind, name) for kind, _, name in names)
     return msgspec.structs.replace(versions(), parts=tuple(part for part in found if part))

@@ -99,7 +99,7 @@ class Workers:
 
 
 class Processes(Workers):
-    """So many processes of this machine."""
+    """`count` processes of this machine; as many as it has cores where none is given."""
 
     restarts = True
     option = "--jobs"

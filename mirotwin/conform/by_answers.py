@@ -72,7 +72,7 @@ class PortScript(TrialScript):
         return self.words() if self.standing else super().same(left, right)
 
     def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
-        """The same, where a PC can send it; else nothing, for as long."""
+        """Sends a frame that a PC can send; lets the frame's time pass without it otherwise."""
         before = len(self.said)
         frame = super().say(kind, payload, what, words, **how)
         if "bad_stop" in how or any(pause < SHORTEST_US for pause in how.get("pauses", {}).values()):

@@ -55,7 +55,7 @@ def _line(row: Row) -> str:
 
 
 def _collapsed(rows: list[Row]) -> Iterator[Row]:
-    """The same again and again is told once."""
+    """Joins equal rows that follow each other into one row with their number."""
     for (what, text), group in groupby(rows, key=lambda row: row[1:]):
         same = list(group)
         more = f" ({len(same)} times, until tick {same[-1][0]})" if len(same) > 1 else ""

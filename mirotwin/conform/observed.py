@@ -1,6 +1,6 @@
-"""What one robot was seen to do in a trial, by its wires and chips: nothing here knows a symbol of the firmware.
+"""What was observed of one robot in a trial, at its wires and chips: nothing here knows a symbol of the firmware.
 
-What a wheel is told is what its LM629 was told; what the robot says is what the PC heard; what the chips are doing is
+An order to a wheel is a command to its LM629; an answer of the robot is what the PC received; the state of the chips is
 read at the start of each control period.
 """
 
@@ -28,13 +28,13 @@ Words = tuple[int, ...]
 T = TypeVar("T", Event, Order, "ReceivedAnswer")
 
 
-def within(found: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
-    """Those of them that came in between."""
-    return [one for one in found if after_tick < one.tick <= until_tick]
+def within(items: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
+    """The items of `items` later than `after_tick` and not later than `until_tick`."""
+    return [one for one in items if after_tick < one.tick <= until_tick]
 
 
 class ReceivedAnswer(msgspec.Struct, frozen=True):
-    """A valid answer that the PC had heard whole at `tick`; `said` is None where its content is nothing known."""
+    """A valid answer that the PC had received whole at `tick`. `said`: its content; None where that is not known."""
 
     tick: int
     frame: Received
@@ -42,7 +42,7 @@ class ReceivedAnswer(msgspec.Struct, frozen=True):
 
 
 class Observed:
-    """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: what came later was not told.
+    """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: the end of the observation.
 
     `filters`: tick and filter words (kp, ki, kd, il) that a chip took, by side.
     """
@@ -62,7 +62,7 @@ class Observed:
         self.periods: list[tuple[int, RobotPeriod]] = []
         self.samples: list[tuple[int, int, int]] = []  # when looked at; next samples of left and right
 
-    # ---- told by the monitor ------------------------------------------------------------------------------------
+    # ---- reported by the monitor --------------------------------------------------------------------------------
 
     def take(self, event: Event) -> None:
         self.events.append(event)
@@ -79,8 +79,8 @@ class Observed:
             self.answers.append(ReceivedAnswer(event.tick, event.frame, said))
 
     def forget(self, data: bytes) -> None:
-        """Takes back what was heard last of these characters: another robot said them."""
-        # the last ones: the robot that is tried may have said the same before
+        """Removes the last reception of these characters: another robot sent them."""
+        # the last ones: the robot under test may have sent the same characters before
         start = bytes(event.value for event in self.heard).rfind(data)
         del self.heard[start : start + len(data)]
 
@@ -90,7 +90,7 @@ class Observed:
         self.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
 
     def restarted(self, tick: int) -> None:
-        """The processor starts again: nothing that wheels were told before holds on."""
+        """The processor starts again: earlier orders to the wheels do not hold on."""
         self._orders = Orders()
         for side in SIDES:
             self.orders[side].append(Order(tick, side, "off"))
@@ -109,10 +109,10 @@ class Observed:
         elif event.opcode == _UDF:
             self.filters[event.side].append((event.tick, tuple(self._filter[event.side])))
 
-    # ---- asked by the rules --------------------------------------------------------------------------------
+    # ---- requested by the rules ----------------------------------------------------------------------------
 
     def told(self, side: str, tick: int) -> Order:
-        """What the wheel was told last, up to and including `tick`."""
+        """The last order to the wheel, up to and including `tick`."""
         return next(order for order in reversed(self.orders[side]) if order.tick <= tick)
 
     def both_told(self, tick: int) -> tuple[Order, Order]:

@@ -74,7 +74,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
 
 
 def _other_layout(script: TrialScript) -> TrialScript:
-    """The same host, which from now on speaks to a network of the other size."""
+    """A script that goes on where `script` stands, and sends frames for a network of the other size."""
     other = TrialScript(next(topology for topology in BOTH if topology.robots != script.n), script.network)
     other.topology = Topology(other.n, script.topology.slots)
     other.now, other.seq = script.now, script.seq

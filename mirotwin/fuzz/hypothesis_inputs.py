@@ -110,7 +110,7 @@ def _settings(size: int, slot: int) -> Bytes:
 
 
 def _unknown(size: int, slot: int) -> Bytes:
-    """The same with any opcode, and no zeros after it."""
+    """Payloads of service frames for this robot, with any opcode and any bytes after it."""
     return _exactly(size - 1).map(lambda drawn: _BYTES[slot] + drawn)
 
 

@@ -160,7 +160,7 @@ def export(options: ExportOptions) -> int:
 
 
 def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[bytes]:
-    """The same; a network that was asked for and is not there is an error, before anything takes its place."""
+    """Passes `pieces` on. Raises BadInput for a requested network that is not there, before a file is replaced."""
     yield from pieces
     if exported.network is not None and not exported.down + exported.up and exported.failure is None:
         there = ", ".join(map(str, sorted(exported.networks))) or "none"

@@ -17,7 +17,7 @@ ERRORS = (
 )
 """Title, label of the axis, column, and the band that counts as settled, with its unit."""
 MOST_INNER = 8
-"""So many inner values are drawn; a recording holds them all."""
+"""Largest number of inner values that are drawn; a recording holds them all."""
 WIDTH = 1000
 LEFT, RIGHT, TOP, BOTTOM = 66, 20, 86, 20
 PANEL, INNER, GAP = 260, 110, 74

@@ -201,7 +201,7 @@ def _said(job: Job, again: WatchedRun) -> list[str]:
 
 
 def _summary(recording: Path, digest: str) -> Summary | None:
-    """That of the same run, which stands beside its recording; None where there is none that can be read."""
+    """The summary beside the recording, if it is of the run with this digest and can be read; else None."""
     for name in SUMMARIES:
         path = recording.with_name(name)
         if path.is_file():

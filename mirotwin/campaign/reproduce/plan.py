@@ -41,7 +41,7 @@ class Start(msgspec.Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """As scenarios and pictures are called."""
+        """The name of the scenario and of the picture."""
         return f"fig{self.figure}"
 
 
@@ -98,7 +98,7 @@ class RunGroup(msgspec.Struct, frozen=True):
 
     @property
     def label(self) -> str:
-        """As rows are labelled, and files of recordings are named: fig7-paper, fig7-improved-white-noise."""
+        """The label of the row and the name of its recording: fig7-paper, fig7-improved-white-noise."""
         parts = [self.start.name, self.controller, self.camera, self.disturbance]
         return "-".join(
             part.replace(",", "").replace("/", "-per-").replace(" ", "-") for part in parts if part

@@ -47,7 +47,7 @@ def presupposed(rule: Rule) -> tuple[Rule, ...]:
 
 
 def presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
-    """The same rules, each after those of them that it presupposes."""
+    """`rules` in an order in which each comes after those of them that it presupposes."""
     tried = {rule.id: rule for rule in rules}
     ordered: dict[str, Rule] = {}
     for rule in rules:

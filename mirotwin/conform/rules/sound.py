@@ -112,7 +112,7 @@ def supply(script: TrialScript) -> None:
 
 
 def _begins_again(script: TrialScript, tick: int, step: int, what: str) -> None:
-    """As from power-on, at `tick`: the motors are off, and a frame is fresh however many steps on."""
+    """Expects the state after power-on, from `tick` on: motors off, and a frame is fresh however many steps on."""
     script.wait_until(tick + ms(BOOTED_MS))
     script.wait(45.0)
     keeps_off(script, tick, script.now)

@@ -20,7 +20,7 @@ from mirotwin.report.foxglove.messages import (
 STRAIGHT = Quaternion(0.0, 0.0, 0.0, 1.0)
 ORIGIN = Pose(Vector3(0.0, 0.0, 0.0), STRAIGHT)
 SCREEN_GAMMA = 0.45
-"""As the camera's: a paint is a share of light, a colour is what a screen is told."""
+"""Gamma of a screen, as of the camera: a paint is a share of light, a colour is the value sent to a screen."""
 
 Point = tuple[float, float]
 

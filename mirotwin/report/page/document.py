@@ -86,7 +86,7 @@ def write_page(out: Path, page: bytes, quiet: bool = False) -> int:
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """As people read it; a dash for none."""
+    """The number in `digits` significant digits; a dash for None."""
     return "\u2013" if value is None else f"{value:.{digits}g}"
 
 

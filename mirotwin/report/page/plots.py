@@ -20,7 +20,7 @@ from mirotwin.report.page.tracks import SIDES, PageTracks
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 MOST_FAILURES = 20
-"""So many are marked; the table has more."""
+"""Largest number of failures that are marked; the table has more."""
 KIND_COLOURS = {
     "noise": "noise",
     "open": "rule",

@@ -50,7 +50,7 @@ class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
 
 
 def frames_needed(params: Radio, characters: int) -> int:
-    """So many frames in a row that a radio like this does not lose all of them; 0: nothing can be said."""
+    """How many frames in a row a radio like this does not all lose; 0: no such number is known."""
     if abs(params.baud_offset_ppm - params.crystal_offset_ppm) > FURTHEST_PPM:
         return 0
     arrives = 1.0 - threshold(params.lost_frames) / ONE

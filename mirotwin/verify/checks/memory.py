@@ -9,7 +9,7 @@ from miro_robot.mcs51.cpu import Cpu
 
 
 class Memory:
-    """As they are when they are read."""
+    """Variables of the firmware, each with its value at the moment of reading."""
 
     def __init__(self, cpu: Cpu, image: Image) -> None:
         self._cpu = cpu

@@ -129,11 +129,11 @@ class ActsCheck(Check, frozen=True, kw_only=True):
 
 
 class ActsWithin(ActsCheck, frozen=True, kw_only=True, tag="acts_within_ms"):
-    """On each fresh team frame both wheels are told its velocities in time, unless that is 0 and they stop already."""
+    """On each fresh team frame both wheels receive its velocities in time, unless that is 0 and they stop already."""
 
 
 class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_ms"):
-    """The same, for the first valid frame after characters that are no frame."""
+    """On the first valid frame after characters that are no frame both wheels receive its velocities in time."""
 
     AFTER_DAMAGE = True
 

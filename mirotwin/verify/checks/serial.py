@@ -10,7 +10,7 @@ from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, Subj
 
 
 class Character(NamedTuple):
-    """As the serial port had it. `tick`: RI or TI went up.
+    """A character that the serial port sent or received. `tick`: RI or TI went up.
 
     `stop_good`: the stop bit was a mark, so far as the mode of the serial port can tell.
     """

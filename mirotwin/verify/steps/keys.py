@@ -134,7 +134,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
         bits = 8 * (form.wire_size - first)
         for bit in self.wrong_bits:
             if not 0 <= bit < bits:
-                return f"wrong_bits: {bit} is none of {bits} bits from HDR to CRC; use 0 to {bits - 1}"
+                return f"wrong_bits: bit {bit} is out of range 0..{bits - 1}, the bits from HDR to CRC"
         if sorted({*range(form.wire_size)}.intersection(self.bad_stop)) != [*self.bad_stop]:
             what = f"bad_stop: {[*self.bad_stop]} are not characters of the frame in their order"
             return f"{what}; use 0 to {form.wire_size - 1}"
@@ -472,7 +472,7 @@ def beyond(slot: int | None, robots: int) -> str:
 
 
 def absent(slot: int | None, network: ScenarioNetwork) -> str:
-    """The same for a slot without a robot."""
+    """What is wrong with a slot that has no robot on `network`, or the empty string."""
     slots = sorted(robot.slot for robot in network.robot)
     if slot is None or slot in slots:
         return ""

@@ -38,10 +38,10 @@ WHEELS = Wheels()
 
 
 class Host(FrameSender):
-    """That of one network; its first frame has number 1.
+    """The host of one network; its first frame has number 1.
 
-    Of its stream of team frames, the next one's first start bit is due at `due_tick`, which is announced `lead_ticks`
-    before; so many frames are `left`, None: no end.
+    It sends a stream of team frames. The first start bit of the next frame is due at `due_tick`, and is announced
+    `lead_ticks` before. `remaining`: frames that it still sends; None: no end.
     """
 
     def __init__(self, machine: Machine, network: int) -> None:
@@ -62,7 +62,7 @@ class Host(FrameSender):
         """Frames from now on, with the velocities that were sent or commanded last."""
         self.due_tick = self.machine.earliest_tick(self.network)
         self.lead_ticks = self.due_tick - self.machine.tick
-        self.every_ticks, self.ask, self.left = every_ticks, ask, frames
+        self.every_ticks, self.ask, self.remaining = every_ticks, ask, frames
         self.top_up()
 
     def end(self) -> None:
@@ -79,9 +79,9 @@ class Host(FrameSender):
         while self.next_tick <= self.machine.tick:
             self.put(self.team(self.ask))
             self.due_tick += self.every_ticks
-            if self.left is not None:
-                self.left -= 1
-                if not self.left:
+            if self.remaining is not None:
+                self.remaining -= 1
+                if not self.remaining:
                     self.end()
 
 
@@ -108,9 +108,11 @@ class _Failed(Exception):
 
 
 class Player:
-    """`steps`: those that the machine can do and show, up to the first that it cannot do and that changes what follows;
-    `unseen`: a line for each that it cannot do or show. `count`: of all steps; `done`: so many were. `saved`: by name,
-    what `save` steps kept. `checks`: those that steps began.
+    """Plays the steps of a scenario on a machine.
+
+    `steps`: the steps that the machine can do and show, up to the first that it cannot do and that changes what
+    follows. `unseen`: a line for each step that it cannot do or show. `count`: number of all steps; `done`: number of
+    steps done. `saved`: states of `save` steps, by name. `checks`: checks that steps began.
     """
 
     def __init__(self, machine: Machine, steps: Sequence[Step], origin: str = "") -> None:
@@ -188,7 +190,7 @@ class Player:
             raise _Failed(event.tick, said, self._other(wanted, event))
 
     def hold(self, condition: Condition, for_ms: float, never: bool) -> None:
-        """So long from now on, in which the wheels have to turn so fast, or the condition must `never` become true."""
+        """Watches for `for_ms`: the wheels have to keep their speeds, or the condition must `never` become true."""
         machine, forbidden, said = self.machine, condition, f"no {condition}"
         if isinstance(condition, WheelSpeeds) and not never:
             holds = condition.predicate
@@ -205,7 +207,7 @@ class Player:
             raise _Failed(machine.tick, f"{for_ms:g} ms of it", self._end())
 
     def _forget(self) -> None:
-        """What has happened before now does not count."""
+        """Passes over the events up to now."""
         self.machine.waits.collect()
         self.machine.waits.pass_over()
 
@@ -225,7 +227,7 @@ class Player:
             self._top_up()
 
     def pause(self, for_ms: float) -> None:
-        """Lets time pass; what happens is kept for the next wait."""
+        """Lets time pass; the next wait also sees the events of this time."""
         machine, until_tick = self.machine, self.machine.tick + ms_ticks(for_ms)
         while machine.tick < until_tick and not machine.finished:
             longest_tick = machine.tick + CONTROL_PERIOD_TICKS
@@ -258,7 +260,7 @@ class Player:
         return f"that {stopped}"
 
     def _nothing(self, wanted: Condition, seen: Sequence[Event]) -> str:
-        """What there was instead of the event that was wanted."""
+        """The text of what happened instead of the event that was wanted."""
         found = [self._end()] if self.machine.finished else []
         if isinstance(wanted, WheelSpeeds):
             found.append(self._speeds(wanted))
@@ -286,7 +288,7 @@ class Player:
 
 
 def _meanwhile(seen: Sequence[Event]) -> str:
-    """What happened in a wait, in one line: how much of each kind, and what was last."""
+    """The events of a wait in one line: the count of each kind, and the last event."""
     events = [event for event in seen if event.what != "true"]
     if not events:
         return "nothing happened meanwhile"

@@ -37,7 +37,7 @@ WRONG = {
     '{ send = "team", network = 1 }': "step 1.network: there is no network 1; use 0",
     '{ send = "team", team_m_s = [[0, 0]] }': "step 1.team_m_s: 1 pair for 3 slots; give one pair",
     '{ send = "team", slot = 0, team_m_s = [[0, 0], [0, 0], [0, 0]] }': "step 1.team_m_s: tells all slots; leave",
-    '{ send = "team", wrong_bits = [120] }': "step 1.wrong_bits: 120 is none of 120 bits from HDR to CRC; use 0",
+    '{ send = "team", wrong_bits = [120] }': "step 1.wrong_bits: bit 120 is out of range 0..119, the bits from HDR",
     '{ send = "team", bad_stop = [3, 3] }': "step 1.bad_stop: [3, 3] are not characters of the frame in their",
     '{ send = "poll", seq = 3, slot = 1 }': "step 1.seq: 3 does not ask robot 1; leave it out",
     '{ send = "filter", kp = 1, ki = 1, kd = 1 }': "step 1.il: this key is missing; add it",
