@@ -178,6 +178,8 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
         end_tick = job.end_tick
         with plain_parameters(subject):
             world = job.spec.world()
+        if world.robots:  # whole control periods: what follows a case's failure may be looked at
+            end_tick = -(-end_tick // world.period_ticks) * world.period_ticks
     network, index = _which_robot(world, options)
     return InspectedRun(world, network, index, end_tick, job)
 

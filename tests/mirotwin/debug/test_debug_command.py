@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -236,6 +237,12 @@ def test_until_goes_on_to_an_event(console, name):
 def test_until_ends_where_the_run_of_an_image_does(console, bare):
     out = console(bare, "--max-cycles", 10, lines=["until heard"])
     assert out.splitlines()[-1].startswith("0.0000055s  no such event before the end")
+
+
+def test_a_robots_case_is_stepped_on_to_the_end_of_its_last_control_period(console):
+    case = Path(__file__).parents[2] / "vectors/cases/silent-case.stream"
+    out = console(case, lines=["continue", "continue", "print tick"])
+    assert "tick = 6406404" in out
 
 
 def test_a_symbol_within_a_function_begins_no_other_one(console, tmp_path):
