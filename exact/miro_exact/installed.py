@@ -75,7 +75,7 @@ def owner(entry: EntryPoint) -> str:
 
 
 def place(entry: EntryPoint) -> str:
-    """The same, with what it registers."""
+    """Name and version of the distribution, and what it registers."""
     return f"{owner(entry)} ({entry.value})"
 
 
@@ -90,7 +90,7 @@ def described(kind: str, name: str) -> str:
 
 
 described_once = cache(described)
-"""As `described` when this process looked first, which is about when it loaded the plug-in."""
+"""What `described` gave at its first call in this process, which is about when the plug-in was loaded."""
 
 
 def differences(

@@ -108,7 +108,7 @@ class Console(Cmd):
         return stop
 
     def do(self, line: str) -> str:
-        """The same, which shows nothing; returns the verb. Raises BadInput."""
+        """Runs one line and shows nothing; returns the verb. Raises BadInput."""
         self.lines.clear()
         word, _, rest = line.strip().partition(" ")
         if word == "r" and rest:

@@ -95,7 +95,7 @@ def content(value: Value) -> Any:
 
 
 def number(value: Value) -> Any:
-    """The same of a single number; an array is its address. Raises NoValue."""
+    """The value as a single number; of an array its address. Raises NoValue."""
     if value.kind is not None and value.kind.kind == "array":
         return value.address
     found = content(value)

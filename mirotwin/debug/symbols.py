@@ -178,7 +178,7 @@ class Moment:
         return "" if places is None else places.name
 
     def _variable(self, name: str, module: str) -> Variable | None:
-        """The one of this file before that of all files. Raises NoValue where several others have it."""
+        """The variable: one of this file before a global one. Raises NoValue where several other files have one."""
         line = self.symbols.line(self.pc)
         own = AnyPath(line.file).stem if line else ""
         there = self.symbols.variables.by_name.get(name, ())
@@ -230,7 +230,7 @@ class Moment:
         return None if function is None else self.symbols.local_places(function)
 
     def variables(self, scope: str, module: str = "") -> dict[str, Callable[[], Value]]:
-        """Those of a function or a file that have a place in memory, or "" of all; by name.
+        """The variables of a function or a file ("": of all) that have a place in memory, by name.
 
         `module`: the file whose function is meant where several have one of this name.
         """

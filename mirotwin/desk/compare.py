@@ -45,7 +45,7 @@ GAP_TICKS = 2 * TICKS_PER_MS
 STATUS = 0xA2
 """Command error, excessive error, motor off: bits of an LM629's status that do not depend on what was before."""
 STATUS_AT_START = 0x22
-"""The same without motor off, for a question that starts motors: the sample after it may come before the answer."""
+"""`STATUS` without motor off, for a question that starts motors: the sample after it may precede the answer."""
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 """A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
@@ -94,7 +94,7 @@ def _by_slot(periods: Sequence[Period]) -> dict[int, list[LogEntry]]:
 
 
 def _side_by_side(port: Sequence[LogEntry], twin: Sequence[LogEntry], until_tick: int) -> list[Pair]:
-    """With the ticks of the port less the shortest delay. After `until_tick` none of its answers is missing."""
+    """Pairs of answers, the port's ticks less the shortest delay. After `until_tick` no answer counts as missing."""
     heard = defaultdict(list)
     for answer in port:
         heard[answer.text].append(answer.tick)

@@ -68,7 +68,7 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
 
 
 class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
-    """The same, and the part of the run that is looked at."""
+    """A subject with its options, and the part of its run that is inspected."""
 
     from_time: Annotated[Time | None, FROM] = None
     to_time: Annotated[Time | None, TO.saying("End there. Default: the end of the run.")] = None

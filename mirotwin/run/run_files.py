@@ -200,7 +200,7 @@ def _keep_frame(recorder: Recorder, view: View) -> None:
 
 
 def digest_in(folder: Path) -> str:
-    """That of the summary which an earlier run left there; "" where there is none that can be read."""
+    """The digest in the summary of an earlier run; "" where there is none that can be read."""
     try:
         return msgspec.json.decode(read_input(folder / SUMMARY), type=Summary).digest
     except (BadInput, OSError, msgspec.DecodeError):

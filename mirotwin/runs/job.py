@@ -28,6 +28,7 @@ from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
+from miro_sim.world.machine import no_network
 from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.capture.layout import frame_counts
@@ -78,8 +79,7 @@ def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None)
     before: dict[int, Transmission] = {}
     for one in script:
         if one.network >= networks:
-            what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
-            raise BadInput("", f"tick {one.tick}", what)
+            raise BadInput("", f"tick {one.tick}", no_network(one.network, networks))
         if isinstance(one, Transmission):
             last = before.get(one.network)
             if last is not None and one.tick < last.end_tick:

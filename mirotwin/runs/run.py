@@ -92,9 +92,9 @@ class Run:
         on_period: Callable[[Period], object] = lambda period: None,
         move: Callable[[], object] | None = None,
     ) -> None:
-        """The same, recorded to `stream` and in `tracks`, flushed several times a second. `begun` gets the recorder.
+        """Runs to the end, recorded to `stream` and in `tracks`, flushed several times a second.
 
-        `hold` holds signals, except while the world is moved.
+        `begun` gets the recorder. `hold` holds signals, except while the world is moved.
         """
 
         from mirotwin.recording.recorder import Recorder  # loads the library of the format
@@ -164,7 +164,7 @@ class Run:
         return self.failures[0] if self.failures else None
 
     def verdict_on(self, name: str) -> Verdict:
-        """That of one check."""
+        """The verdict of one check."""
         return next(one.verdict for one in self.checks.verdicts() if one.name == name)
 
     def result(self) -> Result:
@@ -212,7 +212,7 @@ class Run:
         return max(self.world.scenario.end_tick, *(failure.tick for failure in self.failures[:1]), 0)
 
     def stream(self, expect: Mapping[str, Any] = {}, verdict: str = "") -> str:
-        """The same run as a stream: the case of the check in `expect`, of which nothing is expected without one."""
+        """This run as a stream: the case of the check in `expect`; without a check the stream expects nothing."""
         return case_text(self.world, self._known_trace(), expect, verdict, self._end_tick)
 
     def case_of_step(self) -> str | None:

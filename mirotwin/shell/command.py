@@ -111,7 +111,7 @@ class Option:
         self.origin = self
 
     def saying(self, help: str, **others: Any) -> Option:
-        """The same option with this help, and perhaps other attributes."""
+        """A copy of the option with this help, and perhaps other attributes."""
         other = copy(self)
         vars(other).update(help=help, **others)
         return other

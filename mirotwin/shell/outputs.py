@@ -228,7 +228,7 @@ def check_file(path: Path, option: str, *inputs: str | Path | None) -> None:
 
 
 def check_new(path: Path, option: str, force: bool, *inputs: str | Path | None, more: str = "") -> None:
-    """The same for an output that replaces a file only by `force`; `more` is another way out. Raises OutputError."""
+    """Raises OutputError as `check_file`, and without `force` for a file that exists; `more` is another way out."""
     check_file(path, option, *inputs)
     if path.exists() and not force:
         ways = f"choose another file with {option}, {more}or replace it with --force"

@@ -60,7 +60,7 @@ class Rig:
         return self.result()
 
     def result(self) -> Result:
-        """The same as far as it is known."""
+        """The result as far as it is known."""
         return self.run.result()
 
     def head(self) -> list[str]:

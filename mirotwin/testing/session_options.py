@@ -97,7 +97,7 @@ def number_option(config: pytest.Config, name: str, default: int) -> int:
 
 
 def path_option(config: pytest.Config, name: str) -> Path | None:
-    """The same for paths: an option's goes from where pytest was called, an ini file's from where that lies."""
+    """A path: relative to where pytest was called for an option, to the ini file's folder for an ini file."""
     given = config.getoption(f"--mirotwin-{name}")
     if given is not None:
         return Path(config.invocation_params.dir, given)

@@ -327,7 +327,7 @@ class EmptyBoard(ProcessorBoard):
 
     @property
     def fresh_pages(self) -> bytes:
-        """Those of them that were written since the last digest."""
+        """The pages of RAM that were written since the last digest."""
         return self._content(_FRESH)
 
     @fresh_pages.setter

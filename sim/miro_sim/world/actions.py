@@ -36,7 +36,7 @@ class WaitingAction(NamedTuple):
 
 
 class Actions:
-    """Those of one line. `done`: the actions of the control period that is under way, a record."""
+    """The actions of one line. `done`: those of the control period that is under way, a record."""
 
     STATE = {
         "waiting": Rows(

@@ -35,8 +35,8 @@ _CHIP_PINS = ("cs", "rd", "wr", "ps", "rst", "hi", "pwm", "sign")
 _WIRES = ("rxd", "txd", *(f"{side}.{pin}" for side in ("left", "right") for pin in _CHIP_PINS))
 PORT_PINS = {f"P{port}.{bit}": (port, bit) for port in range(4) for bit in range(8)}
 PINS = (*_WIRES, *PORT_PINS)
-"""Those of a board that one can wait for. Encoder channels and busy bits are not among them: the board learns of their
-edges late."""
+"""The pins of a board that one can wait for. Encoder channels and busy bits are not among them: the board learns
+of their edges late."""
 
 
 class Condition(
@@ -296,7 +296,7 @@ def _name_of(predicate: Any) -> str:
 
 
 Recorded = Answer | Heard | Frame | Command | Received | Transmitted | Sent | Fault | Touch
-"""Those that happen whether somebody waits for them or not: the logs hold them, so a check can judge them."""
+"""The conditions that are logged whether somebody waits for them or not, so that a check can judge them."""
 CONDITIONS: dict[str, type[Condition]] = {
     str(struct.__struct_config__.tag): struct
     for struct in (

@@ -53,7 +53,7 @@ class Device:
         return self.board.run(tick)
 
     def _run_asking(self, tick: int) -> int:
-        """The same in steps, with the predicates asked after each."""
+        """Runs the board to `tick` in steps, and evaluates the predicates after each."""
         board = self.board
         stopped = 0
         while not stopped and board.cpu.cycles * CYCLE_TICKS < tick:

@@ -117,3 +117,8 @@ def require(machine: Machine, wanted: object, needs: Feature | None) -> None:
     """Raises NotObservable for what the machine cannot show or do."""
     if why := why_not(machine, wanted, needs):
         raise NotObservable(why)
+
+
+def no_network(index: int, count: int) -> str:
+    """Why network `index` is refused where there are `count`."""
+    return f"network {index} does not exist; there {'is' if count == 1 else 'are'} {count}, numbered from 0"

@@ -58,7 +58,7 @@ class Medium:
 
     @property
     def first_slot(self) -> int:
-        """That of its first device."""
+        """The slot of its first device."""
         return int(self.devices[0].slot)
 
     def device(self, slot: int) -> Device:

@@ -118,7 +118,7 @@ class Robot(Device):
 
 
 def _named(error: PluginError, robot: str, tick: int) -> PluginError:
-    """The same with the robot it is of, and when."""
+    """The error with its robot and its tick."""
     return PluginError(f"{robot}: tick {tick} ({seconds(tick):.6f} s): {error.what}", error.remedy)
 
 

@@ -11,6 +11,7 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_protocol.toml_text import struct_of
 from miro_sim.world.conditions import CONDITIONS, Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
+from miro_sim.world.machine import no_network
 
 if TYPE_CHECKING:
     from miro_sim.world.machine import Machine
@@ -111,7 +112,7 @@ class Watch:
             struct_of(msgspec.to_builtins(condition), type(condition))
         lines = self.world.lines
         if not 0 <= condition.network < len(lines):
-            raise ValueError(f"there is no network {condition.network}; the last one is {len(lines) - 1}")
+            raise ValueError(no_network(condition.network, len(lines)))
         slot = condition.at_slot(lines[condition.network].first_slot)
         if isinstance(condition, WheelSpeeds):
             self.world.robot(condition.network, slot)

@@ -32,7 +32,7 @@ from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.conditions import Condition
 from miro_sim.world.device import Device
 from miro_sim.world.events import Event
-from miro_sim.world.machine import Feature
+from miro_sim.world.machine import Feature, no_network
 from miro_sim.world.medium import Medium
 from miro_sim.world.saved import Identity, opened, sealed
 from miro_sim.world.waits import Waits
@@ -126,7 +126,7 @@ class World:
 
     @property
     def lacks(self) -> Mapping[Feature, str]:
-        """As of every machine; a twin shows all."""
+        """Nothing: a twin shows everything (`Machine.lacks`)."""
         return {}
 
     @property
@@ -219,7 +219,7 @@ class World:
 
     def _line(self, index: int) -> Medium:
         if not 0 <= index < len(self.lines):
-            raise ValueError(f"there is no network {index}; the last one is {len(self.lines) - 1}")
+            raise ValueError(no_network(index, len(self.lines)))
         return self.lines[index]
 
     def device(self, network: int = 0, slot: int = 0) -> Device:
@@ -400,7 +400,7 @@ class World:
         self.go_on_from(self._opened[1])
 
     def go_on_from(self, flat: bytes) -> None:
-        """The same from what `state.save` gave of this world, which has no seal to be checked."""
+        """Goes on from what `state.save` gave of this world; it has no seal to check."""
         self.state.load(flat)
         if self.bodies is not None:
             self.bodies.start_at(self.tick)
@@ -436,9 +436,11 @@ class World:
 def _check_senders(script: Sequence[ScriptItem], hosts: int) -> None:
     """Raises ValueError for a transmission of no host."""
     for item in script:
-        if isinstance(item, Transmission) and (item.direction != DOWN or not 0 <= item.network < hosts):
-            sender = f"{item.direction!r} of network {item.network}"
-            raise ValueError(f"tick {item.tick}: {sender} is none of the {hosts} hosts")
+        if isinstance(item, Transmission):
+            if item.direction != DOWN:
+                raise ValueError(f"tick {item.tick}: no host sends {item.direction!r}; give {DOWN!r}")
+            if not 0 <= item.network < hosts:
+                raise ValueError(f"tick {item.tick}: {no_network(item.network, hosts)}")
 
 
 def _total(values: Sequence[int | None]) -> int | None:

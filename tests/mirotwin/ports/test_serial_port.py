@@ -207,7 +207,7 @@ def test_a_firmware_fault_ends_every_call_with_its_name(miro, tmp_path):
     [
         ("miro://nope", "no such scenario"),
         ("miro://fig6?firmware=/no/such.ihx", "there is no such file; build it, or give the path of an .ihx"),
-        ("miro://fig6?network=1", "there is no network 1"),
+        ("miro://fig6?network=1", "network 1 does not exist; there is 1, numbered from 0"),
         ("miro://fig6?set=duratio_s=3", "duratio_s"),
     ],
 )

@@ -136,7 +136,7 @@ def test_a_recording_without_a_control_period_is_refused(mirotwin, tmp_path):
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        ({"network": 7}, "tick 96000: network 7, but the scenario has 1, numbered from 0"),
+        ({"network": 7}, "tick 96000: network 7 does not exist; there is 1, numbered from 0"),
         ({"tick": 96_000 + 800_800 - 1}, "starts before the transmission of tick 896799 has ended"),
     ],
 )

@@ -199,7 +199,7 @@ def test_actions_are_events_that_say_what_was_done():
     ("action", "what"),
     [
         (Reset(119, 0, 0, 1), "the earliest is 120"),
-        (Reset(120, 1, 0, 1), "there is no network 1"),
+        (Reset(120, 1, 0, 1), "network 1 does not exist; there is 1, numbered from 0"),
         (Power(120, 0, 2, 1), "no robot in slot 2; there is 0"),
         (Reset(120, 0, 0, 2), "level 2; give 0 or 1"),
         (RadioState(120, 0, "loud"), "give up, down, noise"),

@@ -209,8 +209,8 @@ def test_a_bad_stop_bit_of_no_character_is_refused(bad_stop):
 @pytest.mark.parametrize(
     ("sent", "what"),
     [
-        (Transmission(5, "<", b"a"), "tick 5: '<' of network 0 is none of the 2 hosts"),
-        (Transmission(5, ">", b"a", 2), "tick 5: '>' of network 2 is none of the 2 hosts"),
+        (Transmission(5, "<", b"a"), "tick 5: no host sends '<'; give '>'"),
+        (Transmission(5, ">", b"a", 2), "tick 5: network 2 does not exist; there are 2, numbered from 0"),
         (Transmission(5, ">", b"a", 0, (1,)), "must be ascending indices of 1 characters"),
     ],
 )
@@ -221,7 +221,7 @@ def test_a_script_that_no_host_can_send_is_refused(sent, what):
 
 @pytest.mark.parametrize("network", [-1, 2])
 def test_a_network_that_is_not_there_is_refused(network):
-    with pytest.raises(ValueError, match=f"there is no network {network}; the last one is 1"):
+    with pytest.raises(ValueError, match=f"network {network} does not exist; there are 2, numbered from 0"):
         silent().inject(FRAME, network)
 
 

@@ -181,7 +181,7 @@ def test_a_wait_without_end_ends_with_the_run():
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
-        (wait.Answer(network=2), "there is no network 2; the last one is 1"),
+        (wait.Answer(network=2), "network 2 does not exist; there are 2, numbered from 0"),
         (wait.Answer(slot=12), "slot: is out of range; must be <= 4"),
         (wait.Answer(accepted=300), "accepted: is out of range; must be <= 255"),
         (wait.Received(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
